@@ -1,0 +1,60 @@
+"""What can go wrong, as data: the command line turns it into messages and exit statuses in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class NutdampError(Exception):
+    """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing wrong in an input file.
+
+    ``line`` and ``column`` count from 1; 0 means that the fault has no place in the file.
+    ``where`` is the path of keys, such as ``thrusters[1].force``; empty for the file as a whole.
+    """
+
+    file: str
+    line: int
+    column: int
+    where: str
+    problem: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        return f"{place}: {self.where}: {self.problem}" if self.where else f"{place}: {self.problem}"
+
+
+class FaultyFile(NutdampError):
+    """An input file says something that cannot be; carries all its faults, in the order of the file."""
+
+    def __init__(self, faults: list[Fault]) -> None:
+        self.faults = sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+class BadRequest(NutdampError):
+    """A call or a command line that asks for something impossible, whatever the spacecraft."""
+
+
+class CannotRead(NutdampError):
+    """A file that could not be read."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path, self.reason = path, reason
+        super().__init__(f"cannot read {path}: {reason}")
+
+
+class CannotWrite(NutdampError):
+    """A file that could not be written; what stood there before still stands."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path, self.reason = path, reason
+        super().__init__(f"cannot write {path}: {reason}")
+
+
+class Infeasible(NutdampError):
+    """A scheme that cannot work with this spacecraft within its limits; the text says why."""
