@@ -1,0 +1,112 @@
+"""Attitude: the one place that knows the quaternion convention.
+
+A quaternion (w, x, y, z) is a unit quaternion, scalar first, that leads from body axes to the inertial frame:
+v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p. Arrays may carry leading axes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def multiply(left: Array, right: Array) -> Array:
+    """Product of two quaternions, (..., 4) each: the turn ``right``, then the turn ``left``."""
+    w1, x1, y1, z1 = np.moveaxis(np.asarray(left), -1, 0)
+    w2, x2, y2, z2 = np.moveaxis(np.asarray(right), -1, 0)
+    return np.stack(
+        [
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Components in the inertial frame of a vector given in the body, (..., 4) and (..., 3) -> (..., 3)."""
+    scalar, axis = quaternion[..., :1], quaternion[..., 1:]
+    twice = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * twice + np.cross(axis, twice), dtype=np.float64)
+
+
+def matrix(quaternion: Array) -> Array:
+    """Rotation matrix body -> inertial, (4,) -> (3, 3); its columns are the body axes in the inertial frame."""
+    return rotate(quaternion, np.eye(3)).T
+
+
+def from_matrix(rotation: Array) -> Array:
+    """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative.
+
+    The largest of the four components is taken first, so that none is lost to cancellation.
+    """
+    diagonal = np.diagonal(rotation)
+    squares = 0.25 * np.array([1 + diagonal.sum(), *(1 - diagonal.sum() + 2 * diagonal)])
+    largest = int(np.argmax(squares))
+    off = 0.25 * (rotation - rotation.T)
+    mixed = 0.25 * (rotation + rotation.T)
+    w_times = np.array([off[2, 1], off[0, 2], off[1, 0]])
+    if largest == 0:
+        products = np.array([squares[0], *w_times])
+    else:
+        axis = largest - 1
+        products = np.array([w_times[axis], *mixed[axis]])
+        products[largest] = squares[largest]
+    quaternion = products / math.sqrt(squares[largest])
+    quaternion /= np.linalg.norm(quaternion)
+    return np.asarray(-quaternion if quaternion[0] < 0 else quaternion, dtype=np.float64)
+
+
+def angle_between(first: Array, second: Array) -> Array:
+    """Angle in rad between vectors (..., 3), exact to rounding from 0 to π."""
+    cross = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.asarray(np.arctan2(cross, np.sum(first * second, axis=-1)), dtype=np.float64)
+
+
+def angular_momentum(A: float, C: float, omega: complex, spin: float) -> Array:
+    """H = (A ω1, A ω2, C ω3) in body axes, (3,) N m s."""
+    return np.array([A * omega.real, A * omega.imag, C * spin])
+
+
+def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
+    """Quaternion body -> N, the inertial frame of a file that gives none.
+
+    N has z along H, and the spin axis σ·e3 (σ the sign of the spin) in the half plane x >= 0 of x-z; without
+    nutation x lies along body axis 1. Written so that nothing cancels at small angles.
+    """
+    sense = math.copysign(1.0, spin)
+    transverse, axial = A * abs(omega), C * abs(spin)
+    total = math.hypot(transverse, axial)
+    sine, cosine = transverse / total, axial / total
+    unit = omega / abs(omega) if omega != 0 else -1.0 + 0.0j
+    x = np.array([-cosine * unit.real, -cosine * unit.imag, sense * sine])
+    z = np.array([sine * unit.real, sine * unit.imag, sense * cosine])
+    return from_matrix(np.array([x, np.cross(z, x), z]))
+
+
+def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, times: Array) -> Array:
+    """Attitude on a torque-free arc of a symmetric body, exact: (n,) s after its start -> (n, 4).
+
+    R(t) = Rot(H t/A) R(0) Rot3(a ω3 t): the body turns about H at |H|/A and about its own axis at a ω3, because
+    ω = H/A + a ω3 e3 for a symmetric body (Poinsot's rolling cones, Magnus 1970 fig. 4).
+    """
+    body = angular_momentum(A, C, omega, spin)
+    momentum = rotate(quaternion, body)
+    size = float(np.linalg.norm(momentum))
+    times = np.asarray(times, dtype=float)
+    half_about_momentum = 0.5 * size / A * times
+    half_about_axis = 0.5 * (A - C) / A * spin * times
+    zero = np.zeros_like(times)
+    # A body at rest has no direction of H, but then the angle about it is zero as well.
+    direction = momentum / size if size > 0 else momentum
+    outer = np.concatenate(
+        [np.cos(half_about_momentum)[..., None], np.sin(half_about_momentum)[..., None] * direction], axis=-1
+    )
+    inner = np.stack([np.cos(half_about_axis), zero, zero, np.sin(half_about_axis)], axis=-1)
+    return multiply(multiply(outer, quaternion), inner)
