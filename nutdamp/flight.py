@@ -1,0 +1,267 @@
+"""Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
+
+Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
+impulses. `flown` is the judge: real widths, true moments. Both give legs that can be asked for the motion at any time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.physics import attitude, rates, rigid
+from nutdamp.physics.rigid import Piece
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Inertia, Spacecraft, SpinState, Vector
+from nutdamp.track import Track, make_track
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """What remains after the last pulse, rad.
+
+    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``space_cone`` is signed.
+    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis.
+    """
+
+    nutation: float
+    body_cone: float
+    space_cone: float
+    momentum_shift: float
+    axis_error: float
+
+
+class Path(Protocol):
+    """Motion without jumps."""
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """Torque-free motion of a symmetric body in closed form, from ``state`` at ``start`` s."""
+
+    A: float
+    C: float
+    start: float
+    state: SpinState
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        since = np.asarray(times) - self.start
+        state = self.state
+        omega = state.omega * np.exp(-1j * (self.A - self.C) / self.A * state.spin * since)
+        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since)
+        return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class Integrated:
+    """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
+
+    pieces: tuple[Piece, ...]
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        times = np.asarray(times, dtype=float)
+        starts = np.array([piece.start for piece in self.pieces])
+        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
+        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+        for index in np.unique(owner):
+            rows = owner == index
+            body[rows], quaternion[rows] = self.pieces[index].at(times[rows])
+        return body, quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A stretch of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped as it began."""
+
+    start: float
+    end: float
+    path: Path
+    completed: int
+    jump: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A schedule flown: its legs in order, and the motion as the last pulse ends.
+
+    ``moments`` are those flown with; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
+    the times (s) between which each pulse acts, its centre twice in the impulse sum.
+    """
+
+    spacecraft: Spacecraft
+    schedule: Schedule
+    legs: tuple[Leg, ...]
+    settled: SpinState
+    moments: tuple[float, float, float]
+    spans: tuple[tuple[float, float], ...]
+
+    @property
+    def residual(self) -> Residual:
+        """Cone angles after the last pulse, and where H went."""
+        start, moments = self.spacecraft.initial, np.asarray(self.moments)
+        before = attitude.rotate(start.quaternion, start.rates * moments)
+        body = self.settled.rates * moments
+        after = attitude.rotate(self.settled.quaternion, body)
+        shift = float(attitude.angle_between(before, after))
+        omega, spin = abs(self.settled.omega), self.settled.spin * self._sense
+        nutation = _largest_nutation(self.moments, body, self._sense)
+        body_cone = math.atan2(omega, spin)
+        tilt = math.atan2(math.hypot(body[0], body[1]), self._sense * body[2])
+        return Residual(nutation, body_cone, tilt - body_cone, shift, shift)
+
+    def track(self, samples: int, until: float) -> Track:
+        """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
+
+        The flight must have been made to reach ``until``.
+        """
+        even = np.linspace(0.0, until, samples)
+        rows: list[tuple[Vector, Vector, Vector, NDArray[np.int64]]] = []
+        for leg in self.legs:
+            if leg.start > until:
+                break
+            end = min(leg.end, until)
+            times = even[(even > leg.start) & (even < end)]
+            if leg.jump:
+                times = np.concatenate([[leg.start], times])
+            if end > leg.start:
+                times = np.append(times, end)
+            body, quaternion = leg.path.motion(times)
+            rows.append((times, body, quaternion, np.full(len(times), leg.completed)))
+        t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
+
+    def around_pulses(self) -> tuple[Track, Track]:
+        """The motion just before and just after each pulse, one row a pulse."""
+        before, after = [], []
+        for begins, ends in self.spans:
+            first = next(leg for leg in self.legs if leg.end >= begins)
+            last = next(leg for leg in reversed(self.legs) if leg.start <= ends)
+            before.append((begins, *first.path.motion(np.array([begins]))))
+            after.append((ends, *last.path.motion(np.array([ends]))))
+        return self._rows(before, 0), self._rows(after, 1)
+
+    def _rows(self, states: list[tuple[float, Vector, Vector]], completed: int) -> Track:
+        t = np.array([time for time, _, _ in states])
+        body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
+        quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
+        return make_track(
+            self.moments, self.spacecraft.spin, t, body, quaternion, completed + np.arange(len(t), dtype=np.int64)
+        )
+
+    @property
+    def _sense(self) -> float:
+        """Sign of the spin at t = 0: the spin axis stays the same end of the body through a reversal."""
+        return math.copysign(1.0, self.spacecraft.spin)
+
+
+def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
+    """The impulse-sum solution, Magnus 1970 (17), with exact attitude arcs between the pulses.
+
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`); the body is the equivalent
+    symmetric one. The last leg reaches at least to ``until`` s.
+    """
+    A, C, state = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.initial
+    times = np.array([pulse.t for pulse in schedule])
+    kicks = effective_impulses(spacecraft.inertia, state.spin, schedule)
+    axial = np.array([pulse.impulse[2] for pulse in schedule])
+    omegas, spins = rates.impulse_sum(times, state.omega, state.spin, A, C, times, kicks, axial)
+    legs: list[Leg] = []
+    now = 0.0
+    for index, end in enumerate([*times.tolist(), max(until, schedule.end)]):
+        legs.append(Leg(now, end, Arc(A, C, now, state), index, jump=True))
+        if index < len(schedule):
+            quaternion = attitude.arc(A, C, state.quaternion, state.omega, state.spin, np.array(end - now))
+            state = SpinState(complex(omegas[index]), float(spins[index]), quaternion)
+            now = end
+    return Flight(spacecraft, schedule, tuple(legs), state, (A, A, C), tuple((pulse.t, pulse.t) for pulse in schedule))
+
+
+def effective_impulses(inertia: Inertia, spin: float, schedule: Schedule) -> NDArray[np.complex128]:
+    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`."""
+    impulses = np.empty(len(schedule), dtype=complex)
+    for index, pulse in enumerate(schedule):
+        axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
+        factor = rates.width_factor(inertia.a, spin, axial_torque / inertia.C, pulse.on_time)
+        impulses[index] = complex(pulse.impulse[0], pulse.impulse[1]) * factor
+        spin += float(pulse.impulse[2]) / inertia.C
+    return impulses
+
+
+def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
+    """Euler's equations through the real pulse widths, with the true principal moments.
+
+    Coasts of symmetric bodies are exact arcs, everything else Taylor series at rounding accuracy. The last leg
+    reaches at least to ``until`` s.
+    """
+    inertia, state = spacecraft.inertia, spacecraft.initial
+    moments = (inertia.A, inertia.A, inertia.C) if inertia.symmetric else inertia.moments
+    pulses = schedule.pulses
+    last = max(until, schedule.end)
+    edges = sorted({0.0, last, *(pulse.start for pulse in pulses), *(pulse.end for pulse in pulses)})
+    legs: list[Leg] = []
+    settled = state
+    for now, end in zip(edges, [*edges[1:], last], strict=True):
+        kicks = [pulse.impulse for pulse in pulses if pulse.on_time == 0.0 and pulse.t == now]
+        if kicks and now == 0.0:  # so that the motion just before the kick is there too
+            legs.append(Leg(now, now, Arc(inertia.A, inertia.C, now, state), 0, jump=True))
+        if kicks:
+            body = state.rates + np.sum(kicks, axis=0) / np.asarray(moments)
+            state = SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+        if now == schedule.end:
+            settled = state
+        torques = [
+            pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start <= now and end <= pulse.end
+        ]
+        path, following = _path(inertia, moments, torques, state, now, end)
+        completed = sum(pulse.end <= now for pulse in pulses)
+        legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0))
+        state = following
+    spans = tuple((pulse.start, pulse.end) for pulse in pulses)
+    return Flight(spacecraft, schedule, tuple(legs), settled, moments, spans)
+
+
+def _path(
+    inertia: Inertia,
+    moments: tuple[float, float, float],
+    torques: list[Vector],
+    state: SpinState,
+    start: float,
+    end: float,
+) -> tuple[Path, SpinState]:
+    """Motion from ``start`` to ``end`` under the sum of ``torques``, and the state it ends in."""
+    if end == start or (not torques and inertia.symmetric):
+        arc = Arc(inertia.A, inertia.C, start, state)
+        body, quaternion = arc.motion(np.array([end]))
+        return arc, SpinState(complex(body[0, 0], body[0, 1]), float(body[0, 2]), quaternion[0])
+    torque = np.sum(torques, axis=0) if torques else np.zeros(3)
+    pieces = rigid.integrate(moments, torque, state.rates, state.quaternion, start, end)
+    body, quaternion = pieces[-1].final
+    return Integrated(tuple(pieces)), SpinState(complex(body[0], body[1]), float(body[2]), quaternion)
+
+
+def _largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:
+    """Largest angle in rad between H and the spin axis on the torque-free motion through ``momentum`` (body axes).
+
+    On the polhode 2T - H²/I3 = Σ H_j² (1/I_j - 1/I3), j = 1, 2, is constant; H is farthest from axis 3 where it
+    passes over axis 1 or 2. For I1 = I2 this is the constant nutation angle. If axis 3 is the middle axis, or
+    has the same moment as another, the bound is where the motion is now.
+    """
+    now = math.hypot(momentum[0], momentum[1])
+    first, second = (1.0 / moments[j] - 1.0 / moments[2] for j in (0, 1))
+    if first * second <= 0.0 or moments[0] == moments[1]:
+        return math.atan2(now, sense * float(momentum[2]))
+    level = float(momentum[0]) ** 2 * first + float(momentum[1]) ** 2 * second
+    transverse = math.sqrt(max(level / first, level / second))
+    total = float(np.linalg.norm(momentum))
+    axial = math.sqrt(max(total * total - transverse * transverse, 0.0))
+    return math.atan2(transverse, math.copysign(axial, sense * float(momentum[2])))

@@ -1,0 +1,281 @@
+"""The spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement.
+
+Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan. ``Inertia.axes``
+leads back to the axes of the file, which is where vectors and quaternions are shown to people.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.physics import attitude, cones, inertia
+
+Vector = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665
+"""m/s², exact by definition (3rd CGPM, 1901); turns a specific impulse in seconds into m/s."""
+
+SYMMETRY_TOLERANCE = 1e-12
+"""Transverse moments that differ by less, relatively, count as equal: the rounding of an eigensolver."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the file.
+
+    ``moments`` is (I1, I2, I3); ``axes`` is 3×3, its columns the principal axes in file axes.
+    """
+
+    moments: tuple[float, float, float]
+    axes: Vector = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def A(self) -> float:
+        """Transverse moment of the equivalent symmetric body, kg m²: the mean of I1 and I2."""
+        return 0.5 * (self.moments[0] + self.moments[1])
+
+    @property
+    def C(self) -> float:
+        """Moment about the spin axis, kg m²."""
+        return self.moments[2]
+
+    @property
+    def a(self) -> float:
+        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a sphere."""
+        return inertia.ratio(self.A, self.C)
+
+    @property
+    def shape(self) -> str:
+        """``prolate``, ``oblate`` or ``sphere``."""
+        return inertia.shape(self.A, self.C)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether I1 = I2, so that the closed forms hold exactly."""
+        first, second, _ = self.moments
+        return abs(first - second) <= SYMMETRY_TOLERANCE * max(first, second)
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the principal axes are the axes of the file."""
+        return bool(np.array_equal(self.axes, np.eye(3)))
+
+
+@dataclass(frozen=True, slots=True)
+class Thruster:
+    """One thruster: ``torque`` (3,) N m, ``force`` (3,) N or None, ``thrust`` N or None, ``isp`` s or None."""
+
+    name: str
+    torque: Vector
+    force: Vector | None = None
+    thrust: float | None = None
+    isp: float | None = None
+    min_on_time: float = 0.0
+    max_on_time: float = math.inf
+
+    @property
+    def mass_flow(self) -> float | None:
+        """Propellant flow in kg/s; None where thrust or specific impulse is not known."""
+        if self.thrust is None or self.isp is None:
+            return None
+        return self.thrust / (self.isp * STANDARD_GRAVITY)
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Thrusters that fire together, as one body-fixed torque."""
+
+    name: str
+    thrusters: tuple[Thruster, ...]
+
+    @property
+    def torque(self) -> Vector:
+        """Sum of the torques, (3,) N m."""
+        return np.asarray(sum(thruster.torque for thruster in self.thrusters), dtype=np.float64)
+
+    @property
+    def transverse(self) -> complex:
+        """M1 + i M2 in N m."""
+        torque = self.torque
+        return complex(torque[0], torque[1])
+
+    @property
+    def axial(self) -> float:
+        """M3 in N m, which changes the spin."""
+        return float(self.torque[2])
+
+    @property
+    def damps(self) -> bool:
+        """Whether the torque is more transverse than axial; thrusters for the spin are left alone."""
+        return abs(self.transverse) > abs(self.axial)
+
+    @property
+    def min_on_time(self) -> float:
+        """Largest of the thrusters' minima, s."""
+        return max(thruster.min_on_time for thruster in self.thrusters)
+
+    @property
+    def max_on_time(self) -> float:
+        """Smallest of the thrusters' maxima, s."""
+        return min(thruster.max_on_time for thruster in self.thrusters)
+
+    @property
+    def mass_flow(self) -> float | None:
+        """Propellant flow of all thrusters in kg/s; None where one of them is not known."""
+        flows = [thruster.mass_flow for thruster in self.thrusters]
+        known = [flow for flow in flows if flow is not None]
+        return math.fsum(known) if len(known) == len(flows) else None
+
+    @property
+    def force(self) -> Vector | None:
+        """Sum of the forces in body axes, (3,) N; None where the direction of one is not known."""
+        known = [thruster.force for thruster in self.thrusters if thruster.force is not None]
+        return np.sum(known, axis=0) if len(known) == len(self.thrusters) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Steerable:
+    """Magnus' actuator: a torque about any transverse axis, body-fixed during one pulse.
+
+    ``torque`` in N m; None is an ideal impulse of no width.
+    """
+
+    torque: float | None = None
+    isp: float | None = None
+    lever_arm: float | None = None
+
+    @property
+    def propellant_per_impulse(self) -> float | None:
+        """kg for each N m s; None where specific impulse or lever arm is not known."""
+        if self.isp is None or self.lever_arm is None:
+            return None
+        return 1.0 / (self.lever_arm * self.isp * STANDARD_GRAVITY)
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None asks nothing."""
+
+    nutation: float | None = None
+    momentum_shift: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
+
+    ``horizon`` None stands for `Spacecraft.horizon`'s default.
+    """
+
+    horizon: float | None = None
+    earliest: float = 0.0
+    gap: float = 0.0
+    tick: float | None = None
+    max_pulses: int | None = None
+    blackout: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Attitude at t = 0 as the file gives it: unit quaternion body (file axes) -> frame, scalar first."""
+
+    quaternion: Vector
+    epoch: str | None = None
+    frame: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SpinState:
+    """The motion at one moment, for the closed forms.
+
+    ``omega`` is ω1 + iω2 in rad/s, ``spin`` is ω3 in rad/s, ``quaternion`` (4,) body -> inertial, scalar first.
+    """
+
+    omega: complex
+    spin: float
+    quaternion: Vector
+
+    @property
+    def rates(self) -> Vector:
+        """(ω1, ω2, ω3) in rad/s."""
+        return np.array([self.omega.real, self.omega.imag, self.spin])
+
+
+@dataclass(frozen=True, eq=False)
+class Spacecraft:
+    """A spinning rigid body, how it moves at t = 0, and what can be fired.
+
+    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None.
+    """
+
+    name: str
+    inertia: Inertia
+    omega0: Vector
+    mass: float | None = None
+    attitude: Attitude | None = None
+    channels: tuple[Channel, ...] = ()
+    steerable: Steerable | None = None
+    requirement: Requirement | None = None
+    limits: Limits = field(default_factory=Limits)
+
+    @property
+    def torquer(self) -> Steerable | None:
+        """The steerable torquer; an ideal one is assumed where the file names no actuator at all."""
+        if self.steerable is None and not self.channels:
+            return Steerable()
+        return self.steerable
+
+    @property
+    def horizon(self) -> float:
+        """End of the planning time, s.
+
+        Default: 20 × the longer of the nutation periods seen in the body and inertially; a sphere: the latter.
+        """
+        if self.limits.horizon is not None:
+            return self.limits.horizon
+        body, inertial = self.body_period, self.inertial_period
+        return 20.0 * (max(body, inertial) if math.isfinite(body) else inertial)
+
+    @property
+    def initial(self) -> SpinState:
+        """The motion at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
+        omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
+        if self.attitude is None:
+            quaternion = attitude.frame_n(self.inertia.A, self.inertia.C, omega, spin)
+        else:
+            quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
+        return SpinState(omega, spin, quaternion)
+
+    @property
+    def nutation(self) -> float:
+        """Nutation angle θ at t = 0, rad, Magnus (19)."""
+        return float(cones.nutation_angle(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin))
+
+    @property
+    def transverse_rate(self) -> float:
+        """|ω0| at t = 0, rad/s."""
+        return math.hypot(self.omega0[0], self.omega0[1])
+
+    @property
+    def spin(self) -> float:
+        """ω3 at t = 0, rad/s, signed."""
+        return float(self.omega0[2])
+
+    @property
+    def body_period(self) -> float:
+        """Nutation period seen in the body, Magnus (12), s; infinite for a sphere."""
+        return cones.body_period(self.inertia.A, self.inertia.C, self.spin)
+
+    @property
+    def inertial_period(self) -> float:
+        """Nutation period seen inertially, 2π A/|H|, s."""
+        return cones.inertial_period(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin)
+
+    @property
+    def least_impulse(self) -> float:
+        """A |ω0| in N m s: no schedule can remove the nutation with less."""
+        return self.inertia.A * self.transverse_rate
