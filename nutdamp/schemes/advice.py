@@ -1,0 +1,55 @@
+"""Why a scheme cannot work, and what it leaves, in words."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+from nutdamp.schemes.walk import Walk
+from nutdamp.spacecraft import Channel, Spacecraft
+
+
+def no_channels(spacecraft: Spacecraft) -> str:
+    """No body-fixed channel can damp."""
+    if spacecraft.channels:
+        return "no channel has a torque more transverse than axial, so none can damp a nutation"
+    return "the file names no thrusters, and this scheme fires body-fixed ones"
+
+
+def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
+    """No channel can be fired against ω within the limits; names the cure."""
+    omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    if spacecraft.inertia.a == 0.0:
+        off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
+        nearest = min(off, key=lambda name: off[name])
+        return (
+            "in a sphere (a = 0) ω stands still in the body, so waiting brings no channel to oppose it; "
+            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
+        )
+    walk = Walk(spacecraft, endless=True)
+    pulses = [walk.align(channel, max(channel.min_on_time, 0.0)) for channel in channels]
+    ends = [pulse.end for pulse in pulses if pulse is not None and walk.left_after(pulse) < walk.left]
+    if not ends:
+        least = min(walk.left_after(pulse) for pulse in pulses if pulse is not None)
+        return (
+            f"every channel's shortest pulse is too strong: {walk.left:.4g} N m s are to be taken out, "
+            f"and firing would leave {least:.4g} N m s; lower min_on_time"
+        )
+    return (
+        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
+        f"the first does until {min(ends):.4g} s: set limits.horizon beyond that"
+    )
+
+
+def remainder(walk: Walk) -> tuple[str, ...]:
+    """A remark on what the pulses leave, and what ended them; none where they leave nothing."""
+    if walk.settled:
+        return ()
+    theta = math.degrees(math.atan2(walk.left, walk.C * abs(walk.spin)))
+    if walk.full:
+        reason = f"limits.max_pulses = {walk.spacecraft.limits.max_pulses} ends it"
+    elif walk.spacecraft.limits.tick is not None and theta < math.degrees(walk.spacecraft.nutation) * 0.1:
+        reason = "the resolution of commands (limits.tick) or the shortest pulse leaves it"
+    else:
+        reason = "on-times, horizon or blackout windows allow no more"
+    return (f"{theta:.3g}° of nutation remain: {reason}",)

@@ -1,0 +1,114 @@
+"""Body-fixed pulses at every alignment, Magnus 1970 section 4 and fig. 5: for ±1, ±2 one every T_ω/4."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from nutdamp.errors import Infeasible
+from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schemes import Options
+from nutdamp.schemes.advice import no_alignment, no_channels, remainder
+from nutdamp.schemes.walk import Walk
+from nutdamp.spacecraft import Channel, Spacecraft
+
+DEFAULT_SHARE = 0.125
+"""Default on-time as a share of T_ω: 2.6 % of the impulse is lost to the width."""
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """Fire each channel whenever it opposes ω and firing helps, until it no longer does.
+
+    Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at most J_min/(2A) where
+    the rest is below the smallest pulse. The sign rule holds for both signs of a ω3.
+
+    Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
+    """
+    channels = [channel for channel in spacecraft.channels if channel.damps]
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    walk = Walk(spacecraft)
+    on_times = {channel.name: _on_time(walk, channel, options.on_time) for channel in channels}
+    if spacecraft.inertia.a == 0.0:
+        _standing(walk, channels, options)
+    else:
+        _turning(walk, channels, on_times, options)
+    if not walk.pulses:
+        raise Infeasible(no_alignment(spacecraft, channels))
+    return walk.schedule(*_remarks(walk, options))
+
+
+def _remarks(walk: Walk, options: Options) -> tuple[str, ...]:
+    if options.coarse and not walk.full:
+        return ()  # what coarse pulses leave is what was asked for
+    return remainder(walk)
+
+
+def _on_time(walk: Walk, channel: Channel, asked: float | None) -> float:
+    """Length of a full pulse of ``channel``, s."""
+    if asked is None:
+        return max(min(channel.max_on_time, DEFAULT_SHARE * walk.period), channel.min_on_time)
+    if not channel.min_on_time <= asked <= channel.max_on_time:
+        raise Infeasible(
+            f"an on-time of {asked:.4g} s is outside what {channel.name} allows: "
+            f"{channel.min_on_time:.4g} s to {channel.max_on_time:.4g} s"
+        )
+    return asked
+
+
+def _turning(walk: Walk, channels: list[Channel], on_times: dict[str, float], options: Options) -> None:
+    """Alignment after alignment, whichever helpful channel comes first."""
+    while not walk.full and not walk.settled:
+        pulses = [_next(walk, channel, on_times[channel.name], options.coarse) for channel in channels]
+        helpful = [pulse for pulse in pulses if pulse is not None and walk.left_after(pulse) < walk.left]
+        if not helpful:
+            return
+        walk.fire(min(helpful, key=lambda pulse: pulse.t))
+
+
+def _next(walk: Walk, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
+    """The next pulse of ``channel``: a full one, or in fine damping just what is left."""
+    just_enough = None if coarse else walk.on_time_for(channel, walk.left, on_time)
+    return walk.align(channel, on_time if just_enough is None else just_enough)
+
+
+def _standing(walk: Walk, channels: list[Channel], options: Options) -> None:
+    """A sphere: ω does not turn, so the two channels on either side of -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
+    shares = _shares(channels, -walk.A * walk.omega)
+    for channel, impulse in shares:
+        unit = impulse / abs(channel.transverse)
+        longest = channel.max_on_time if options.on_time is None else options.on_time
+        count = 1 if math.isinf(longest) else max(math.ceil(unit / longest - 1e-9), 1)
+        for _ in range(count):
+            wanted = longest if options.coarse and not math.isinf(longest) else unit / count
+            on_time = walk.windows.on_time(wanted, channel.min_on_time, channel.max_on_time)
+            start = walk.windows.earliest_start(on_time, walk.ready)
+            if walk.full or start is None:
+                return
+            pulse = channel_pulse(channel, start + 0.5 * on_time, on_time)
+            if walk.left_after(pulse) >= walk.left:
+                break
+            walk.fire(pulse)
+
+
+def _shares(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:
+    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else the nearest."""
+    best: list[tuple[Channel, float]] = []
+    least = math.inf
+    for one, two in itertools.combinations(channels, 2):
+        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (one, two))
+        area = (d1.conjugate() * d2).imag
+        if abs(area) < 1e-9:
+            continue
+        first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
+        if min(first, second) >= -1e-12 * abs(target) and first + second < least:
+            least = first + second
+            best = [(one, first), (two, second)]
+    if not best:
+        along = {
+            channel.name: (target * channel.transverse.conjugate()).real / abs(channel.transverse)
+            for channel in channels
+        }
+        nearest = max(channels, key=lambda channel: along[channel.name])
+        best = [(nearest, along[nearest.name])]
+    return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]

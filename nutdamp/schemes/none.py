@@ -1,0 +1,12 @@
+"""Free motion: nothing is fired."""
+
+from __future__ import annotations
+
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options
+from nutdamp.spacecraft import Spacecraft
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG001 - the signature of a scheme
+    """No pulses."""
+    return Schedule()

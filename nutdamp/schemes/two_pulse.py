@@ -1,0 +1,348 @@
+"""Two pulses half an inertial nutation turn apart, Magnus 1970 (22): no nutation, and H back where it was.
+
+With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
+torque directions d1, d2 the shift of H closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both
+pulses together then oppose ω at cost 1/cos(ψ/2), where ψ is the angle by which the second direction misses
+the one that Magnus' scheme asks for. The chosen pair is trimmed on the real pulse widths.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics import damping, rates
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes import Options, trim
+from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.walk import ALIGNED, Walk
+from nutdamp.schemes.windows import Windows
+from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
+
+DEAREST = 2.0
+"""Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
+
+CLOSE_IN_COST = 1.02
+"""Among candidates within this factor of the cheapest the one that ends first is preferred."""
+
+SHORTLIST = 6
+"""Candidates that are flown and trimmed, at most."""
+
+CLEARLY = 0.5
+"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+
+EXACT = 1e-11
+"""rad of flown residual below which a trimmed candidate is as good as exact (6e-10 deg)."""
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """Two pulses, and a remark on what fixed channels cost or leave.
+
+    ``options.literal``: equal halves and the wait as printed, not trimmed. Raises Infeasible with the reason.
+    """
+    most = spacecraft.limits.max_pulses
+    if most is not None and most < 2:
+        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
+    torquer = spacecraft.torquer
+    if torquer is not None:
+        return _steered(spacecraft, torquer, options)
+    channels = [channel for channel in spacecraft.channels if channel.damps]
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    return _fixed(spacecraft, channels, options)
+
+
+# --- steerable torquer -----------------------------------------------------------------------------------------------
+
+
+def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Schedule:
+    """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
+    inertia, windows = spacecraft.inertia, Windows(spacecraft)
+    form = damping.half_pulses_as_printed if options.literal else damping.half_pulses
+    halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
+    best: tuple[Pulse, Pulse] | None = None
+    for turns in range(1, max(int(windows.horizon / halves.wait), 1) + 1, 2):
+        wait = turns * halves.wait
+        for start in _starts(windows, spacecraft.limits.earliest, on_times, wait):
+            pulses = _pair(spacecraft, torquer, halves, start, wait, on_times)
+            if _allowed(windows, pulses) and (best is None or pulses[1].end < best[1].end):
+                best = pulses
+        if best is not None:
+            break
+    if best is None:
+        raise Infeasible(
+            f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
+            f"together; horizon ({windows.horizon:.4g} s), gap and blackout windows leave no room for both"
+        )
+    if torquer.torque is None or options.literal:
+        return Schedule(best)
+    return _trim_steered(spacecraft, torquer, best)
+
+
+def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
+    """On-time in s of one half pulse; raises Infeasible where the torque is too weak for it."""
+    if torquer.torque is None:
+        return 0.0
+    on_time = rates.on_time_for(impulse, torquer.torque, spacecraft.inertia.a, spacecraft.spin, 0.0, math.inf)
+    if on_time is None:
+        needed = 0.5 * abs(spacecraft.inertia.a * spacecraft.spin) * impulse
+        raise Infeasible(
+            f"half the nutation needs a torque above {needed:.4g} N m to be taken out within half a body nutation "
+            f"period; the torquer has {torquer.torque:.4g} N m"
+        )
+    return Windows(spacecraft).on_time(on_time, 0.0, math.inf)
+
+
+def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait: float) -> list[float]:
+    """Starts of the first pulse worth trying: at once, or as a blackout window ends for either pulse."""
+    to_second = wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
+    ends = [end for _, end in windows.limits.blackout]
+    starts = [earliest, *ends, *(end - to_second for end in ends)]
+    return [windows.tick_after(start) for start in starts if start >= earliest]
+
+
+def _pair(
+    spacecraft: Spacecraft,
+    torquer: Steerable,
+    halves: damping.HalfPulses,
+    start: float,
+    wait: float,
+    on_times: tuple[float, ...],
+) -> tuple[Pulse, Pulse]:
+    """The two pulses against ω, the first from ``start`` s on."""
+    walk = Walk(spacecraft)
+    pulses = []
+    for centre, on_time, half in zip(
+        (start + 0.5 * on_times[0], start + 0.5 * on_times[0] + wait), on_times, halves[:2], strict=True
+    ):
+        begin = walk.windows.nearest_tick(centre - 0.5 * on_time)
+        centre = begin + 0.5 * on_time
+        angle = cmath.phase(-walk.omega_at(centre))
+        impulse = half if torquer.torque is None else torquer.torque * on_time
+        pulses.append(steerable_pulse(torquer, centre, angle, impulse=impulse))
+        walk.fire(pulses[-1])
+    return pulses[0], pulses[1]
+
+
+def _trim_steered(spacecraft: Spacecraft, torquer: Steerable, pulses: tuple[Pulse, Pulse]) -> Schedule:
+    """Trim directions, on-times and the second moment on the real widths; the first start stays."""
+    torque = torquer.torque
+    assert torque is not None
+    start = pulses[0].start
+
+    def build(x: Vector) -> Schedule:
+        first = steerable_pulse(torquer, start + 0.5 * x[0], x[1], impulse=torque * x[0])
+        return Schedule((first, steerable_pulse(torquer, x[2], x[4], impulse=torque * x[3])))
+
+    angles = [math.atan2(pulse.impulse[1], pulse.impulse[0]) for pulse in pulses]
+    x0 = np.array([pulses[0].on_time, angles[0], pulses[1].t, pulses[1].on_time, angles[1]])
+    pace = 1.0 / abs(spacecraft.spin)
+    scale = np.array([x0[0], 1.0, pace, x0[3], 1.0])
+    lower = np.array([0.0, -np.inf, -np.inf, 0.0, -np.inf])
+    x, _ = trim.solve(lambda x: trim.misses(spacecraft, build(x)), x0, scale, lower, np.full(5, np.inf))
+    windows = Windows(spacecraft)
+    x[0], x[3] = (windows.on_time(on_time, 0.0, math.inf) for on_time in (x[0], x[3]))
+    x[2] = windows.nearest_tick(x[2] - 0.5 * x[3]) + 0.5 * x[3]
+    trimmed = build(x)
+    return trimmed if _allowed(windows, trimmed.pulses) else Schedule(pulses)
+
+
+def _allowed(windows: Windows, pulses: tuple[Pulse, ...]) -> bool:
+    """Whether both pulses keep the limits."""
+    ready = windows.limits.earliest
+    for pulse in pulses:
+        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
+            return False
+        ready = pulse.end + windows.limits.gap
+    return True
+
+
+# --- body-fixed channels ---------------------------------------------------------------------------------------------
+
+
+class Candidate(NamedTuple):
+    """Two channels and moments that close to first order; ``short`` is the part of the impulse out of reach."""
+
+    short: float
+    cost: float
+    end: float
+    channels: tuple[Channel, Channel]
+    x: tuple[float, float, float, float]
+    """Centre and on-time of the first pulse, centre and on-time of the second, s."""
+    miss: float
+    """ψ, rad."""
+    factor: float
+    """Impulse over A|ω0|."""
+
+
+def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) -> Schedule:
+    """Fly and trim the most promising candidates; the smallest flown residual wins, exact ones in order."""
+    candidates = sorted(
+        (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
+        key=lambda found: (found.short, found.cost),
+    )
+    if not candidates:
+        raise Infeasible(_nothing_closes(spacecraft, channels))
+    cheapest = candidates[0]
+    near = [c for c in candidates if c.short <= cheapest.short + 1e-3 and c.cost <= cheapest.cost * CLOSE_IN_COST]
+    near.sort(key=lambda found: found.end)
+    others = [candidate for candidate in candidates if candidate not in near]
+    best: tuple[float, Schedule] | None = None
+    for candidate in [*near, *others][:SHORTLIST]:
+        made, left = _trimmed(spacecraft, candidate, options.literal)
+        if _allowed(Windows(spacecraft), made.pulses) and (best is None or left < CLEARLY * best[0]):
+            best = left, made
+            if left <= EXACT:
+                break
+    if best is None:
+        raise Infeasible(_nothing_closes(spacecraft, channels))
+    return best[1]
+
+
+def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
+    """The candidate's schedule, trimmed on the real widths and made commandable, and its flown residual in rad."""
+    one, two = candidate.channels
+    windows = Windows(spacecraft)
+
+    def build(x: Vector) -> Schedule:
+        return Schedule((channel_pulse(one, x[0], x[1]), channel_pulse(two, x[2], x[3])))
+
+    x = np.array(candidate.x)
+    if not literal:
+        pace = 1.0 / abs(spacecraft.spin)
+        x, _ = trim.solve(
+            lambda x: trim.misses(spacecraft, build(x)),
+            x,
+            np.array([pace, x[1], pace, x[3]]),
+            np.array([0.0, one.min_on_time, 0.0, two.min_on_time]),
+            np.array([np.inf, one.max_on_time, np.inf, two.max_on_time]),
+        )
+    for index, channel in ((0, one), (2, two)):
+        on_time = windows.on_time(x[index + 1], channel.min_on_time, channel.max_on_time)
+        x[index] = windows.nearest_tick(x[index] - 0.5 * on_time) + 0.5 * on_time
+        x[index + 1] = on_time
+    made = build(x)
+    left = float(np.linalg.norm(trim.misses(spacecraft, made)))
+    return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
+
+
+def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tuple[str, ...]:
+    inertia = spacecraft.inertia
+    halves = damping.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    first, second = made.pulses
+    turns = (second.t - first.t) / halves.wait
+    text = (
+        f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half nutation turns; "
+        f"the second is {abs(math.degrees(candidate.miss)):.2g}° off the ideal direction, "
+        f"which costs {candidate.factor:.3f} × A|ω0|"
+    )
+    if candidate.short > 1e-9:
+        text += f"; {100 * candidate.short:.2g} % of the impulse is beyond the on-times allowed"
+    return (text,)
+
+
+def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[Candidate]:
+    """Closings of H for this pair within the horizon, the most promising first."""
+    inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    A, C, a, spin = inertia.A, inertia.C, inertia.a, spacecraft.spin
+    theta = spacecraft.nutation
+    turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
+    # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
+    rate = a * spin + C / A * spin / math.cos(0.5 * theta)
+    if rate == 0.0:
+        return []
+    sense = math.copysign(1.0, rate)
+    first_wait = ((math.pi - turn) * sense) % (2 * math.pi) / abs(rate)
+    count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
+    waits = first_wait + 2 * math.pi / abs(rate) * np.arange(count)
+    halves = damping.half_pulses(A, C, abs(omega0), spin)
+    if literal:  # halves and wait as printed; the pair must do with the direction it finds
+        halves = damping.half_pulses_as_printed(A, C, abs(omega0), spin)
+        waits = halves.wait * np.arange(1, max(int(spacecraft.horizon / halves.wait), 1) + 1, 2)
+    miss = np.angle(np.exp(1j * (turn + a * spin * waits)))
+    factor = 1.0 / np.cos(0.5 * miss)
+    placed = (
+        _place(spacecraft, one, two, halves, float(waits[index]), float(miss[index]), literal)
+        for index in _promising(factor)
+    )
+    return [candidate for candidate in placed if candidate is not None]
+
+
+def _promising(factor: Vector) -> Vector:
+    """Indices of the waits worth placing: each one clearly cheaper than all before it, and the cheapest few."""
+    before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
+    better = np.flatnonzero(factor * CLOSE_IN_COST < before)
+    cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
+    chosen = np.union1d(better, cheapest)
+    return np.asarray(chosen[factor[chosen] <= DEAREST])
+
+
+def _place(
+    spacecraft: Spacecraft,
+    one: Channel,
+    two: Channel,
+    halves: damping.HalfPulses,
+    wait: float,
+    miss: float,
+    literal: bool,
+) -> Candidate | None:
+    """First allowed moment at which the pair opposes ω; None where the limits leave none."""
+    windows, a, spin = Windows(spacecraft), spacecraft.inertia.a, spacecraft.spin
+    omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    factor = 1.0 if literal else 1.0 / math.cos(0.5 * miss)
+    on_times, short = [], 0.0
+    for channel, half in ((one, halves.first), (two, halves.second)):
+        wanted = half * factor
+        rate = channel.axial / spacecraft.inertia.C
+        on_time = rates.on_time_for(wanted, abs(channel.transverse), a, spin, rate, channel.max_on_time)
+        longest = min(channel.max_on_time, math.pi / abs(a * spin) if a != 0.0 else math.inf)
+        on_times.append(max(longest if on_time is None else on_time, channel.min_on_time))
+        reached = abs(channel.transverse) * on_times[-1] * abs(rates.width_factor(a, spin, rate, on_times[-1]))
+        short += abs(wanted - reached) / (spacecraft.least_impulse * factor)
+    if short >= 1.0:
+        return None
+    # Both together oppose ω0 where the middle between their directions does.
+    phase = damping.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
+    earliest = spacecraft.limits.earliest
+    if a == 0.0:
+        if abs(phase) > ALIGNED:
+            return None
+        period, first = math.inf, earliest + 0.5 * on_times[0]
+    else:
+        period = 2 * math.pi / abs(a * spin)
+        first = phase / (a * spin)
+        first += max(math.ceil((earliest + 0.5 * on_times[0] - first) / period), 0) * period
+    while first + wait + 0.5 * on_times[1] <= windows.horizon:
+        pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
+        if _allowed(windows, pulses):
+            made = Schedule(pulses)
+            cost = made.total_impulse if made.propellant is None else made.propellant
+            return Candidate(
+                short if short > 1e-9 else 0.0,
+                cost,
+                made.end,
+                (one, two),
+                (first, on_times[0], first + wait, on_times[1]),
+                miss,
+                factor,
+            )
+        first += period
+    return None
+
+
+def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
+    names = ", ".join(channel.name for channel in channels)
+    if spacecraft.inertia.a == 0.0:
+        return (
+            "in a sphere (a = 0) ω stands still in the body, and no two of the channels "
+            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
+        )
+    return (
+        f"no two of the channels ({names}) bring H back and oppose the nutation within the horizon of "
+        f"{spacecraft.horizon:.4g} s, the on-times, gap and blackout windows"
+    )

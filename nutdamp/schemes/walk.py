@@ -1,0 +1,130 @@
+"""A schedule laid pulse by pulse along the closed-form motion; what the body-fixed schemes share."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+from nutdamp.physics import damping, rates
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.windows import SLACK, Windows
+from nutdamp.spacecraft import Channel, Spacecraft, Steerable
+
+ALIGNED = 1e-9
+"""Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
+
+
+class Walk:
+    """The transverse rate as it will be, and the pulses chosen so far.
+
+    ``omega`` and ``spin`` (rad/s) hold just after the centre of the last pulse at ``now`` s; ``ready`` is the first
+    moment at which the next pulse may start.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
+        self.spacecraft = spacecraft
+        self.A, self.C, self.a = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.inertia.a
+        self.windows = Windows(spacecraft, endless=endless)
+        self.omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+        self.spin = spacecraft.spin
+        self.now = 0.0
+        self.ready = spacecraft.limits.earliest
+        self.pulses: list[Pulse] = []
+
+    @property
+    def left(self) -> float:
+        """Impulse in N m s that still has to be taken out: A|ω|."""
+        return self.A * abs(self.omega)
+
+    @property
+    def settled(self) -> bool:
+        """Whether what is left is rounding."""
+        return self.left <= 1e-13 * self.C * abs(self.spin)
+
+    @property
+    def full(self) -> bool:
+        """Whether no more pulses are allowed."""
+        most = self.spacecraft.limits.max_pulses
+        return most is not None and len(self.pulses) >= most
+
+    @property
+    def period(self) -> float:
+        """Nutation period in the body at the present spin, s; infinite for a sphere."""
+        rate = abs(self.a * self.spin)
+        return 2.0 * math.pi / rate if rate > 0.0 else math.inf
+
+    def omega_at(self, time: float) -> complex:
+        """ω at ``time`` s if nothing more is fired."""
+        return self.omega * cmath.exp(-1j * self.a * self.spin * (time - self.now))
+
+    def acts(self, pulse: Pulse) -> complex:
+        """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
+        axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
+        factor = rates.width_factor(self.a, self.spin, axial / self.C, pulse.on_time)
+        return complex(pulse.impulse[0], pulse.impulse[1]) * factor
+
+    def left_after(self, pulse: Pulse) -> float:
+        """What would be left, N m s, if ``pulse`` were fired next."""
+        return abs(self.A * self.omega_at(pulse.t) + self.acts(pulse))
+
+    def fire(self, pulse: Pulse) -> None:
+        """Take ``pulse`` into the schedule."""
+        self.omega = self.omega_at(pulse.t) + self.acts(pulse) / self.A
+        self.spin += float(pulse.impulse[2]) / self.C
+        self.now = pulse.t
+        self.ready = pulse.end + self.spacecraft.limits.gap
+        self.pulses.append(pulse)
+
+    def schedule(self, *notes: str) -> Schedule:
+        """What has been chosen."""
+        return Schedule(tuple(self.pulses), notes)
+
+    def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
+        """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
+        spin_rate = channel.axial / self.C
+        return rates.on_time_for(impulse, abs(channel.transverse), self.a, self.spin, spin_rate, longest)
+
+    def align(self, channel: Channel, on_time: float) -> Pulse | None:
+        """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
+        on_time = self.windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
+        probe = channel_pulse(channel, 0.0, on_time)
+        turn = damping.phase_to_oppose(self.omega, self.acts(probe))
+        if math.isinf(self.period):
+            start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
+            return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
+        first = self.now + turn / (self.a * self.spin)
+        ready = self.ready
+        slack = SLACK if self.pulses else 0.0  # nothing may start before t = 0
+        while True:
+            turns = math.ceil((ready + 0.5 * on_time - first - slack) / self.period)
+            centre = first + turns * self.period
+            start = centre - 0.5 * on_time
+            if self.windows.limits.tick is not None:
+                start = self.windows.nearest_tick(start)
+                centre = start + 0.5 * on_time
+            if start < self.ready - slack:  # rounded to a tick before the actuators are ready
+                ready += self.windows.limits.tick or SLACK
+                continue
+            free = self.windows.blocked_until(start, on_time)
+            if free is None:
+                break
+            ready = max(free, ready + SLACK)
+        return channel_pulse(channel, centre, on_time) if self.windows.allows(start, on_time, self.ready) else None
+
+    def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
+        """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
+        if steerable.torque is None:
+            start = self.windows.earliest_start(0.0, self.ready)
+            if start is None:
+                return None
+            return steerable_pulse(steerable, start, cmath.phase(-self.omega_at(start)), impulse=impulse)
+        wanted = rates.on_time_for(impulse, steerable.torque, self.a, self.spin, 0.0, math.inf)
+        if wanted is None:
+            return None
+        on_time = self.windows.on_time(wanted, 0.0, math.inf)
+        start = self.windows.earliest_start(on_time, self.ready)
+        if start is None:
+            return None
+        centre = start + 0.5 * on_time
+        angle = cmath.phase(-self.omega_at(centre))
+        return steerable_pulse(steerable, centre, angle, impulse=steerable.torque * on_time)

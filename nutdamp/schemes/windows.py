@@ -1,0 +1,60 @@
+"""When a pulse may be on: earliest start, gap, blackout windows, horizon, and the resolution of commands."""
+
+from __future__ import annotations
+
+import math
+
+from nutdamp.spacecraft import Spacecraft
+
+SLACK = 1e-9
+"""Seconds by which rounding may overstep a limit; far below any command resolution."""
+
+
+class Windows:
+    """The limits of one spacecraft, asked about one pulse at a time."""
+
+    def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
+        """``endless`` drops the horizon, to tell what a longer one would allow."""
+        self.limits = spacecraft.limits
+        self.horizon = math.inf if endless else spacecraft.horizon
+
+    def blocked_until(self, start: float, on_time: float) -> float | None:
+        """End of the first blackout window that the pulse would touch; None where it is free."""
+        for begins, ends in self.limits.blackout:
+            if start < ends - SLACK and start + on_time > begins + SLACK:
+                return ends
+        return None
+
+    def allows(self, start: float, on_time: float, ready: float) -> bool:
+        """Whether a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
+        return (
+            start >= ready - SLACK
+            and start + on_time <= self.horizon + SLACK
+            and self.blocked_until(start, on_time) is None
+        )
+
+    def earliest_start(self, on_time: float, ready: float) -> float | None:
+        """First allowed start, s, on a tick; None where the horizon comes first."""
+        start = self.tick_after(ready)
+        while (free := self.blocked_until(start, on_time)) is not None:
+            start = self.tick_after(free)
+        return start if self.allows(start, on_time, ready) else None
+
+    def nearest_tick(self, time: float) -> float:
+        """``time`` rounded to the resolution of commands."""
+        tick = self.limits.tick
+        return time if tick is None else round(time / tick) * tick
+
+    def tick_after(self, time: float) -> float:
+        """First commandable time not before ``time``."""
+        tick = self.limits.tick
+        return time if tick is None else math.ceil((time - SLACK) / tick) * tick
+
+    def on_time(self, wanted: float, shortest: float, longest: float) -> float:
+        """Commandable on-time nearest to ``wanted`` s within the bounds, and not zero."""
+        tick = self.limits.tick
+        if tick is None:
+            return min(max(wanted, shortest), longest)
+        least = max(math.ceil((shortest - SLACK) / tick), 1)
+        most = math.inf if math.isinf(longest) else math.floor((longest + SLACK) / tick)
+        return float(min(max(round(wanted / tick), least), most)) * tick
