@@ -1,0 +1,209 @@
+"""Plan several schemes, fly them, judge them against limits and requirement, recommend one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nutdamp import flight, schemes
+from nutdamp.errors import Infeasible
+from nutdamp.flight import Residual
+from nutdamp.physics import attitude
+from nutdamp.schedule import Schedule
+from nutdamp.schemes.windows import SLACK
+from nutdamp.spacecraft import Spacecraft, Vector
+
+NO_NUTATION = 1e-12
+"""Nutation angle in rad below which there is nothing to plan."""
+
+AS_GOOD = math.radians(1e-3)
+"""Flown nutation in rad below which plans count as equally good; likewise within twice the least."""
+
+LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
+"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A scheme's schedule for a spacecraft, and how it was judged; without one, ``why``."""
+
+    spacecraft: Spacecraft
+    scheme: str
+    schedule: Schedule | None
+    why: str | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the schedule keeps every limit and lowers the nutation."""
+        return self.schedule is not None
+
+    @property
+    def pulses(self) -> Schedule:
+        """The schedule; empty where the plan is infeasible."""
+        return self.schedule or Schedule()
+
+    @cached_property
+    def residual(self) -> Residual | None:
+        """What remains by the impulse sum (17)."""
+        return None if self.schedule is None else flight.by_impulses(self.spacecraft, self.schedule).residual
+
+    @cached_property
+    def _flight(self) -> flight.Flight | None:
+        return None if self.schedule is None else flight.flown(self.spacecraft, self.schedule)
+
+    @property
+    def flown(self) -> Residual | None:
+        """What remains when the real pulse widths are flown."""
+        return None if self._flight is None else self._flight.residual
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether the flown residual keeps the requirement of the file; None without one or without a schedule."""
+        asked, left = self.spacecraft.requirement, self.flown
+        if asked is None or left is None or (asked.nutation is None and asked.momentum_shift is None):
+            return None
+        return (asked.nutation is None or left.nutation <= asked.nutation) and (
+            asked.momentum_shift is None or left.momentum_shift <= asked.momentum_shift
+        )
+
+    @property
+    def spin_change(self) -> float | None:
+        """ω3 at the end minus at the start, rad/s, flown."""
+        return None if self._flight is None else self._flight.settled.spin - self.spacecraft.spin
+
+    @cached_property
+    def delta_v(self) -> Vector | None:
+        """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is not known."""
+        mass = self.spacecraft.mass
+        if self._flight is None or mass is None or any(pulse.force is None for pulse in self.pulses):
+            return None
+        return _momentum_gained(self._flight) / mass
+
+
+def _momentum_gained(flown: flight.Flight) -> Vector:
+    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
+    gained = np.zeros(3)
+    for leg in flown.legs:
+        firing = [p.force for p in flown.schedule if p.force is not None and p.start <= leg.start and leg.end <= p.end]
+        force = np.asarray(sum(firing, np.zeros(3)))
+        if leg.end == leg.start or not force.any():
+            continue
+        turned = float(np.linalg.norm(leg.path.motion(np.array([leg.start]))[0])) * (leg.end - leg.start)
+        edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
+        middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
+        for node, weight in (*LEGENDRE, *((-node, weight) for node, weight in LEGENDRE)):
+            _, quaternions = leg.path.motion(middles + node * half)
+            gained += weight * half * attitude.rotate(quaternions, force).sum(axis=0)
+    return gained
+
+
+def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> Plan:
+    """Plan one scheme and judge it; an infeasible plan says why.
+
+    Raises KeyError for a name not in `schemes.NAMES`.
+    """
+    if spacecraft.nutation < NO_NUTATION:
+        return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
+    try:
+        made = schemes.schedule(scheme, spacecraft, options or schemes.Options())
+    except Infeasible as reason:
+        return Plan(spacecraft, scheme, None, str(reason))
+    judged = Plan(spacecraft, scheme, made)
+    broken = broken_limits(spacecraft, made)
+    if broken:
+        return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
+    left = judged.flown
+    if scheme != "none" and left is not None and left.nutation >= spacecraft.nutation:
+        angle = math.degrees(left.nutation)
+        return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")
+    return judged
+
+
+def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
+    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all."""
+    limits, horizon = spacecraft.limits, spacecraft.horizon
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    broken: list[str] = []
+    previous_end = -math.inf
+    for number, pulse in enumerate(made, start=1):
+        name = f"pulse {number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s)"
+        if pulse.start < min(limits.earliest, 0.0) - SLACK or pulse.start < limits.earliest - SLACK:
+            broken.append(f"{name} starts before {limits.earliest:.6g} s")
+        if pulse.end > horizon + SLACK:
+            broken.append(f"{name} ends after the horizon of {horizon:.6g} s")
+        if pulse.start < previous_end + limits.gap - SLACK:
+            broken.append(f"{name} comes less than {limits.gap:.6g} s after the one before")
+        for begins, ends in limits.blackout:
+            if pulse.start < ends - SLACK and pulse.end > begins + SLACK:
+                broken.append(f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s")
+        channel = channels.get(pulse.channel)
+        if channel is not None and not (channel.min_on_time - SLACK <= pulse.on_time <= channel.max_on_time + SLACK):
+            broken.append(f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows")
+        previous_end = pulse.end
+    if limits.max_pulses is not None and len(made) > limits.max_pulses:
+        broken.append(f"{len(made)} pulses are more than {limits.max_pulses}")
+    return broken
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Several plans for one spacecraft, the recommended one and the reason for it."""
+
+    spacecraft: Spacecraft
+    plans: tuple[Plan, ...]
+    recommended: Plan | None
+    reason: str
+
+
+def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Options | None = None) -> Comparison:
+    """Plan the schemes named and recommend one."""
+    plans = tuple(plan(spacecraft, name, options) for name in names)
+    recommended, reason = recommend(plans)
+    return Comparison(spacecraft, plans, recommended, reason)
+
+
+def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
+    """The plan to fly, and why.
+
+    Of the plans that meet the requirement (all feasible ones without one), those within twice the least flown nutation
+    or below 1e-3 deg; of these least propellant (impulse where unknown), then less shift of H, then earlier end. If
+    none meets it, least flown nutation.
+    """
+    judged = [(one, one.flown) for one in plans]
+    feasible = [(one, left) for one, left in judged if left is not None]
+    if not feasible:
+        return None, "no scheme is feasible"
+    least = min(left.nutation for _, left in feasible)
+    asked = any(one.meets_requirement is not None for one, _ in feasible)
+    meeting = [(one, left) for one, left in feasible if one.meets_requirement is not False]
+    if not meeting:
+        best = next(one for one, left in feasible if left.nutation == least)
+        return best, "no feasible plan meets the requirement; this one leaves least nutation"
+    least = min(left.nutation for _, left in meeting)
+    close = [(one, left) for one, left in meeting if left.nutation <= max(2.0 * least, AS_GOOD)]
+    group = "meets the requirement" if asked else "is feasible"
+    if len(close) == 1:
+        only = "the only plan that" if len(meeting) == 1 else "leaves least nutation of the plans that"
+        subject = group if len(meeting) == 1 else ("meet the requirement" if asked else "are feasible")
+        return close[0][0], f"{only} {subject}"
+    known = all(one.pulses.propellant is not None for one, _ in close)
+
+    def cost(one: Plan) -> float:
+        propellant = one.pulses.propellant
+        return propellant if known and propellant is not None else one.pulses.total_impulse
+
+    cheapest = min(cost(one) for one, _ in close)
+    equal = [(one, left) for one, left in close if cost(one) <= cheapest * (1.0 + 1e-6)]
+    what = "propellant" if known else "impulse"
+    if len(equal) == 1:
+        return equal[0][0], f"least {what} of the {len(close)} plans that leave practically no nutation"
+    least_shift = min(left.momentum_shift for _, left in equal)
+    still = [one for one, left in equal if left.momentum_shift <= least_shift + 1e-9]
+    best = min(still, key=lambda one: one.pulses.end)
+    if len(still) == 1:
+        return best, f"as little {what} as any, and less shift of H"
+    return best, f"as little {what} and shift of H as any, and ends first"
