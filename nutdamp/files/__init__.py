@@ -1,0 +1,1 @@
+"""Files in and out: spacecraft files (YAML, JSON), schedules, tracks and results."""

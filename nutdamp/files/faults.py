@@ -1,0 +1,171 @@
+"""Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
+
+One table holds the wording of pydantic's errors.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.models import SpacecraftFile
+from nutdamp.files.rules import Finding, findings
+from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
+from nutdamp.units import shown
+
+
+def read_contents(text: str, name: str) -> SpacecraftFile:
+    """The checked contents of a spacecraft file; raises `FaultyFile` with all its faults, sorted by place."""
+    root, faults = read_tree(text, name)
+    found = [*_spelling(root, SpacecraftFile, ()), *findings(root)]
+    try:
+        contents = SpacecraftFile.model_validate(root.plain())
+    except ValidationError as error:
+        judged = {finding.path for finding in found}
+        found += [finding for finding in _type_errors(error) if finding.path not in judged]
+    faults += [_placed(finding, root, name) for finding in found]
+    if faults:
+        raise FaultyFile(faults)
+    return contents
+
+
+def _placed(finding: Finding, root: Node, name: str) -> Fault:
+    """The finding with its place; what is missing is reported where the key of its parent stands."""
+    path = finding.path
+    if finding.at_key:
+        place = root.key_place_of(path)
+    elif root.get(*path) is None:
+        place = root.key_place_of(path[:-1])
+    else:
+        place = root.place_of(path)
+    return Fault(name, *place, dotted(path), finding.problem)
+
+
+def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath) -> Iterator[Finding]:
+    """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
+
+    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too;
+    any other unknown key is dropped.
+    """
+    fields = model.model_fields if model else {}
+    if fields and isinstance(node.value, dict):
+        for key in [key for key in node.value if key not in fields]:
+            dropped = node.value.pop(key)
+            meant = _meant(key, [field for field in fields if field not in node.value])
+            cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
+            if meant:
+                node.value[meant], node.keys[meant] = dropped, node.keys[key]
+            elif ":" in key:
+                cure = "put a space behind the colon"
+            yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
+    for step, child in node.children():
+        below = _section(fields[step].annotation) if isinstance(step, str) and fields else model
+        if child.value is None:
+            cure = "give a value, or leave the key out" if isinstance(step, str) else "a value is wanted"
+            yield Finding((*path, step), f"empty; {cure}")
+        yield from _spelling(child, below if fields else None, (*path, step))
+
+
+def _meant(key: str, fields: list[str]) -> str | None:
+    """The field that a misspelt key stands for, whatever its case."""
+    folded = {field.casefold(): field for field in fields}
+    close = difflib.get_close_matches(key.casefold(), folded, n=1)
+    return folded[close[0]] if close else None
+
+
+def _section(annotation: Any) -> type[BaseModel] | None:
+    """The model within the type of a field, such as that of a list's entries."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_section, get_args(annotation))), None)
+
+
+def _type_errors(error: ValidationError) -> Iterator[Finding]:
+    for details in error.errors(include_url=False):
+        path: KeyPath = details["loc"]
+        wording = _WORDING.get(details["type"])
+        if details["type"] == "missing":
+            problem = f"missing; {_description(path)}"
+        else:
+            problem = wording(details["input"], details.get("ctx", {})) if wording else details["msg"]
+        yield Finding(path, problem)
+
+
+def _description(path: KeyPath) -> str:
+    """What stands at ``path``, as the model describes it."""
+    model: type[BaseModel] | None = SpacecraftFile
+    text = ""
+    for step in path:
+        if model is not None and isinstance(step, str):
+            field = model.model_fields[step]
+            model, text = _section(field.annotation), field.description or ""
+    return text[:1].lower() + text[1:].rstrip(".")
+
+
+def _not(wanted: str) -> Callable[[Any, dict[str, Any]], str]:
+    return lambda value, _: f"{shown(value)} stands where {wanted} is wanted"
+
+
+def _text(value: Any, _: dict[str, Any]) -> str:
+    cure = "" if isinstance(value, dict | list) else "; put it in quotes"
+    return f"{shown(value)} stands where a text is wanted{cure}"
+
+
+def _count(value: Any, context: dict[str, Any]) -> str:
+    wanted = context.get("min_length", context.get("max_length"))
+    if not value:
+        return "empty; an entry is wanted"
+    return f"{len(value)} {'entry stands' if len(value) == 1 else 'entries stand'} where {wanted} are wanted"
+
+
+_WORDING.get(details["type"])
+        if details["type"] == "missing":
+            problem = f"missing; {_description(path)}"
+        else:
+            problem = wording(details["input"], details.get("ctx", {})) if wording else details["msg"]
+        yield Finding(path, problem)
+
+
+def _description(path: KeyPath) -> str:
+    """What stands at ``path``, as the model describes it."""
+    model: type[BaseModel] | None = SpacecraftFile
+    text = ""
+    for step in path:
+        if model is not None and isinstance(step, str):
+            field = model.model_fields[step]
+            model, text = _section(field.annotation), field.description or ""
+    return text[:1].lower() + text[1:].rstrip(".")
+
+
+def _not(wanted: str) -> Callable[[Any, dict[str, Any]], str]:
+    return lambda value, _: f"{shown(value)} stands where {wanted} is wanted"
+
+
+def _text(value: Any, _: dict[str, Any]) -> str:
+    cure = "" if isinstance(value, dict | list) else "; put it in quotes"
+    return f"{shown(value)} stands where a text is wanted{cure}"
+
+
+def _count(value: Any, context: dict[str, Any]) -> str:
+    wanted = context.get("min_length", context.get("max_length"))
+    return f"{len(value)} entries stand where {wanted} are wanted" if value else "empty; an entry is wanted"
+
+
+_WORDING: dict[str, Callable[[Any, dict[str, Any]], str]] = {
+    "model_type": _not("a mapping, {key: value, …},"),
+    "dict_type": _not("a mapping, {key: value, …},"),
+    "list_type": _not("a list, [value, …],"),
+    "string_type": _text,
+    "int_type": _not("a whole number"),
+    "greater_than_equal": lambda value, context: f"{shown(value)} is too small; at least {context['ge']} is wanted",
+    "less_than_equal": lambda value, context: f"{shown(value)} is too large; at most {context['le']} is wanted",
+    "too_short": _count,
+    "too_long": _count,
+    "literal_error": lambda value, context: f"{shown(value)} is not known; {context['expected']} is wanted",
+    "value_error": lambda _, context: str(context["error"]),
+}
+"""What to say for each type of pydantic error that the models can cause, from the input and the context."""

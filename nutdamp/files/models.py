@@ -1,0 +1,264 @@
+"""The keys of a spacecraft file, their types and ranges; also the source of the JSON Schema.
+
+What needs more than one key to judge is in `rules`.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+import operator
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
+from pydantic_core import CoreSchema, core_schema
+
+from nutdamp.units import KINDS, parse, pattern, shown
+
+SMALLEST = 1e-15
+"""Values that must be above zero and are smaller count as zero, in SI: what is divided by them could overflow."""
+
+_BOUNDS = {
+    "minimum": (operator.ge, "of at least"),
+    "exclusiveMinimum": (operator.gt, "above"),
+    "exclusiveMaximum": (operator.lt, "below"),
+}
+_RIGHT_ANGLE = parse("90 deg", "angle")
+
+
+class Quantity:
+    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON Schema, in SI."""
+
+    def __init__(self, kind: str, **bounds: float) -> None:
+        self.kind, self.bounds = kind, bounds
+
+    def check(self, value: object) -> float:
+        """SI value; raises ValueError, which says what would be right."""
+        result = parse(value, self.kind)
+        if not all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items()):
+            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted")
+        if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
+            raise ValueError(
+                f"{shown(value)} is too small to be real; {self.range} is wanted, in SI at least {SMALLEST:g}"
+            )
+        return result
+
+    @property
+    def range(self) -> str:
+        """``an angle of at least 0 and below 90 deg``."""
+        bounds = (
+            f"{_BOUNDS[name][1]} {'90 deg' if limit == _RIGHT_ANGLE else f'{limit:g}'}"
+            for name, limit in self.bounds.items()
+        )
+        return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
+        number = {"type": "number", **self.bounds}
+        if not KINDS[self.kind].factors:
+            return number
+        return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
+
+
+def _epoch(text: str) -> str:
+    """Refuses what is not a date and a time; their text is passed on as it stands."""
+    try:
+        if not re.fullmatch(_EPOCH, text):
+            raise ValueError
+        datetime.datetime.fromisoformat(text)
+    except ValueError:
+        example = "2026-03-01T12:00:00Z"
+        raise ValueError(f"{shown(text)} is no epoch; ISO 8601 with date and time is wanted: {example}") from None
+    return text
+
+
+_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
+
+Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
+Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
+Rate = Annotated[float, Quantity("rate")]
+Angle = Annotated[float, Quantity("angle")]
+Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
+AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
+Time = Annotated[float, Quantity("time", minimum=0)]
+PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
+Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
+Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
+Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
+
+_THREE = Field(min_length=3, max_length=3)
+Rates = Annotated[list[Rate], _THREE]
+Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
+Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
+Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
+Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
+Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Field(min_length=4, max_length=4)]
+Window = Annotated[list[Time], Field(min_length=2, max_length=2)]
+Name = Annotated[str, Field(min_length=1)]
+Epoch = Annotated[str, AfterValidator(_epoch), Field(json_schema_extra={"pattern": f"^{_EPOCH}$"})]
+Count = Annotated[int, Strict(), Field(ge=1, le=1_000_000)]
+
+
+def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
+    """JSON Schema for: all of ``keys`` and none of ``without``."""
+    return {"required": list(keys), "not": {"anyOf": [{"required": [key]} for key in without]}}
+
+
+class Section(BaseModel):
+    """A mapping of the file: no key that is not named here."""
+
+    # Built once, with the root, when the first file is read.
+    model_config = ConfigDict(extra="forbid", defer_build=True)
+
+
+class InertiaSection(Section):
+    """Moments of inertia about the centre of mass: A and C, or the whole tensor."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
+    )
+
+    A: Moment | None = Field(default=None, description="Transverse moment of inertia, kg m².")
+    C: Moment | None = Field(default=None, description="Moment of inertia about the spin axis 3, kg m²; at most 2 A.")
+    tensor: Tensor | None = Field(
+        default=None,
+        description="Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
+    )
+
+
+class StateSection(Section):
+    """The motion at t = 0 by spin and nutation angle."""
+
+    spin: Rate = Field(description="Spin rate about axis 3, signed, rad/s; not zero.")
+    nutation: Nutation = Field(
+        description="Nutation angle between angular momentum and spin axis, rad, from 0 to below 90 deg."
+    )
+    phase: Angle = Field(default=0.0, description="Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.")
+
+
+class AttitudeSection(Section):
+    """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
+
+    quaternion: Quaternion = Field(description="Turn from body to frame, scalar first; normalised when read.")
+    epoch: Epoch | None = Field(default=None, description="Date and time of t = 0, ISO 8601; without a zone it is UTC.")
+    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field(
+        default=None, description="Inertial frame of the quaternion."
+    )
+
+
+class ThrusterSection(Section):
+    """A thruster: position, direction and force, or only its torque."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                _needs("position", "direction", "force", without=("torque", "lever_arm")),
+                _needs("torque", without=("position", "direction", "force")),
+            ]
+        }
+    )
+
+    name: Name = Field(description="Name of the thruster, used by channels and in schedules.")
+    position: Position | None = Field(default=None, description="Where the force acts, from the centre of mass, m.")
+    direction: Direction | None = Field(
+        default=None, description="Direction of the force on the spacecraft (against the plume), any length but zero."
+    )
+    force: Force | None = Field(default=None, description="Thrust, N.")
+    torque: Torques | None = Field(
+        default=None,
+        description="Torque about the centre of mass, N m; instead of position, direction and force.",
+    )
+    lever_arm: Lever | None = Field(
+        default=None, description="Lever arm, m, that gives the thrust of a torque, for the propellant."
+    )
+    isp: PositiveTime | None = Field(default=None, description="Specific impulse, s, for the propellant.")
+    min_on_time: Time = Field(default=0.0, description="Shortest firing, s; default 0.")
+    max_on_time: PositiveTime | None = Field(default=None, description="Longest firing, s; default: no limit.")
+
+
+class SteerableSection(Section):
+    """A torquer for any transverse axis; body-fixed during one pulse."""
+
+    torque: Torque | None = Field(
+        default=None, description="Its torque, N m; left out: an ideal impulse without width."
+    )
+    isp: PositiveTime | None = Field(default=None, description="Specific impulse, s, for the propellant.")
+    lever_arm: Lever | None = Field(default=None, description="Lever arm, m, for the propellant.")
+
+
+class RequirementSection(Section):
+    """What a plan must reach at its end."""
+
+    nutation: AcuteAngle | None = Field(
+        default=None, description="Largest nutation angle, rad, above 0 and below 90 deg."
+    )
+    momentum_shift: AcuteAngle | None = Field(
+        default=None, description="Largest turn of the angular momentum, rad, above 0 and below 90 deg."
+    )
+
+
+class LimitsSection(Section):
+    """What every schedule keeps."""
+
+    horizon: PositiveTime | None = Field(
+        default=None, description="End of the planning time, s; default: 20 nutation periods."
+    )
+    earliest: Time = Field(default=0.0, description="No pulse begins before, s; default 0.")
+    gap: Time = Field(default=0.0, description="Least time between two pulses, s; default 0.")
+    tick: PositiveTime | None = Field(
+        default=None, description="Resolution of commanded starts and on-times, s; default: none."
+    )
+    max_pulses: Count | None = Field(default=None, description="Largest number of pulses; default: no limit.")
+    blackout: list[Window] = Field(default=[], description="Windows [begin, end], s, in which no pulse may be on.")
+
+
+class SpacecraftFile(Section):
+    """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers are SI."""
+
+    model_config = ConfigDict(
+        title="nutdamp spacecraft file",
+        json_schema_extra={"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]},
+    )
+
+    name: Name = Field(description="Name of the spacecraft.")
+    mass: Mass | None = Field(default=None, description="Mass, kg; without it no velocity change is worked out.")
+    inertia: InertiaSection = Field(description="Moments of inertia: A and C, or tensor, kg m².")
+    omega0: Rates | None = Field(default=None, description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.")
+    state: StateSection | None = Field(
+        default=None, description="Motion at t = 0 by spin and nutation; or instead omega0."
+    )
+    attitude: AttitudeSection | None = Field(default=None, description="Attitude at t = 0.")
+    thrusters: list[ThrusterSection] = Field(default=[], description="Body-fixed thrusters.")
+    channels: Annotated[dict[str, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)] | None = Field(
+        default=None,
+        description="Names of thrusters that fire together; without it each thruster is a channel of its own.",
+    )
+    steerable: SteerableSection | None = Field(default=None, description="A torquer for any transverse axis.")
+    requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
+    limits: LimitsSection | None = Field(default=None, description="What every schedule keeps.")
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of the spacecraft file, for editors."""
+    from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+
+    class Schema(GenerateJsonSchema):
+        """None stands for a key that is left out, which a file cannot write; and titles would repeat the keys."""
+
+        def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+            return self.generate_inner(schema["schema"])
+
+        def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+            described = super().default_schema(schema)
+            if described.get("default", 0) is None:
+                del described["default"]
+            return described
+
+        def field_title_should_be_set(self, schema: object) -> bool:  # noqa: ARG002
+            return False
+
+    schema = SpacecraftFile.model_json_schema(schema_generator=Schema)
+    return {"$schema": Schema.schema_dialect, **schema}

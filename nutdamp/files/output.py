@@ -1,0 +1,95 @@
+"""Writing: whole files or none, and numbers that read back as they were."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from nutdamp.errors import CannotWrite
+
+STDOUT = "-"
+"""File name that stands for standard output."""
+
+
+def write_whole(path: str, content: str | bytes) -> None:
+    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output.
+
+    The text goes to a temporary file in the same folder, which then takes the place of the old one. What is no
+    plain file (a pipe, /dev/null) is written to directly. Raises CannotWrite.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        if path == STDOUT:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+            return
+        target = Path(path).resolve()
+        if target.exists() and not target.is_file() and not target.is_dir():
+            target.write_bytes(data)
+            return
+        _replace(target, data)
+    except BrokenPipeError:
+        raise
+    except OSError as reason:
+        raise CannotWrite(path, reason.strerror or str(reason)) from reason
+
+
+def _replace(target: Path, data: bytes) -> None:
+    if target.is_dir():
+        raise IsADirectoryError(0, "it is a directory")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(0, "permission denied")
+    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if target.exists():
+            Path(temporary).chmod(target.stat().st_mode & 0o7777)
+        else:
+            mask = os.umask(0)
+            os.umask(mask)
+            Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def number(value: float | None) -> str:
+    """A number with 17 significant digits at most, the shortest text that reads back the same; None is empty."""
+    return "" if value is None or not math.isfinite(value) else repr(float(value))
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table as RFC 4180 CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream)
+    writer.writerow(header)
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def json_text(data: dict[str, Any]) -> str:
+    """JSON with numbers that are not finite as null, and a newline at the end."""
+    return json.dumps(_finite(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,107 @@
+"""Plans, flights and spacecraft as JSON-ready dictionaries; vectors in the axes of the file, angles in degrees."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.flight import Flight, Residual
+from nutdamp.physics import cones
+from nutdamp.planning import Comparison, Plan
+from nutdamp.schedule import Pulse
+from nutdamp.spacecraft import Spacecraft, Vector
+
+
+def comparison_json(compared: Comparison) -> dict[str, Any]:
+    """What ``plan --json`` gives."""
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(compared.spacecraft),
+        "plans": [plan_json(plan) for plan in compared.plans],
+        "recommended": None if compared.recommended is None else compared.recommended.scheme,
+        "reason": compared.reason,
+    }
+
+
+def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """Derived quantities of a spacecraft at t = 0."""
+    inertia = spacecraft.inertia
+    A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
+    return {
+        "name": spacecraft.name,
+        "A_kgm2": A,
+        "C_kgm2": C,
+        "a": inertia.a,
+        "shape": inertia.shape,
+        "moments_kgm2": list(inertia.moments),
+        "principal_axes": inertia.axes.T.tolist(),
+        "omega0_rad_s": (inertia.axes @ spacecraft.omega0).tolist(),
+        "nutation_deg": math.degrees(spacecraft.nutation),
+        "body_cone_deg": math.degrees(cones.body_cone(omega, spin)),
+        "space_cone_deg": math.degrees(cones.space_cone(A, C, omega, spin)),
+        "body_nutation_period_s": spacecraft.body_period,
+        "inertial_nutation_period_s": spacecraft.inertial_period,
+    }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """One plan; an infeasible one has no pulses, nulls, and why."""
+    schedule, axes = plan.schedule, plan.spacecraft.inertia.axes
+    return {
+        "scheme": plan.scheme,
+        "feasible": plan.feasible,
+        "why": plan.why,
+        "meets_requirement": plan.meets_requirement,
+        "pulses": [pulse_json(pulse, axes) for pulse in plan.pulses],
+        "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
+        "least_impulse_Nms": None if schedule is None else plan.spacecraft.least_impulse,
+        "propellant_kg": None if schedule is None else schedule.propellant,
+        "end_s": None if schedule is None else schedule.end,
+        "delta_v_m_s": None if plan.delta_v is None else plan.delta_v.tolist(),
+        "spin_change_rad_s": plan.spin_change,
+        "residual": residual_json(plan.residual),
+        "flown": residual_json(plan.flown),
+        "notes": list(plan.pulses.notes),
+    }
+
+
+def pulse_json(pulse: Pulse, axes: Vector) -> dict[str, Any]:
+    """One pulse; ``axes`` leads from principal axes to those of the file."""
+    return {
+        "t_s": pulse.t,
+        "start_s": pulse.start,
+        "on_time_s": pulse.on_time,
+        "channel": pulse.channel,
+        "torque_Nm": None if pulse.torque is None else (axes @ pulse.torque).tolist(),
+        "impulse_Nms": (axes @ pulse.impulse).tolist(),
+        "propellant_kg": pulse.propellant,
+    }
+
+
+def residual_json(residual: Residual | None) -> dict[str, float | None]:
+    """Cone angles and shifts in degrees; nulls where there is no schedule."""
+    return {
+        "nutation_deg": None if residual is None else math.degrees(residual.nutation),
+        "body_cone_deg": None if residual is None else math.degrees(residual.body_cone),
+        "space_cone_deg": None if residual is None else math.degrees(residual.space_cone),
+        "momentum_shift_deg": None if residual is None else math.degrees(residual.momentum_shift),
+        "axis_error_deg": None if residual is None else math.degrees(residual.axis_error),
+    }
+
+
+def pulses_json(flown: Flight) -> list[dict[str, Any]]:
+    """The pulses of a flight with the cone angles before and after each."""
+    before, after = flown.around_pulses()
+    axes = flown.spacecraft.inertia.axes
+    return [
+        {
+            **pulse_json(pulse, axes),
+            **{
+                f"{cone}_{when}_deg": math.degrees(getattr(track, cone)[index])
+                for when, track in (("before", before), ("after", after))
+                for cone in ("nutation", "body_cone", "space_cone")
+            },
+        }
+        for index, pulse in enumerate(flown.schedule)
+    ]

@@ -1,0 +1,307 @@
+"""What must hold between several keys of a spacecraft file.
+
+The rules read the raw tree and skip what cannot be read, so that they speak up whatever else is wrong.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.files.models import SMALLEST
+from nutdamp.files.yaml_tree import KeyPath, Node, dotted
+from nutdamp.physics.inertia import principal_axes
+from nutdamp.schedule import STEERABLE
+from nutdamp.units import parse, shown
+
+Vector = NDArray[np.float64]
+
+SYMMETRIC = 1e-9
+"""Asymmetry of an inertia tensor that passes for rounding, relative to its largest entry."""
+
+CANCELLED = 1e-12
+"""A sum that is smaller than its terms by this factor is rounding; it counts as zero."""
+
+
+class Finding(NamedTuple):
+    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at its value."""
+
+    path: KeyPath
+    problem: str
+    at_key: bool = False
+
+
+class Facts:
+    """The values of a tree that can be read."""
+
+    def __init__(self, root: Node) -> None:
+        self.root = root
+
+    def has(self, *path: str | int) -> bool:
+        """Whether something stands at ``path``."""
+        return self.root.get(*path) is not None
+
+    def text(self, *path: str | int) -> str | None:
+        """The text at ``path``."""
+        node = self.root.get(*path)
+        return node.value if node is not None and isinstance(node.value, str) else None
+
+    def number(self, kind: str, *path: str | int) -> float | None:
+        """The quantity at ``path``, SI."""
+        node = self.root.get(*path)
+        try:
+            return None if node is None else parse(node.plain(), kind)
+        except ValueError:
+            return None
+
+    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
+        """The ``size`` quantities at ``path``, SI; None unless all can be read."""
+        if len(self.children(*path)) != size:
+            return None
+        numbers = [self.number(kind, *path, index) for index in range(size)]
+        return None if None in numbers else np.array(numbers, dtype=np.float64)
+
+    def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
+        """Keys or positions at ``path``, and what stands there."""
+        node = self.root.get(*path)
+        return [] if node is None else list(node.children())
+
+
+def findings(root: Node) -> Iterator[Finding]:
+    """Everything wrong between the keys of a file."""
+    facts = Facts(root)
+    for rule in (_names, _inertia, _motion, _attitude, _thrusters, _channels, _limits):
+        yield from rule(facts)
+
+
+def force_vector(direction: Iterable[float], force: float) -> Vector:
+    """Force in N along ``direction``, which need not have length one."""
+    components = tuple(direction)
+    return np.array([part / math.hypot(*components) * force for part in components])
+
+
+def symmetric(tensor: Vector) -> Vector:
+    """A tensor without the asymmetry that passes for rounding."""
+    return 0.5 * (tensor + tensor.T)
+
+
+def _norm(vector: Vector) -> float:
+    """Length of a vector, without the underflow of squares."""
+    return math.hypot(*vector)
+
+
+def _names(facts: Facts) -> Iterator[Finding]:
+    paths: list[KeyPath] = [("name",), *(("thrusters", index, "name") for index, _ in facts.children("thrusters"))]
+    named = [(path, facts.text(*path), False) for path in paths]
+    named += [(("channels", key), str(key), True) for key, _ in facts.children("channels")]
+    for path, name, at_key in named:
+        if name is None:
+            continue
+        if not name.strip() or not name.isprintable():
+            yield Finding(path, f"{shown(name)} is no name; printable characters are wanted", at_key)
+        elif name == STEERABLE and path != ("name",):
+            yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
+    first: dict[str, KeyPath] = {}
+    for path, name, _ in named[1 : len(paths)]:
+        if name is not None and first.setdefault(name, path) != path:
+            other = first[name]
+            line = facts.root.place_of(other)[0]
+            yield Finding(path, f"duplicate name; {dotted(other[:2])} has it already (line {line}); take another")
+
+
+def _inertia(facts: Facts) -> Iterator[Finding]:
+    keys = [key for key, _ in facts.children("inertia") if key in ("A", "C", "tensor")]
+    if "tensor" in keys:
+        if len(keys) > 1:
+            yield Finding(("inertia", "tensor"), "stands beside A or C; keep either tensor, or A and C", True)
+        tensor = _tensor(facts)
+        fault = None if tensor is None else _tensor_fault(tensor)
+        if fault is not None:
+            yield fault
+    elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict):
+        missing = {"A": "transverse", "C": "axial"}
+        for key, what in missing.items():
+            if key not in keys:
+                yield Finding(("inertia", key), f"missing; the {what} moment of inertia, in kg m^2")
+    A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
+    if A is not None and C is not None and C > 2 * A > 0:
+        problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2, as in no body; at most 2 A (a flat disc)"
+        yield Finding(("inertia", "C"), problem)
+
+
+def _tensor(facts: Facts) -> Vector | None:
+    rows = [facts.vector("inertia", 3, "inertia", "tensor", row) for row in range(3)]
+    if len(facts.children("inertia", "tensor")) != 3 or any(row is None for row in rows):
+        return None
+    return np.array(rows)
+
+
+def _tensor_fault(tensor: Vector) -> Finding | None:
+    """What makes a 3×3 tensor impossible as an inertia tensor."""
+    path: KeyPath = ("inertia", "tensor")
+    skew = np.abs(tensor - tensor.T)
+    if skew.max() > SYMMETRIC * np.abs(tensor).max():
+        column, row = (int(index) for index in np.unravel_index(np.argmax(skew), skew.shape))
+        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]"
+        problem = f"not symmetric: {tensor[row, column]:g} here, but {mirrored}; both must be equal"
+        return Finding((*path, row, column), problem)
+    moments = np.linalg.eigvalsh(symmetric(tensor))
+    values = ", ".join(f"{moment:g}" for moment in moments)
+    if moments[0] <= max(SMALLEST, 1e-14 * moments[2]):
+        return Finding(path, f"principal moments {values} kg m^2; all three must be above 0")
+    if moments[2] > (moments[0] + moments[1]) * (1 + SYMMETRIC):
+        problem = f"principal moments {values} kg m^2: the largest must not exceed the sum of the other two"
+        return Finding(path, f"{problem} (triangle inequality)")
+    return None
+
+
+def _motion(facts: Facts) -> Iterator[Finding]:
+    if facts.has("omega0") and facts.has("state"):
+        yield Finding(("state",), "stands beside omega0; keep one of the two", True)
+    if not facts.has("omega0") and not facts.has("state"):
+        yield Finding(("omega0",), "missing; give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}")
+    for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
+        if spin is not None and abs(spin) < SMALLEST:
+            yield Finding(path, "the spin is zero; a rate about axis 3 is wanted, nothing nutates without it")
+
+
+def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
+    """The rate about principal axis 3, and where it stands; what rounding leaves of a transverse rate is zero."""
+    omega0, tensor = facts.vector("rate", 3, "omega0"), _tensor(facts)
+    if omega0 is None or (tensor is not None and _tensor_fault(tensor) is not None):
+        return (), None
+    if tensor is None:
+        return ("omega0", 2), float(omega0[2])
+    spin = float(principal_axes(symmetric(tensor))[1][:, 2] @ omega0)
+    return ("omega0",), spin if abs(spin) > CANCELLED * _norm(omega0) else 0.0
+
+
+def _attitude(facts: Facts) -> Iterator[Finding]:
+    quaternion = facts.vector("number", 4, "attitude", "quaternion")
+    if quaternion is not None and _norm(quaternion) < SMALLEST:
+        yield Finding(("attitude", "quaternion"), "zero; a turn is wanted, such as [1, 0, 0, 0]")
+
+
+_MOUNTING = ("position", "direction", "force")
+
+
+def _thrusters(facts: Facts) -> Iterator[Finding]:
+    for index, node in facts.children("thrusters"):
+        if isinstance(node.value, dict):
+            yield from _thruster_keys(facts, ("thrusters", index))
+            yield from _thruster_values(facts, ("thrusters", index))
+
+
+def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    mounting = [key for key in _MOUNTING if facts.has(*path, key)]
+    given = " and ".join(mounting)
+    if facts.has(*path, "torque"):
+        if mounting:
+            problem = f"stands beside {given}; keep either torque, or position, direction and force"
+            yield Finding((*path, "torque"), problem, True)
+    elif not mounting:
+        yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
+    else:
+        for key in _MOUNTING:
+            if key not in mounting:
+                yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
+    if mounting and facts.has(*path, "lever_arm"):
+        yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
+
+
+def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    direction = facts.vector("number", 3, *path, "direction")
+    if direction is not None and _norm(direction) < SMALLEST:
+        yield Finding((*path, "direction"), "zero; a direction is wanted, such as [1, 0, 0]")
+    elif _cancel([_torque(facts, path)]):
+        if facts.has(*path, "torque"):
+            yield Finding((*path, "torque"), "zero; at least one component other than 0 is wanted")
+        else:
+            problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
+            yield Finding((*path, "position"), problem)
+    least, most = _on_times(facts, path)
+    if least > most:
+        yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; at most {most:g} s is wanted")
+
+
+def _torque(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
+    """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be read."""
+    torque = facts.vector("torque", 3, *path, "torque")
+    if torque is not None:
+        return torque, _norm(torque)
+    position = facts.vector("length", 3, *path, "position")
+    direction = facts.vector("number", 3, *path, "direction")
+    force = facts.number("force", *path, "force")
+    if position is None or direction is None or not force or _norm(direction) < SMALLEST:
+        return None
+    return np.cross(position, force_vector(direction, force)), _norm(position) * abs(force)
+
+
+def _cancel(torques: Sequence[tuple[Vector, float] | None]) -> bool:
+    """Whether torques add up to zero; False where one is not known."""
+    known = [torque for torque in torques if torque is not None]
+    if len(known) < len(torques):
+        return False
+    total = _norm(np.sum([torque for torque, _ in known], axis=0))
+    return total <= max(SMALLEST, CANCELLED * sum(size for _, size in known))
+
+
+def _on_times(facts: Facts, path: KeyPath) -> tuple[float, float]:
+    """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
+    least = facts.number("time", *path, "min_on_time")
+    most = facts.number("time", *path, "max_on_time")
+    return (0.0 if least is None else least), (math.inf if most is None else most)
+
+
+def _channels(facts: Facts) -> Iterator[Finding]:
+    thrusters = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
+    names = [name for name in thrusters if name is not None]
+    for channel, node in facts.children("channels"):
+        path = ("channels", channel)
+        members: set[KeyPath] = set()
+        for index, entry in node.children():
+            name = entry.value
+            if not isinstance(name, str):
+                continue
+            if name not in thrusters:
+                yield Finding((*path, index), f"no thruster is called {shown(name)}; {_instead(name, names)}")
+            elif (member := ("thrusters", thrusters[name])) in members:
+                yield Finding((*path, index), f"{shown(name)} stands twice in this channel; once is wanted")
+            else:
+                members.add(member)
+        if members and len(members) == len(list(node.children())):
+            yield from _channel_values(facts, path, members)
+
+
+def _instead(name: str, names: list[str]) -> str:
+    """The thruster that was meant, or all there are."""
+    few = names[:20]  # to look for the nearest of very many takes long
+    close = difflib.get_close_matches(name, few, n=1)
+    if close:
+        return f"did you mean {shown(close[0])}?"
+    return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
+
+
+def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
+    if len(members) > 1 and _cancel([_torque(facts, member) for member in members]):
+        yield Finding(path, "the torques of these thrusters cancel; let them fire in channels of their own")
+    times = [_on_times(facts, member) for member in members]
+    least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
+    if least > most and all(shortest <= longest for shortest, longest in times):
+        problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
+        yield Finding(path, f"{problem}; let them fire in channels of their own")
+
+
+def _limits(facts: Facts) -> Iterator[Finding]:
+    earliest, horizon = facts.number("time", "limits", "earliest"), facts.number("time", "limits", "horizon")
+    if earliest is not None and horizon is not None and earliest >= horizon > 0:
+        yield Finding(("limits", "earliest"), f"not before the horizon; less than {horizon:g} s is wanted")
+    for index, _ in facts.children("limits", "blackout"):
+        window = facts.vector("time", 2, "limits", "blackout", index)
+        if window is not None and window[1] < window[0]:
+            yield Finding(("limits", "blackout", index), "ends before it begins; [begin, end] is wanted")

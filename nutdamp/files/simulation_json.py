@@ -1,0 +1,39 @@
+"""What ``simulate --json`` gives."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.files.plan_json import pulses_json, residual_json, spacecraft_json
+from nutdamp.flight import Flight, Residual
+from nutdamp.track import Track, extremes
+
+
+def simulation_json(
+    flight: Flight, track: Track, residual: Residual, flown: Residual, *, scheme: str
+) -> dict[str, Any]:
+    """Pulses with the cone angles around them, both residuals, and the extremes of the axis track in degrees."""
+    found = extremes(track)
+    attitude = flight.spacecraft.attitude
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(flight.spacecraft),
+        "scheme": scheme,
+        "pulses": pulses_json(flight),
+        "residual": residual_json(residual),
+        "flown": residual_json(flown),
+        "until_s": float(track.t[-1]),
+        "axis_track": {
+            "frame": "N" if attitude is None else attitude.frame,
+            "farthest_from_momentum_deg": math.degrees(found.farthest[0]),
+            "farthest_s": found.farthest[1],
+            "nearest_to_momentum_deg": math.degrees(found.nearest[0]),
+            "nearest_s": found.nearest[1],
+            "x_deg": [math.degrees(value) for value in found.x],
+            "y_deg": [math.degrees(value) for value in found.y],
+            "right_ascension_deg": None if attitude is None else [math.degrees(v) for v in found.right_ascension],
+            "declination_deg": None if attitude is None else [math.degrees(v) for v in found.declination],
+        },
+    }

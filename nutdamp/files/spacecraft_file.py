@@ -1,0 +1,140 @@
+"""Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians."""
+
+from __future__ import annotations
+
+import math
+import pkgutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.files.faults import read_contents
+from nutdamp.files.models import (
+    AttitudeSection,
+    InertiaSection,
+    LimitsSection,
+    RequirementSection,
+    SpacecraftFile,
+    SteerableSection,
+    ThrusterSection,
+    json_schema,
+)
+from nutdamp.files.rules import force_vector, symmetric
+from nutdamp.files.yaml_tree import read_text
+from nutdamp.physics.inertia import principal_axes
+from nutdamp.spacecraft import Attitude, Channel, Inertia, Limits, Requirement, Spacecraft, Steerable, Thruster
+
+__all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spacecraft"]
+
+Vector = NDArray[np.float64]
+
+
+def load_spacecraft(path: str | Path) -> Spacecraft:
+    """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
+    return read_spacecraft(read_text(Path(path)), str(path))
+
+
+def read_spacecraft(text: str, name: str) -> Spacecraft:
+    """The spacecraft in the text of a file; ``name`` stands for the file in messages.
+
+    Raises `FaultyFile` with everything that is wrong in it.
+    """
+    contents = read_contents(text, name)
+    inertia = _inertia(contents.inertia)
+    thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}
+    channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
+    return Spacecraft(
+        name=contents.name,
+        inertia=inertia,
+        omega0=_rates(contents, inertia),
+        mass=contents.mass,
+        attitude=_attitude(contents.attitude),
+        channels=tuple(
+            Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
+        ),
+        steerable=_steerable(contents.steerable),
+        requirement=_requirement(contents.requirement),
+        limits=_limits(contents.limits),
+    )
+
+
+def built_in_example_text() -> str:
+    """The commented spacecraft file that ships with the package: the built-in example, and what `init` writes."""
+    data = pkgutil.get_data("nutdamp", "data/example.yaml")
+    if data is None:
+        raise FileNotFoundError("nutdamp/data/example.yaml is not installed")
+    return data.decode("utf-8")
+
+
+def _inertia(section: InertiaSection) -> Inertia:
+    if section.tensor is not None:
+        moments, axes = principal_axes(symmetric(np.array(section.tensor)))
+        return Inertia(moments, axes)
+    assert section.A is not None
+    assert section.C is not None
+    return Inertia((section.A, section.A, section.C))
+
+
+def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
+    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = A|ω|/(C|ω3|), Magnus 1970 (19)."""
+    if contents.omega0 is not None:
+        rates: Vector = inertia.axes.T @ np.array(contents.omega0)
+        return rates
+    state = contents.state
+    assert state is not None
+    transverse = inertia.C / inertia.A * abs(state.spin) * math.tan(state.nutation)
+    return np.array([transverse * math.cos(state.phase), transverse * math.sin(state.phase), state.spin])
+
+
+def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
+    force: Vector | None = None
+    if entry.torque is not None:
+        torque = np.array(entry.torque)
+        thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
+    else:
+        assert entry.position is not None
+        assert entry.direction is not None
+        assert entry.force is not None
+        thrust, force = entry.force, force_vector(entry.direction, entry.force)
+        torque = np.cross(entry.position, force)
+    return Thruster(
+        name=entry.name,
+        torque=axes.T @ torque,
+        force=None if force is None else axes.T @ force,
+        thrust=thrust,
+        isp=entry.isp,
+        min_on_time=entry.min_on_time,
+        max_on_time=math.inf if entry.max_on_time is None else entry.max_on_time,
+    )
+
+
+def _attitude(section: AttitudeSection | None) -> Attitude | None:
+    if section is None:
+        return None
+    quaternion = np.array(section.quaternion) / math.hypot(*section.quaternion)
+    return Attitude(quaternion, section.epoch, section.frame)
+
+
+def _steerable(section: SteerableSection | None) -> Steerable | None:
+    return None if section is None else Steerable(section.torque, section.isp, section.lever_arm)
+
+
+def _requirement(section: RequirementSection | None) -> Requirement | None:
+    """None also for a requirement that names nothing."""
+    if section is None or (section.nutation is None and section.momentum_shift is None):
+        return None
+    return Requirement(section.nutation, section.momentum_shift)
+
+
+def _limits(section: LimitsSection | None) -> Limits:
+    if section is None:
+        return Limits()
+    return Limits(
+        horizon=section.horizon,
+        earliest=section.earliest,
+        gap=section.gap,
+        tick=section.tick,
+        max_pulses=section.max_pulses,
+        blackout=tuple((begin, end) for begin, end in section.blackout),
+    )

@@ -1,0 +1,134 @@
+"""Units of the files and of the command line: one small table that leads from "60 rpm" to 6.283… rad/s.
+
+A quantity is a number, which is SI, or a text with a unit. What is not in the table is refused with the units
+that are: Hz and revolutions are left out on purpose, since nobody can tell whether they count turns or radians.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of quantity: its name with article, and its units with their factors to SI."""
+
+    noun: str
+    factors: dict[str, float]
+
+    @property
+    def si(self) -> str:
+        """The SI unit; empty for a ratio and for plain numbers."""
+        return next((unit for unit, factor in self.factors.items() if factor == 1.0), "")
+
+    @property
+    def units(self) -> str:
+        """The units allowed, for messages: ``rad/s, deg/s or rpm``."""
+        *others, last = self.factors
+        return f"{', '.join(others)} or {last}" if others else last
+
+    @property
+    def wanted(self) -> str:
+        """What may be written, for messages: ``a number in kg, or a text in kg or g``."""
+        if not self.factors:
+            return "no unit, no quotes"
+        return f"a number{' in ' * bool(self.si)}{self.si}, or a text in {self.units}"
+
+
+KINDS: dict[str, Kind] = {
+    "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3}),
+    "length": Kind("a length", {"m": 1.0, "mm": 1e-3}),
+    "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0}),
+    "force": Kind("a force", {"N": 1.0, "mN": 1e-3}),
+    "torque": Kind("a torque", {"N m": 1.0, "mN m": 1e-3}),
+    "inertia": Kind("a moment of inertia", {"kg m^2": 1.0}),
+    "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
+    "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
+    "ratio": Kind("a ratio", {"%": 0.01}),
+    "number": Kind("a plain number", {}),
+}
+"""The kinds of quantity by name; ``number`` is for what has no unit, such as the parts of a quaternion."""
+
+LARGEST = 1e15
+"""Magnitudes above are refused, in SI: nothing physical, and what is computed from them could overflow."""
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
+
+# "Nm" and "kgm^2" are as clear as "N m" and "kg m^2", and much used.
+_SPELLINGS: dict[str, tuple[str, float]] = {
+    spelling: (name, factor)
+    for name, kind in KINDS.items()
+    for unit, factor in kind.factors.items()
+    for spelling in (unit, unit.replace(" ", ""))
+}
+
+
+def parse(value: object, kind: str, *, bare: bool = False) -> float:
+    """SI value of a quantity: a number, or a text with a unit of ``kind``.
+
+    ``bare`` accepts a text that is only a number, as command lines give it; in a file that is a slip.
+    Raises ValueError, with a message that says what is wrong and what is allowed; also for NaN, infinite and
+    unphysically large values.
+    """
+    wanted = KINDS[kind]
+    if isinstance(value, str):
+        number, factor = _split(value, kind, bare)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        number, factor = value, 1.0
+    else:
+        raise ValueError(f"{shown(value)} stands where {wanted.noun} is wanted: {wanted.wanted}")
+    try:
+        result = float(number) * factor
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise ValueError(f"{shown(value)} is not a finite number")
+    if abs(result) > LARGEST:
+        raise ValueError(f"{shown(value)} is beyond anything physical; at most {LARGEST:g} {wanted.si}".rstrip())
+    return result
+
+
+def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
+    """Number and factor of a text with a unit of ``kind``."""
+    wanted = KINDS[kind]
+    match = _QUANTITY.fullmatch(text)
+    # A "unit" that starts like the rest of a number is a decimal comma or a thousands separator.
+    if match is None or re.match(r"[0-9.,_']", match[2]):
+        raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
+    number, unit = float(match[1]), re.sub(r"[\s*·]+", " ", match[2]).replace("²", "^2")
+    if not unit and bare:
+        return number, 1.0
+    if not wanted.factors:
+        raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
+    if not unit:
+        raise ValueError(f"{shown(text)} has no unit; add {wanted.units}, or leave the quotes out")
+    if unit not in _SPELLINGS:
+        noun = wanted.noun.partition(" ")[2]
+        turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
+        hint = f" ({match[2]} hides a factor 2π)" if turns else ""
+        raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {wanted.units}{hint}")
+    found, factor = _SPELLINGS[unit]
+    if found != kind:
+        raise ValueError(f"{shown(text)} is {KINDS[found].noun}; {wanted.noun} is wanted: {wanted.wanted}")
+    return number, factor
+
+
+def pattern(kind: str) -> str:
+    """Regular expression (ECMA 262 and Python) of the texts that `parse` takes for ``kind``; for JSON Schema."""
+    units = [unit.replace("^2", "(\\^2|²)").replace(" ", "[ *·]*") for unit in KINDS[kind].factors]
+    return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({'|'.join(units)})\s*$"
+
+
+def shown(value: object) -> str:
+    """A value as messages show it: one line, short, in the words of YAML."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict | list):
+        return "a mapping" if isinstance(value, dict) else "a list"
+    if value is None:
+        return "nothing"
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:40]}…{text[-10:]}"
