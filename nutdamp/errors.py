@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
 class NutdampError(Exception):
     """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(NamedTuple):
     """One thing wrong in an input file.
 
     ``line`` and ``column`` count from 1; 0 means that the fault has no place in the file.
@@ -54,6 +53,14 @@ class CannotWrite(NutdampError):
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
         super().__init__(f"cannot write {path}: {reason}")
+
+
+class MissingExtra(NutdampError):
+    """An optional part of the installation is needed and not there."""
+
+    def __init__(self, extra: str, purpose: str) -> None:
+        self.extra = extra
+        super().__init__(f"{purpose} needs the extra '{extra}': pip install 'nutdamp[{extra}]'")
 
 
 class Infeasible(NutdampError):

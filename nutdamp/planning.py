@@ -11,7 +11,7 @@ import numpy as np
 
 from nutdamp import flight, schemes
 from nutdamp.errors import Infeasible
-from nutdamp.flight import Residual
+from nutdamp.flight import Flight, Residual
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.windows import SLACK
@@ -52,13 +52,14 @@ class Plan:
         return None if self.schedule is None else flight.by_impulses(self.spacecraft, self.schedule).residual
 
     @cached_property
-    def _flight(self) -> flight.Flight | None:
-        return None if self.schedule is None else flight.flown(self.spacecraft, self.schedule)
+    def flight(self) -> Flight:
+        """The schedule flown through its real pulse widths; free motion where the plan is infeasible."""
+        return flight.flown(self.spacecraft, self.pulses)
 
     @property
     def flown(self) -> Residual | None:
         """What remains when the real pulse widths are flown."""
-        return None if self._flight is None else self._flight.residual
+        return self.flight.residual if self.feasible else None
 
     @property
     def meets_requirement(self) -> bool | None:
@@ -73,18 +74,18 @@ class Plan:
     @property
     def spin_change(self) -> float | None:
         """ω3 at the end minus at the start, rad/s, flown."""
-        return None if self._flight is None else self._flight.settled.spin - self.spacecraft.spin
+        return self.flight.settled.spin - self.spacecraft.spin if self.feasible else None
 
     @cached_property
     def delta_v(self) -> Vector | None:
         """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is not known."""
         mass = self.spacecraft.mass
-        if self._flight is None or mass is None or any(pulse.force is None for pulse in self.pulses):
+        if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        return _momentum_gained(self._flight) / mass
+        return _momentum_gained(self.flight) / mass
 
 
-def _momentum_gained(flown: flight.Flight) -> Vector:
+def _momentum_gained(flown: Flight) -> Vector:
     """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
     gained = np.zeros(3)
     for leg in flown.legs:
@@ -185,11 +186,11 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
         return best, "no feasible plan meets the requirement; this one leaves least nutation"
     least = min(left.nutation for _, left in meeting)
     close = [(one, left) for one, left in meeting if left.nutation <= max(2.0 * least, AS_GOOD)]
-    group = "meets the requirement" if asked else "is feasible"
+    those = "meet the requirement" if asked else "are feasible"
+    if len(meeting) == 1:
+        return meeting[0][0], f"the only plan that {'meets the requirement' if asked else 'is feasible'}"
     if len(close) == 1:
-        only = "the only plan that" if len(meeting) == 1 else "leaves least nutation of the plans that"
-        subject = group if len(meeting) == 1 else ("meet the requirement" if asked else "are feasible")
-        return close[0][0], f"{only} {subject}"
+        return close[0][0], f"leaves least nutation of the {len(meeting)} plans that {those}"
     known = all(one.pulses.propellant is not None for one, _ in close)
 
     def cost(one: Plan) -> float:
@@ -200,7 +201,7 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     equal = [(one, left) for one, left in close if cost(one) <= cheapest * (1.0 + 1e-6)]
     what = "propellant" if known else "impulse"
     if len(equal) == 1:
-        return equal[0][0], f"least {what} of the {len(close)} plans that leave practically no nutation"
+        return equal[0][0], f"least {what} of the {len(close)} plans that {those} and leave least nutation"
     least_shift = min(left.momentum_shift for _, left in equal)
     still = [one for one, left in equal if left.momentum_shift <= least_shift + 1e-9]
     best = min(still, key=lambda one: one.pulses.end)

@@ -41,14 +41,18 @@ def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> Hal
     return HalfPulses(half, half, cones.half_turn(A, C, omega, spin))
 
 
+def turn_between_halves(A: float, C: float, omega: float, spin: float) -> float:
+    """Angle in rad by which ω turns in the body between the two `half_pulses`: σπ(1 - A/C)cos(θ/2)."""
+    theta = cones.nutation_angle(A, C, omega, spin)
+    return math.copysign(math.pi, spin) * (1.0 - A / C) * math.cos(0.5 * theta)
+
+
 def mounting_angle(A: float, C: float, omega: float, spin: float) -> float:
     """Angle in rad, [0, π), from the first to the second torque axis of two fixed actuators for `half_pulses`.
 
-    In the body ω turns by σπ(1 - A/C)cos(θ/2) while the pulses wait for each other (small angles: -σπA/C), so two
-    actuators mounted at that angle, each able to push both ways, give both pulses (Magnus 1970 after (22)).
+    Each must be able to push both ways; at small angles it is -σπA/C mod π (Magnus 1970 after (22)).
     """
-    theta = cones.nutation_angle(A, C, omega, spin)
-    return (math.copysign(math.pi, spin) * (1.0 - A / C) * math.cos(0.5 * theta)) % math.pi
+    return turn_between_halves(A, C, omega, spin) % math.pi
 
 
 def phase_to_oppose(omega: complex, torque: complex) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from typing import cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
+    from nutdamp.schedule import Schedule
+    from nutdamp.spacecraft import Spacecraft
 
 CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 """The schemes of Magnus 1970, planned when none is named."""
@@ -15,8 +15,7 @@ CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 NAMES = (*CLASSIC, "none")
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
+class Options(NamedTuple):
     """What a user may ask of the schemes; each reads what concerns it.
 
     ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)). ``coarse``: four-pulse without a
@@ -37,4 +36,4 @@ def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     if name not in NAMES:
         raise KeyError(name)
     module = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
-    return cast(Schedule, module.schedule(spacecraft, options))
+    return cast("Schedule", module.schedule(spacecraft, options))

@@ -29,6 +29,9 @@ DEAREST = 2.0
 CLOSE_IN_COST = 1.02
 """Among candidates within this factor of the cheapest the one that ends first is preferred."""
 
+CLOSE_IN_SHORT = 1.1
+"""Where on-times cannot give the whole impulse, candidates that miss nearly as much count as equal."""
+
 SHORTLIST = 6
 """Candidates that are flown and trimmed, at most."""
 
@@ -189,7 +192,8 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) ->
     if not candidates:
         raise Infeasible(_nothing_closes(spacecraft, channels))
     cheapest = candidates[0]
-    near = [c for c in candidates if c.short <= cheapest.short + 1e-3 and c.cost <= cheapest.cost * CLOSE_IN_COST]
+    short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
+    near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
     near.sort(key=lambda found: found.end)
     others = [candidate for candidate in candidates if candidate not in near]
     best: tuple[float, Schedule] | None = None
@@ -239,7 +243,7 @@ def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tup
     text = (
         f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half nutation turns; "
         f"the second is {abs(math.degrees(candidate.miss)):.2g}° off the ideal direction, "
-        f"which costs {candidate.factor:.3f} × A|ω0|"
+        f"ideal impulses would cost {candidate.factor:.3f} × A|ω0|"
     )
     if candidate.short > 1e-9:
         text += f"; {100 * candidate.short:.2g} % of the impulse is beyond the on-times allowed"

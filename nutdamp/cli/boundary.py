@@ -1,0 +1,55 @@
+"""The one place that turns errors into messages and exit statuses; a real bug keeps its traceback."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import click
+
+DONE = 0
+UNREADABLE = 1
+BAD_INPUT = 2
+INFEASIBLE = 3
+REQUIREMENT_MISSED = 4
+INTERRUPTED = 130
+
+
+def run(group: click.Group) -> None:
+    """Run ``group`` on the arguments of the process and leave with its exit status."""
+    try:
+        status = group.main(standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.Exit as leave:
+        status = leave.exit_code
+    except click.ClickException as wrong:
+        wrong.show()
+        status = BAD_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        status = INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = UNREADABLE
+    except Exception as wrong:
+        status = _explain(wrong)
+    sys.exit(status if isinstance(status, int) else DONE)
+
+
+def _explain(wrong: Exception) -> int:
+    """Say on standard error what the user can cure, and give its exit status; a bug is raised again."""
+    from nutdamp import errors  # here, because a run without errors need not load it
+
+    statuses: dict[type[errors.NutdampError], int] = {
+        errors.CannotRead: UNREADABLE,
+        errors.CannotWrite: UNREADABLE,
+        errors.MissingExtra: UNREADABLE,
+        errors.BadRequest: BAD_INPUT,
+        errors.FaultyFile: BAD_INPUT,
+        errors.Infeasible: INFEASIBLE,
+    }
+    if not isinstance(wrong, errors.NutdampError):
+        raise wrong
+    click.echo(str(wrong) if isinstance(wrong, errors.FaultyFile) else f"nutdamp: {wrong}", err=True)
+    return next(status for kind, status in statuses.items() if isinstance(wrong, kind))

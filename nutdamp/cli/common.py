@@ -1,0 +1,102 @@
+"""What several commands share: the spacecraft argument, quantities as options, the two output streams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+    from nutdamp.spacecraft import Spacecraft
+
+DEFAULT_FILE = "spacecraft.yaml"
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+spacecraft_argument = click.argument("spacecraft", required=False, metavar="[SPACECRAFT]")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
+
+
+class Quantity(click.ParamType["float"]):
+    """A number in SI or a text with a unit, as in a spacecraft file."""
+
+    name = "quantity"
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The SI value; a usage error for anything else."""
+        from nutdamp.units import parse
+
+        try:
+            return parse(value, self.kind)
+        except ValueError as wrong:
+            self.fail(str(wrong), param, ctx)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:  # noqa: ARG002 - signature of click
+        """Shown in the help page."""
+        return self.kind.upper()
+
+
+def scheme_options(command: Command) -> Command:
+    """Options that the schemes read."""
+    for option in (
+        click.option("--literal", is_flag=True, help="two-pulse as printed by Magnus: equal halves, small-angle wait."),
+        click.option("--coarse", is_flag=True, help="four-pulse with full pulses only, no shorter one at the end."),
+        click.option("--on-time", type=Quantity("time"), help="Pulse length of four-pulse, such as 200ms."),
+    ):
+        command = option(command)
+    return command
+
+
+def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
+    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example."""
+    from pathlib import Path
+
+    from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
+
+    if path is None and Path(DEFAULT_FILE).exists():
+        remark(f"reading {DEFAULT_FILE}")
+        path = DEFAULT_FILE
+    if path is not None:
+        return load_spacecraft(path)
+    remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
+    return read_spacecraft(built_in_example_text(), "example.yaml")
+
+
+def remarks(quiet: bool) -> Callable[[str], None]:
+    """Prints remarks on standard error, unless ``quiet``."""
+    return (lambda _: None) if quiet else (lambda text: click.echo(text, err=True))
+
+
+def one_stdout(**files: str | None) -> bool:
+    """Whether an output file is standard output, so that nothing else may go there; a usage error if two are."""
+    taken = [name for name, path in files.items() if path == "-"]
+    if len(taken) > 1:
+        raise click.UsageError(f"--{taken[0]} and --{taken[1]} cannot both go to standard output")
+    return bool(taken)
+
+
+def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
+    """Write the files asked for, once all of their contents are made."""
+    if outputs:
+        from nutdamp.files.output import write_whole
+
+        for path, content in outputs:
+            write_whole(path, content)
+
+
+def show(renderable: RenderableType) -> None:
+    """Print a result on standard output."""
+    console().print(renderable)
+
+
+def console() -> Console:
+    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=False)

@@ -1,0 +1,49 @@
+"""The ``nutdamp`` command: its subcommands, loaded when they are used."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from nutdamp import __version__
+from nutdamp.cli.boundary import run
+
+COMMANDS = ("plan", "simulate", "check", "init", "schema")
+
+
+class Commands(click.Group):
+    """Subcommands live in modules of their name, so that a command loads nothing of another."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
+        """Names in the order of a first use."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """The command of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"nutdamp.cli.{cmd_name}").command
+        return command
+
+
+@click.command(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=(
+        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 nothing that was asked "
+        "for is feasible; 4 no feasible plan meets the requirement; 130 interrupted."
+    ),
+)
+@click.version_option(__version__, prog_name="nutdamp")
+def group() -> None:
+    """Plan which thruster of a nutating spinner to fire, when and for how long.
+
+    Begin with `nutdamp plan`: it plans the built-in example. `nutdamp init` writes a commented spacecraft file to
+    start from.
+    """
+
+
+def main() -> None:
+    """Entry point: run the command line and leave with its exit status."""
+    run(group)

@@ -1,0 +1,104 @@
+"""``nutdamp simulate``: propagate a scheme or a schedule file."""
+
+from __future__ import annotations
+
+import click
+
+from nutdamp.cli.common import (
+    Quantity,
+    load,
+    one_stdout,
+    quiet_option,
+    remarks,
+    scheme_options,
+    show,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.schemes import NAMES, Options
+
+
+@click.command("simulate")
+@spacecraft_argument
+@click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
+@click.option("--schedule", metavar="FILE", help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
+@scheme_options
+@click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
+@click.option("--until", type=Quantity("time"), help="End; default last pulse + one inertial period.")
+@click.option(
+    "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
+)
+@click.option("--csv", metavar="FILE", help="Write the track.")
+@click.option("--json", metavar="FILE", help="Write pulses, residuals and extremes.")
+@click.option("--plot", metavar="FILE", help="Draw pole curve and axis track (.png, .svg, .pdf; needs the extra plot).")
+@quiet_option
+def command(
+    spacecraft: str | None,
+    scheme: str | None,
+    schedule: str | None,
+    on_time: float | None,
+    coarse: bool,
+    literal: bool,
+    real: bool,
+    until: float | None,
+    samples: int,
+    csv: str | None,
+    json: str | None,
+    plot: str | None,
+    quiet: bool,
+) -> None:
+    """Propagate a schedule; show cone angles around each pulse, the residuals and the axis track.
+
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
+    standard output.
+    """
+    if (scheme is None) == (schedule is None):
+        raise click.UsageError("name what to propagate: either --scheme or --schedule")
+    if until is not None and until <= 0.0:
+        raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+    silent = one_stdout(csv=csv, json=json, plot=plot)
+    remark = remarks(quiet)
+    body = load(spacecraft, remark)
+
+    from nutdamp import flight, planning
+    from nutdamp.errors import Infeasible
+
+    if schedule is not None:
+        from nutdamp.files.pulses_csv import read_pulses
+
+        pulses, warnings = read_pulses(schedule, body)
+        for warning in (*warnings, *planning.broken_limits(body, pulses)):
+            remark(f"warning: {warning}")
+    else:
+        plan = planning.plan(body, scheme or "none", Options(on_time=on_time, coarse=coarse, literal=literal))
+        if plan.why is not None:
+            raise Infeasible(f"{scheme} is infeasible: {plan.why}")
+        pulses = plan.pulses
+        for note in pulses.notes:
+            remark(note)
+    end = pulses.end + body.inertial_period if until is None else until
+    flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
+    residual, flown = (one.residual for one in flights)
+    chosen = flights[real]
+    track = chosen.track(samples, end)
+    name = scheme or schedule or ""
+    outputs: list[tuple[str, str | bytes]] = []
+    if csv is not None:
+        from nutdamp.files.track_csv import track_csv
+
+        outputs.append((csv, track_csv(track, body.inertia)))
+    if json is not None:
+        from nutdamp.files.output import json_text
+        from nutdamp.files.simulation_json import simulation_json
+
+        outputs.append((json, json_text(simulation_json(chosen, track, residual, flown, scheme=name))))
+    if plot is not None:
+        from nutdamp.report.figures import motion_picture
+
+        outputs.append((plot, motion_picture(chosen, track, plot)))
+    write_all(outputs)
+    if not silent:
+        from nutdamp.report.simulate_tables import simulation_screen
+
+        how = "real pulse widths" if real else "impulse sum (17)"
+        show(simulation_screen(chosen, track, residual, flown, how=f"{name}, propagated by the {how}"))

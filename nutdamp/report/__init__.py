@@ -1,0 +1,1 @@
+"""Results as rich renderables and figures; nothing here prints."""

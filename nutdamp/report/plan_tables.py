@@ -1,0 +1,156 @@
+"""The screen of ``plan``: the spacecraft, the schemes compared, the recommendation, its pulses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.flight import Residual
+from nutdamp.physics import cones
+from nutdamp.planning import Comparison, Plan
+from nutdamp.report.layout import columns, facts
+from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
+from nutdamp.schedule import STEERABLE
+from nutdamp.spacecraft import Spacecraft, Vector
+
+
+def comparison_screen(compared: Comparison) -> RenderableType:
+    """Everything that ``plan`` shows."""
+    parts: list[RenderableType] = [header(compared.spacecraft), Text(), _comparison(compared)]
+    parts.extend(_reasons(compared))
+    chosen = compared.recommended
+    if chosen is None:
+        parts.append(Text(f"No recommendation: {compared.reason}.", style="bold"))
+        return Group(*parts)
+    parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {compared.reason}.")]
+    if len(chosen.pulses):
+        parts += [Text(), pulse_table(chosen)]
+    return Group(*parts)
+
+
+def header(spacecraft: Spacecraft) -> RenderableType:
+    """Name and derived quantities of the spacecraft at t = 0."""
+    inertia = spacecraft.inertia
+    A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
+    body, space = cones.body_cone(omega, spin), cones.space_cone(A, C, omega, spin)
+    table = facts()
+    moments = f"A = {quantity(A, 'kg m²')}, C = {quantity(C, 'kg m²')}"
+    table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
+    if not inertia.symmetric:
+        first, second, _ = inertia.moments
+        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²: planned with A = (I1 + I2)/2, flown as they are")
+    table.add_row("spin", f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})")
+    table.add_row(
+        "nutation", f"{degrees(spacecraft.nutation)} = body cone {degrees(body)} + space cone {degrees(space)}"
+    )
+    turns = "stands still in the body" if math.isinf(spacecraft.body_period) else duration(spacecraft.body_period)
+    table.add_row("nutation period", f"{turns} in the body, {duration(spacecraft.inertial_period)} inertially")
+    table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; no schedule needs less")
+    table.add_row("actuators", _actuators(spacecraft))
+    return Group(Text(spacecraft.name, style="bold"), table)
+
+
+def _actuators(spacecraft: Spacecraft) -> str:
+    torquer = spacecraft.torquer
+    texts = []
+    if torquer is not None:
+        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
+        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
+        texts.append(f"steerable torquer, {strength}{assumed}")
+    if spacecraft.channels:
+        texts.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
+    return "; ".join(texts)
+
+
+Cell = Callable[[Plan], str]
+
+
+def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
+    """What the comparison shows of each feasible plan."""
+    least = compared.spacecraft.least_impulse
+
+    def ratio(plan: Plan) -> str:
+        return f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING
+
+    rows: list[tuple[str, Cell]] = [
+        ("pulses", lambda plan: str(len(plan.pulses))),
+        ("ends at", lambda plan: moment(plan.pulses.end)),
+        ("impulse", lambda plan: quantity(plan.pulses.total_impulse, "N m s")),
+        ("  × least impulse", ratio),
+        ("propellant", lambda plan: mass(plan.pulses.propellant)),
+        ("by impulses (17):", lambda _: ""),
+        ("  nutation left", lambda plan: _angle(plan.residual, "nutation")),
+        ("  shift of H", lambda plan: _angle(plan.residual, "momentum_shift")),
+        ("flown, real widths:", lambda _: ""),
+        ("  nutation left", lambda plan: _angle(plan.flown, "nutation")),
+        ("  body cone", lambda plan: _angle(plan.flown, "body_cone")),
+        ("  space cone", lambda plan: _angle(plan.flown, "space_cone")),
+        ("  shift of H", lambda plan: _angle(plan.flown, "momentum_shift")),
+        ("  spin change", lambda plan: quantity(plan.spin_change, "rad/s")),
+    ]
+    if any(plan.delta_v is not None for plan in compared.plans):
+        rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
+    if compared.spacecraft.requirement is not None:
+        verdict = {True: "met", False: "not met", None: MISSING}
+        rows.append(("requirement", lambda plan: verdict[plan.meets_requirement]))
+    return rows
+
+
+def _angle(left: Residual | None, name: str) -> str:
+    return MISSING if left is None else degrees(getattr(left, name))
+
+
+def _speed(plan: Plan) -> float | None:
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
+
+
+def _comparison(compared: Comparison) -> Table:
+    """Quantities down, schemes across: so three schemes fit a screen of 80 columns."""
+    table = columns("", *(plan.scheme for plan in compared.plans))
+    for name, cell in _rows(compared):
+        cells = [cell(plan) if plan.feasible else "" for plan in compared.plans]
+        if name == "pulses":
+            cells = [text or "infeasible" for text in cells]
+        table.add_row(Text(name, style="dim"), *cells)
+    return table
+
+
+def _reasons(compared: Comparison) -> list[RenderableType]:
+    """Why a scheme is infeasible, and the remarks of the others."""
+    lines: list[RenderableType] = []
+    for plan in compared.plans:
+        for remark in (plan.why,) if plan.why is not None else plan.pulses.notes:
+            lines.append(Text.assemble((f"{plan.scheme}: ", "bold"), remark or ""))
+    return [Text(), *lines] if lines else []
+
+
+def pulse_table(plan: Plan) -> Table:
+    """One row a pulse: when, how long, which channel, and the nutation before and after."""
+    before, after = plan.flight.around_pulses()
+    axes = plan.spacecraft.inertia.axes
+    names = ("pulse", "start", "centre", "on-time", "channel", "impulse", "nutation", "after")
+    units = ("", "s", "s", "s", "", "N m s", "deg", "deg")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    for index, pulse in enumerate(plan.pulses):
+        table.add_row(
+            str(index + 1),
+            f"{pulse.start:.4f}",
+            f"{pulse.t:.4f}",
+            "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}",
+            channel_text(pulse.channel, axes @ pulse.impulse),
+            f"{pulse.magnitude:.4g}",
+            degrees(float(before.nutation[index])).removesuffix(" deg"),
+            degrees(float(after.nutation[index])).removesuffix(" deg"),
+        )
+    return table
+
+
+def channel_text(name: str, impulse: Vector) -> str:
+    """A steerable pulse is named by the angle of its torque in the 1-2 plane."""
+    if name != STEERABLE:
+        return name
+    return f"{STEERABLE} {math.degrees(math.atan2(impulse[1], impulse[0])):.2f}°"

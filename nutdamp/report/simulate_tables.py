@@ -1,0 +1,72 @@
+"""The screen of ``simulate``: cone angles around each pulse, residuals, extremes of the axis track."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.flight import Flight, Residual
+from nutdamp.report.layout import columns, facts
+from nutdamp.report.plan_tables import channel_text, header
+from nutdamp.report.text import degrees, moment
+from nutdamp.track import Extremes, Track, extremes
+
+
+def simulation_screen(flight: Flight, track: Track, residual: Residual, flown: Residual, *, how: str) -> RenderableType:
+    """Everything that ``simulate`` shows; ``how`` names what was propagated."""
+    parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
+    if len(flight.schedule):
+        parts += [Text(), _pulses(flight)]
+    parts += [Text(), _residuals(residual, flown), Text(), _extremes(extremes(track), flight, track)]
+    return Group(*parts)
+
+
+def _pulses(flight: Flight) -> Table:
+    before, after = flight.around_pulses()
+    axes = flight.spacecraft.inertia.axes
+    names = ("pulse", "centre", "on-time", "channel", "", "nutation", "body cone", "space cone")
+    units = ("", "s", "s", "", "", "deg", "deg", "deg")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
+    for index, pulse in enumerate(flight.schedule):
+        on_time = "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}"
+        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse.channel, axes @ pulse.impulse))
+        for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
+            cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
+            table.add_row(*cells, when, *(degrees(cone).removesuffix(" deg") for cone in cones))
+    return table
+
+
+def _residuals(residual: Residual, flown: Residual) -> Table:
+    table = columns("after the last pulse", "by impulses (17)", "flown, real widths")
+    for name, key in (
+        ("nutation", "nutation"),
+        ("body cone", "body_cone"),
+        ("space cone", "space_cone"),
+        ("shift of H", "momentum_shift"),
+    ):
+        table.add_row(Text(name, style="dim"), degrees(getattr(residual, key)), degrees(getattr(flown, key)))
+    return table
+
+
+def _extremes(found: Extremes, flight: Flight, track: Track) -> Table:
+    table = facts()
+    far, near = found.farthest, found.nearest
+    table.add_row(
+        "spin axis from H(0)", f"{degrees(near[0])} at {moment(near[1])} to {degrees(far[0])} at {moment(far[1])}"
+    )
+    table.add_row("spin axis in x, in y", f"{_range(found.x)}, {_range(found.y)} of the inertial frame")
+    given = flight.spacecraft.attitude
+    if given is not None:
+        frame = given.frame or "the frame of the file"
+        table.add_row("right ascension", f"{_range(found.right_ascension)} in {frame}")
+        table.add_row("declination", _range(found.declination))
+    table.add_row("track", f"{len(track.t)} rows, 0 to {moment(float(track.t[-1]))}")
+    return table
+
+
+def _range(values: tuple[float, float]) -> str:
+    low, high = (math.degrees(value) for value in values)
+    return f"{low:.4f} to {high:.4f} deg"
