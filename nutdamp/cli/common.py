@@ -33,7 +33,7 @@ class Quantity(click.ParamType["float"]):
         from nutdamp.units import parse
 
         try:
-            return parse(value, self.kind)
+            return parse(value, self.kind, bare=True)
         except ValueError as wrong:
             self.fail(str(wrong), param, ctx)
 

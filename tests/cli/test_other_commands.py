@@ -1,0 +1,116 @@
+"""``check``, ``init``, ``schema``, help and version as processes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp import __version__
+from nutdamp.cli.root import COMMANDS
+
+GOOD = "name: Good\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+TYPO = "name: Typo\ninertia: {A: 120, c: 80}\nomega0: [0.1, 0, 3]\n"
+TENSOR = """
+name: Tilted
+inertia: {tensor: [[120, 0, 2], [0, 118, 0], [2, 0, 80]]}
+omega0: [0.1, 0, 3]
+thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torque: [0, 0, 5]}]
+"""
+
+
+def test_init_writes_a_file_that_plans(run: Run, tmp_path: Path) -> None:
+    assert run("init").returncode == 0
+    assert run("plan").returncode == 0
+    again = run("init")
+    assert again.returncode == 1
+    assert "--force" in again.stderr
+    (tmp_path / "spacecraft.yaml").write_text("mine")
+    assert run("init", "--force").returncode == 0
+    assert run("plan").returncode == 0
+    assert run("init", "other.yaml").returncode == 0
+    assert run("init", "-").stdout == (tmp_path / "other.yaml").read_text()
+
+
+def test_check_prints_derived_quantities(run: Run) -> None:
+    done = run("check")
+    assert done.returncode == 0
+    for text in ("a = 0.3333", "nutation period", "smallest step", "deg apart about axis 3", "Nearest of the channels"):
+        assert text in done.stdout
+
+
+def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
+    for name, text in (("good.yaml", GOOD), ("typo.yaml", TYPO), ("tensor.yaml", TENSOR)):
+        (tmp_path / name).write_text(text)
+    done = run("check", "typo.yaml", "good.yaml", "missing.yaml", "tensor.yaml", "--json", "check.json")
+    assert done.returncode == 2  # a bad file counts before one that cannot be read
+    assert "typo.yaml:2:" in done.stderr
+    assert "missing.yaml" in done.stderr
+    assert "Good" in done.stdout
+    assert "principal axis 1" in done.stdout
+    assert "SPIN" in done.stdout
+    files = json.loads((tmp_path / "check.json").read_text())["files"]
+    assert [entry["valid"] for entry in files] == [False, True, False, True]
+    assert files[0]["faults"][0]["line"] == 2
+    assert files[3]["channels"][1]["damps"] is False
+    axes = files[3]["spacecraft"]["principal_axes"]
+    assert axes[0][2] == pytest.approx(-axes[2][0], abs=1e-12)  # the tilt about axis 2
+
+
+def test_a_missing_file_alone_is_exit_1(run: Run) -> None:
+    assert run("check", "missing.yaml").returncode == 1
+
+
+def test_a_misspelt_inertia_stops_the_run(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "typo.yaml").write_text(TYPO)
+    for command in (("plan",), ("simulate", "--scheme", "none"), ("check",)):
+        done = run(command[0], "typo.yaml", *command[1:])
+        assert done.returncode == 2
+        assert "did you mean" in done.stderr
+        assert done.stdout == ""
+
+
+def test_schema_is_json(run: Run, tmp_path: Path) -> None:
+    schema = json.loads(run("schema").stdout)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert run("schema", "-o", "s.json").stdout == ""
+    assert json.loads((tmp_path / "s.json").read_text()) == schema
+
+
+def test_version(run: Run) -> None:
+    assert __version__ in run("--version").stdout
+
+
+@pytest.mark.parametrize("arguments", [(), *((command,) for command in COMMANDS)])
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+def test_every_help_page_fits_80_columns(run: Run, arguments: tuple[str, ...], flag: str) -> None:
+    done = run(*arguments, flag)
+    assert done.returncode == 0
+    assert done.stdout.startswith("Usage: ")
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+
+
+def test_help_loads_click_only(run: Run) -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\nfrom nutdamp.cli.root import group\ngroup.main(['--help'], standalone_mode=False)\n"
+        "print(sorted({'numpy', 'scipy', 'yaml', 'pydantic', 'rich', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_plan_of_a_symmetric_body_loads_no_scipy_and_no_matplotlib(run: Run) -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\nfrom nutdamp.cli.root import group\ngroup.main(['plan', '-q'], standalone_mode=False)\n"
+        "print(sorted({'scipy', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,236 @@
+"""``nutdamp plan`` as a process: what it prints, writes, and leaves with."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp.files.pulses_csv import HEADER
+
+WEAK = """
+name: Weak
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters: [{name: T1, torque: [0, 0.5, 0], max_on_time: 100 ms}]
+requirement: {nutation: 0.01 deg}
+limits: {horizon: 20 s}
+"""
+
+NOTHING_FITS = """
+name: Late
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 0 deg}
+thrusters: [{name: T1, torque: [8, 0, 0]}]
+limits: {horizon: 0.1 s}
+"""
+
+
+def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
+    done = run("plan")
+    assert done.returncode == 0
+    assert "built-in example" in done.stderr
+    for scheme in ("one-pulse", "two-pulse", "four-pulse"):
+        assert scheme in done.stdout
+    assert "Recommended: " in done.stdout
+
+
+def test_a_spacecraft_yaml_in_the_folder_is_found(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "spacecraft.yaml").write_text(WEAK.replace("Weak", "Found-Me"))
+    done = run("plan")
+    assert "Found-Me" in done.stdout
+    assert "reading spacecraft.yaml" in done.stderr
+
+
+@pytest.mark.parametrize("columns", [80, 140])
+def test_no_line_is_cut_or_wider_than_the_screen(run: Run, columns: int) -> None:
+    for line in run("plan", columns=columns).stdout.splitlines():
+        assert len(line.rstrip()) <= columns
+        assert "…" not in line
+
+
+def test_json_follows_the_contract(run: Run) -> None:
+    done = run("plan", "--json", "-")
+    data = json.loads(done.stdout)  # nothing but the JSON on standard output
+    assert set(data) >= {"nutdamp", "spacecraft", "plans", "recommended"}
+    assert set(data["spacecraft"]) >= {
+        "name",
+        "A_kgm2",
+        "C_kgm2",
+        "a",
+        "shape",
+        "omega0_rad_s",
+        "nutation_deg",
+        "body_cone_deg",
+        "space_cone_deg",
+        "body_nutation_period_s",
+        "inertial_nutation_period_s",
+    }
+    assert [plan["scheme"] for plan in data["plans"]] == ["one-pulse", "two-pulse", "four-pulse"]
+    for plan in data["plans"]:
+        assert set(plan) >= {
+            "scheme",
+            "feasible",
+            "why",
+            "meets_requirement",
+            "pulses",
+            "total_impulse_Nms",
+            "least_impulse_Nms",
+            "propellant_kg",
+            "end_s",
+            "delta_v_m_s",
+            "spin_change_rad_s",
+            "residual",
+            "flown",
+        }
+        keys = {"nutation_deg", "body_cone_deg", "space_cone_deg", "momentum_shift_deg", "axis_error_deg"}
+        assert set(plan["residual"]) == set(plan["flown"]) == keys
+        for pulse in plan["pulses"]:
+            assert set(pulse) == {
+                "t_s",
+                "start_s",
+                "on_time_s",
+                "channel",
+                "torque_Nm",
+                "impulse_Nms",
+                "propellant_kg",
+            }
+            assert pulse["start_s"] == pytest.approx(pulse["t_s"] - pulse["on_time_s"] / 2, abs=1e-12)
+            assert pulse["impulse_Nms"] == pytest.approx([m * pulse["on_time_s"] for m in pulse["torque_Nm"]])
+
+
+def test_csv_is_the_recommended_plan_and_agrees_with_the_json(run: Run, tmp_path: Path) -> None:
+    done = run("plan", "--csv", "pulses.csv", "--json", "plan.json")
+    assert done.returncode == 0
+    raw = (tmp_path / "pulses.csv").read_bytes().decode()
+    assert raw.endswith("\r\n")  # RFC 4180
+    rows = list(csv.DictReader(io.StringIO(raw, newline="")))
+    assert tuple(rows[0]) == HEADER
+    data = json.loads((tmp_path / "plan.json").read_text())
+    plan = next(plan for plan in data["plans"] if plan["scheme"] == data["recommended"])
+    assert [float(row["t_s"]) for row in rows] == [pulse["t_s"] for pulse in plan["pulses"]]
+    assert float(rows[-1]["nutation_after_deg"]) == pytest.approx(plan["flown"]["nutation_deg"], abs=1e-12)
+    assert float(rows[0]["nutation_before_deg"]) == pytest.approx(data["spacecraft"]["nutation_deg"], rel=1e-9)
+
+
+def test_csv_alone_on_standard_output(run: Run) -> None:
+    done = run("plan", "--scheme", "two-pulse", "--csv", "-")
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert [row["pulse"] for row in rows] == ["1", "2"]
+
+
+def test_schemes_can_be_named(run: Run) -> None:
+    data = json.loads(run("plan", "--scheme", "four-pulse", "--scheme", "one-pulse", "--json", "-").stdout)
+    assert [plan["scheme"] for plan in data["plans"]] == ["four-pulse", "one-pulse"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("plan", "--scheme", "one-pulse", "--scheme", "two-pulse", "--csv", "x.csv"), "--csv writes one schedule"),
+        (("plan", "--csv", "-", "--json", "-"), "cannot both go to standard output"),
+        (("plan", "--scheme", "five-pulse"), "four-pulse"),
+        (("plan", "--on-time", "20 Hz"), "Hz"),
+        (("plan", "--on-time", "0"), "above zero"),
+        (("plan", "--no-such-option"), "No such option"),
+        (("fly",), "No such command"),
+    ],
+)
+def test_a_bad_command_line_is_exit_2_and_writes_nothing(
+    run: Run, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_feasible_is_exit_3_with_json(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "late.yaml").write_text(NOTHING_FITS)
+    done = run("plan", "late.yaml", "--json", "plan.json", "--csv", "pulses.csv")
+    assert done.returncode == 3
+    data = json.loads((tmp_path / "plan.json").read_text())
+    assert data["recommended"] is None
+    for plan in data["plans"]:
+        assert plan["feasible"] is False
+        assert plan["why"]
+        assert plan["pulses"] == []
+        assert plan["total_impulse_Nms"] is plan["propellant_kg"] is plan["end_s"] is plan["delta_v_m_s"] is None
+        assert set(plan["flown"].values()) == set(plan["residual"].values()) == {None}
+    assert "horizon" in done.stdout
+    assert not (tmp_path / "pulses.csv").exists()
+    assert "pulses.csv was not written" in done.stderr
+
+
+def test_a_missed_requirement_is_exit_4_with_results(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "weak.yaml").write_text(WEAK)
+    done = run("plan", "weak.yaml", "--csv", "pulses.csv")
+    assert done.returncode == 4
+    assert "not met" in done.stdout
+    assert (tmp_path / "pulses.csv").exists()
+
+
+def test_no_nutation_is_an_empty_schedule(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "calm.yaml").write_text(WEAK.replace("5 deg", "0 deg"))
+    done = run("plan", "calm.yaml", "--json", "-")
+    assert done.returncode == 0
+    for plan in json.loads(done.stdout)["plans"]:
+        assert plan["feasible"] is True
+        assert plan["pulses"] == []
+        assert plan["flown"]["nutation_deg"] == 0.0
+    assert run("plan", "calm.yaml").returncode == 0
+
+
+def test_what_cannot_be_read_or_written_is_exit_1(run: Run, tmp_path: Path) -> None:
+    assert run("plan", "missing.yaml").returncode == 1
+    done = run("plan", "--csv", str(tmp_path / "no" / "such" / "folder.csv"))
+    assert done.returncode == 1
+    assert "cannot write" in done.stderr
+    (tmp_path / "folder").mkdir()
+    assert run("plan", "--json", "folder").returncode == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder"]
+
+
+def test_an_old_file_survives_a_failed_run(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "late.yaml").write_text(NOTHING_FITS)
+    (tmp_path / "pulses.csv").write_text("old")
+    run("plan", "late.yaml", "--csv", "pulses.csv")
+    assert (tmp_path / "pulses.csv").read_text() == "old"
+
+
+def test_quiet_says_nothing_on_stderr(run: Run) -> None:
+    assert run("plan", "--quiet").stderr == ""
+
+
+def test_a_reader_that_leaves_is_no_bug(run: Run) -> None:
+    import subprocess
+    import sys
+
+    done = subprocess.run(
+        f"{sys.executable} -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.startswith("t_s,")
+    assert "Traceback" not in done.stderr
+
+
+def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None:
+    ideal = "name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 10 deg}\n"
+    (tmp_path / "ideal.yaml").write_text(ideal)
+    exact, literal = (
+        json.loads(run("plan", "ideal.yaml", "--scheme", "two-pulse", "--json", "-", *flags).stdout)["plans"][0]
+        for flags in ((), ("--literal",))
+    )
+    assert exact["residual"]["momentum_shift_deg"] < 1e-9
+    assert literal["residual"]["momentum_shift_deg"] == pytest.approx(0.19, abs=0.005)  # PHYSICS: 0.19° at 10°
+    first, second = (math.hypot(*pulse["impulse_Nms"]) for pulse in literal["pulses"])
+    assert first == pytest.approx(second, rel=1e-12)

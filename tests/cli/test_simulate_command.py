@@ -1,0 +1,154 @@
+"""``nutdamp simulate`` as a process."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp.files.track_csv import HEADER
+
+
+def test_a_scheme_is_simulated_in_an_empty_folder(run: Run) -> None:
+    done = run("simulate", "--scheme", "two-pulse")
+    assert done.returncode == 0
+    for text in ("before", "after", "by impulses (17)", "flown, real widths", "spin axis from H(0)"):
+        assert text in done.stdout
+
+
+def test_the_track_has_the_columns_of_the_contract(run: Run, tmp_path: Path) -> None:
+    assert run("simulate", "--scheme", "four-pulse", "--csv", "track.csv", "--samples", "50").returncode == 0
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "track.csv").read_text())))
+    assert tuple(rows[0]) == HEADER
+    times = [float(row["t_s"]) for row in rows]
+    assert times == sorted(times)
+    assert rows[0]["pulse"] == "0"
+    assert int(rows[-1]["pulse"]) == 4
+    for row in rows:
+        length = sum(float(row[f"q_{part}"]) ** 2 for part in "wxyz")
+        assert length == pytest.approx(1.0, abs=1e-14)
+        assert float(row["nutation_deg"]) == pytest.approx(
+            float(row["body_cone_deg"]) + float(row["space_cone_deg"]), abs=1e-12
+        )
+
+
+@pytest.mark.parametrize("flown", [(), ("--flown",)])
+def test_a_written_schedule_flies_as_it_was_planned(run: Run, flown: tuple[str, ...]) -> None:
+    planned = json.loads(run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "-").stdout)
+    flight = json.loads(run("simulate", "--schedule", "pulses.csv", "--json", "-", *flown).stdout)
+    for kind in ("residual", "flown"):
+        assert flight[kind] == pytest.approx(planned["plans"][0][kind], abs=1e-11)
+
+
+def test_an_edited_schedule_warns_of_columns_that_contradict(run: Run, tmp_path: Path) -> None:
+    run("plan", "--scheme", "one-pulse", "--csv", "pulses.csv")
+    path = tmp_path / "pulses.csv"
+    rows = list(csv.DictReader(io.StringIO(path.read_text())))
+    rows[0]["t_s"] = str(float(rows[0]["t_s"]) + 0.25)
+    with path.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    done = run("simulate", "--schedule", "pulses.csv")
+    assert done.returncode == 0
+    assert "pulses.csv:2: start_s" in done.stderr
+    assert "t_s counts" in done.stderr
+
+
+def test_the_shortest_schedule_has_three_kinds_of_columns(run: Run, tmp_path: Path) -> None:
+    header = "t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms"
+    (tmp_path / "own.csv").write_text(f"{header}\n1.0,0,-5,0,0\n2.0,0.5,0,4,0\n")
+    data = json.loads(run("simulate", "--schedule", "own.csv", "--json", "-").stdout)
+    assert len(data["pulses"]) == 2
+    assert data["pulses"][0]["torque_Nm"] is None
+    assert data["pulses"][1]["torque_Nm"] == pytest.approx([0, 8, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "empty"),
+        ("t_s,on_time_s\n1,2\n", "impulse_1_Nms: the column is missing"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,a,0,0\n", ":2:1: impulse_1_Nms: 'a' is not a"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,-1,1,0,0\n", "negative"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,4,1,0,0\n", "before t = 0"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\nnan,0,1,0,0\n", "finite"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,1\n", "3 values under 5 columns"),
+        ("t_s,t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,1,0,1,0,0\n", "twice"),
+        (
+            "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,1,+M1,8,0,0\n1.5,1,+M1,8,0,0\n",
+            "still firing the pulse of line 2",
+        ),
+    ],
+    ids=["empty", "columns", "word", "negative", "early", "nan", "short", "double", "overlap"],
+)
+def test_a_broken_schedule_is_exit_2_with_its_place(run: Run, tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "broken.csv").write_text(text)
+    done = run("simulate", "--schedule", "broken.csv", "--csv", "track.csv")
+    assert done.returncode == 2
+    assert "broken.csv:" in done.stderr
+    assert said in done.stderr
+    assert not (tmp_path / "track.csv").exists()
+
+
+def test_binary_and_missing_schedules(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
+    assert run("simulate", "--schedule", "binary.csv").returncode == 2
+    assert run("simulate", "--schedule", "missing.csv").returncode == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("--scheme", "one-pulse", "--schedule", "x.csv"),
+        ("--scheme", "one-pulse", "--until", "-1"),
+        ("--scheme", "one-pulse", "--until", "1 m"),
+        ("--scheme", "one-pulse", "--samples", "1"),
+        ("--scheme", "one-pulse", "--plot", "picture.bmp"),
+    ],
+)
+def test_bad_command_lines_are_exit_2(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    done = run("simulate", *arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_free_motion_keeps_its_nutation(run: Run) -> None:
+    data = json.loads(run("simulate", "--scheme", "none", "--json", "-").stdout)
+    assert data["pulses"] == []
+    assert data["flown"]["nutation_deg"] == pytest.approx(data["spacecraft"]["nutation_deg"], rel=1e-12)
+
+
+def test_an_infeasible_scheme_is_exit_3(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "ideal.yaml").write_text("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n")
+    done = run("simulate", "ideal.yaml", "--scheme", "four-pulse")
+    assert done.returncode == 3
+    assert "infeasible" in done.stderr
+
+
+def test_the_end_can_be_chosen(run: Run) -> None:
+    data = json.loads(run("simulate", "--scheme", "two-pulse", "--until", "3 s", "--json", "-").stdout)
+    assert data["until_s"] == 3.0
+    assert data["flown"]["nutation_deg"] < 1e-9  # of the whole schedule, wherever the track ends
+
+
+@pytest.mark.parametrize(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_pictures_are_drawn_in_three_formats(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
+    assert run("simulate", "--scheme", "four-pulse", "--plot", f"motion.{ending}").returncode == 0
+    assert (tmp_path / f"motion.{ending}").read_bytes().startswith(magic)
+
+
+def test_right_ascension_and_declination_with_an_attitude(run: Run, tmp_path: Path) -> None:
+    run("init")
+    text = (tmp_path / "spacecraft.yaml").read_text()
+    attitude = "attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}\n"
+    (tmp_path / "spacecraft.yaml").write_text(text + attitude)
+    done = run("simulate", "--scheme", "two-pulse")
+    assert "right ascension" in done.stdout
+    assert "EME2000" in done.stdout

@@ -1,0 +1,50 @@
+"""The README is true: its sessions give the output it shows, its file loads, its commands are those of CI."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp.files.spacecraft_file import read_spacecraft
+
+ROOT = Path(__file__).parent.parent
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+SESSIONS = re.findall(r"```console\n(.+?)```", TEXT, re.DOTALL)
+
+
+def tidy(text: str) -> list[str]:
+    return [line.rstrip() for line in text.strip().splitlines()]
+
+
+@pytest.mark.parametrize("session", SESSIONS, ids=lambda text: str(text).splitlines()[0])
+def test_a_session_prints_what_the_readme_shows(run: Run, session: str) -> None:
+    for part in re.split(r"^\$ ", session, flags=re.MULTILINE)[1:]:
+        command, _, shown = part.partition("\n")
+        name, *arguments = shlex.split(command)
+        assert name == "nutdamp"
+        done = run(*arguments)
+        assert done.returncode == 0, done.stderr
+        assert tidy(done.stdout) == tidy(shown)
+
+
+def test_there_are_sessions() -> None:
+    assert len(SESSIONS) >= 2
+
+
+def test_the_file_shown_is_a_good_one() -> None:
+    (shown,) = re.findall(r"```yaml\n(.+?)```", TEXT, re.DOTALL)
+    assert read_spacecraft(shown, "README.md").name == "Sounder-1"
+
+
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    assert "<!-- test command -->" in TEXT
+    assert "<!-- test command -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_the_picture_is_there() -> None:
+    (path,) = re.findall(r"!\[.*?\]\((.+?)\)", TEXT)
+    assert (ROOT / path).read_bytes().startswith(b"\x89PNG")
