@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.models import SpacecraftFile
@@ -25,7 +26,7 @@ def read_contents(text: str, name: str) -> SpacecraftFile:
     try:
         contents = SpacecraftFile.model_validate(root.plain())
     except ValidationError as error:
-        judged = {finding.path for finding in found}
+        judged = {finding.path for finding in found if not finding.at_key}
         found += [finding for finding in _type_errors(error) if finding.path not in judged]
     faults += [_placed(finding, root, name) for finding in found]
     if faults:
@@ -86,13 +87,8 @@ def _section(annotation: Any) -> type[BaseModel] | None:
 
 def _type_errors(error: ValidationError) -> Iterator[Finding]:
     for details in error.errors(include_url=False):
-        path: KeyPath = details["loc"]
         wording = _WORDING.get(details["type"])
-        if details["type"] == "missing":
-            problem = f"missing; {_description(path)}"
-        else:
-            problem = wording(details["input"], details.get("ctx", {})) if wording else details["msg"]
-        yield Finding(path, problem)
+        yield Finding(details["loc"], wording(details) if wording else details["msg"])
 
 
 def _description(path: KeyPath) -> str:
@@ -106,66 +102,34 @@ def _description(path: KeyPath) -> str:
     return text[:1].lower() + text[1:].rstrip(".")
 
 
-def _not(wanted: str) -> Callable[[Any, dict[str, Any]], str]:
-    return lambda value, _: f"{shown(value)} stands where {wanted} is wanted"
+def _stands(details: ErrorDetails, wanted: str) -> str:
+    return f"{shown(details['input'])} stands where {wanted} is wanted"
 
 
-def _text(value: Any, _: dict[str, Any]) -> str:
-    cure = "" if isinstance(value, dict | list) else "; put it in quotes"
-    return f"{shown(value)} stands where a text is wanted{cure}"
+def _text(details: ErrorDetails) -> str:
+    cure = "" if isinstance(details["input"], dict | list) else "; put it in quotes"
+    return _stands(details, "a text") + cure
 
 
-def _count(value: Any, context: dict[str, Any]) -> str:
-    wanted = context.get("min_length", context.get("max_length"))
-    if not value:
+def _count(details: ErrorDetails) -> str:
+    wanted, found = details["ctx"].get("min_length", details["ctx"].get("max_length")), len(details["input"])
+    if wanted == 1:
         return "empty; an entry is wanted"
-    return f"{len(value)} {'entry stands' if len(value) == 1 else 'entries stand'} where {wanted} are wanted"
+    return f"{found} {'entry stands' if found == 1 else 'entries stand'} where {wanted} are wanted"
 
 
-_WORDING.get(details["type"])
-        if details["type"] == "missing":
-            problem = f"missing; {_description(path)}"
-        else:
-            problem = wording(details["input"], details.get("ctx", {})) if wording else details["msg"]
-        yield Finding(path, problem)
-
-
-def _description(path: KeyPath) -> str:
-    """What stands at ``path``, as the model describes it."""
-    model: type[BaseModel] | None = SpacecraftFile
-    text = ""
-    for step in path:
-        if model is not None and isinstance(step, str):
-            field = model.model_fields[step]
-            model, text = _section(field.annotation), field.description or ""
-    return text[:1].lower() + text[1:].rstrip(".")
-
-
-def _not(wanted: str) -> Callable[[Any, dict[str, Any]], str]:
-    return lambda value, _: f"{shown(value)} stands where {wanted} is wanted"
-
-
-def _text(value: Any, _: dict[str, Any]) -> str:
-    cure = "" if isinstance(value, dict | list) else "; put it in quotes"
-    return f"{shown(value)} stands where a text is wanted{cure}"
-
-
-def _count(value: Any, context: dict[str, Any]) -> str:
-    wanted = context.get("min_length", context.get("max_length"))
-    return f"{len(value)} entries stand where {wanted} are wanted" if value else "empty; an entry is wanted"
-
-
-_WORDING: dict[str, Callable[[Any, dict[str, Any]], str]] = {
-    "model_type": _not("a mapping, {key: value, …},"),
-    "dict_type": _not("a mapping, {key: value, …},"),
-    "list_type": _not("a list, [value, …],"),
+_WORDING: dict[str, Callable[[ErrorDetails], str]] = {
+    "missing": lambda details: f"missing; {_description(details['loc'])}",
+    "model_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
+    "dict_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
+    "list_type": lambda details: _stands(details, "a list, [value, …],"),
+    "int_type": lambda details: _stands(details, "a whole number"),
+    "literal_error": lambda details: _stands(details, details["ctx"]["expected"]),
+    "greater_than_equal": lambda details: _stands(details, f"at least {details['ctx']['ge']}"),
+    "less_than_equal": lambda details: _stands(details, f"at most {details['ctx']['le']}"),
     "string_type": _text,
-    "int_type": _not("a whole number"),
-    "greater_than_equal": lambda value, context: f"{shown(value)} is too small; at least {context['ge']} is wanted",
-    "less_than_equal": lambda value, context: f"{shown(value)} is too large; at most {context['le']} is wanted",
     "too_short": _count,
     "too_long": _count,
-    "literal_error": lambda value, context: f"{shown(value)} is not known; {context['expected']} is wanted",
-    "value_error": lambda _, context: str(context["error"]),
+    "value_error": lambda details: str(details["ctx"]["error"]),
 }
-"""What to say for each type of pydantic error that the models can cause, from the input and the context."""
+"""What to say for each type of pydantic error that the models can cause."""

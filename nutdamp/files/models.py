@@ -238,7 +238,7 @@ class SpacecraftFile(Section):
     )
     steerable: SteerableSection | None = Field(default=None, description="A torquer for any transverse axis.")
     requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
-    limits: LimitsSection | None = Field(default=None, description="What every schedule keeps.")
+    limits: LimitsSection | None = Field(default=None, description="Limits that every schedule keeps.")
 
 
 def json_schema() -> dict[str, Any]:

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from nutdamp.files.spacecraft_file import built_in_example_text, json_schema
+from nutdamp.files.yaml_tree import read_tree
+
+SCHEMA = json_schema()
+VALIDATOR = Draft202012Validator(SCHEMA)
+
+EVERYTHING: dict[str, Any] = {
+    "name": "Sat",
+    "mass": "250 kg",
+    "inertia": {"A": "120 kg m²", "C": 80},
+    "omega0": [0.1, "2 deg/s", "30rpm"],
+    "attitude": {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "GCRF"},
+    "thrusters": [
+        {"name": "a", "position": [0, 0, "0.8 m"], "direction": [1, 0, 0], "force": "10 N", "isp": "220 s"},
+        {"name": "b", "torque": ["8 N m", "8 N*m", 0], "lever_arm": "800 mm", "min_on_time": 0, "max_on_time": "2 s"},
+    ],
+    "channels": {"both": ["a", "b"]},
+    "steerable": {"torque": "20 Nm", "isp": 220, "lever_arm": 1},
+    "requirement": {"nutation": "0.5 deg", "momentum_shift": "3 mrad"},
+    "limits": {"horizon": "2 min", "earliest": 5, "gap": 0.5, "tick": "1 ms", "max_pulses": 8, "blackout": [[10, 20]]},
+}
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    """`EVERYTHING` with one value changed, or left out where ``value`` is None."""
+    contents = copy.deepcopy(EVERYTHING)
+    *parents, last = (int(step) if step.isdigit() else step for step in path.split("."))
+    at: Any = contents
+    for step in parents:
+        at = at[step]
+    if value is None:
+        del at[last]
+    else:
+        at[last] = value
+    return contents
+
+
+def nodes(schema: object) -> Iterator[dict[str, Any]]:
+    """All mappings within a schema."""
+    if isinstance(schema, dict):
+        yield schema
+        for inner in schema.values():
+            yield from nodes(inner)
+    elif isinstance(schema, list):
+        for inner in schema:
+            yield from nodes(inner)
+
+
+def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert json.loads(json.dumps(SCHEMA)) == SCHEMA
+
+
+def test_the_example_and_everything_else_validate() -> None:
+    VALIDATOR.validate(read_tree(built_in_example_text(), "example.yaml")[0].plain())
+    VALIDATOR.validate(EVERYTHING)
+    VALIDATOR.validate({"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}})
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("mas", "250 kg"),
+        ("limits.horizn", 5),
+        ("thrusters.0.forse", 5),
+        ("name", None),
+        ("name", ""),
+        ("name", 5),
+        ("inertia", None),
+        ("omega0", None),
+        ("state", {"spin": 3, "nutation": 0}),
+        ("inertia.C", None),
+        ("inertia.tensor", [[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        ("inertia.A", 0),
+        ("inertia.A", "120 kg"),
+        ("mass", True),
+        ("mass", "250"),
+        ("omega0", [1, 2]),
+        ("omega0.2", "20 Hz"),
+        ("attitude.frame", "ICRF"),
+        ("attitude.epoch", "2026-03-01"),
+        ("attitude.quaternion", ["1", 0, 0, 0]),
+        ("thrusters.0.torque", [8, 0, 0]),
+        ("thrusters.0.force", None),
+        ("thrusters.0.lever_arm", 1),
+        ("channels", {}),
+        ("channels.both", []),
+        ("requirement.nutation", 2.0),
+        ("limits.max_pulses", 0),
+        ("limits.max_pulses", 1.5),
+        ("limits.blackout", [10, 20]),
+    ],
+)
+def test_slips_do_not_validate(path: str, value: object) -> None:
+    assert not VALIDATOR.is_valid(changed(path, value))
+
+
+def test_every_key_is_explained() -> None:
+    for schema in (SCHEMA, *SCHEMA["$defs"].values()):
+        assert schema["additionalProperties"] is False
+        assert schema["description"]
+        for key, field in schema["properties"].items():
+            assert len(field["description"]) > 5, key
+
+
+def test_no_key_takes_null() -> None:
+    assert not any(node.get("type") == "null" or node.get("default", 0) is None for node in nodes(SCHEMA))
