@@ -1,0 +1,223 @@
+"""Body rates under torques that last: the general solution Magnus 1970 (8)-(10) and its special cases.
+
+Everything in time, ω̇ = -i a ω3(t) ω + M(t)/A and ω̇3 = M3/C, so that nothing is divided by ω3 (Magnus' m = M/(Aω3)
+breaks where the spin passes zero) or by a (a sphere is no exception). M = M1 + iM2 in N m, body-fixed unless said.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+PANEL = 2.0
+"""Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+FRESNEL_FROM = 60.0
+"""Phase in rad from which Fresnel functions are cheaper than panels."""
+
+FRESNEL_REACH = 100.0
+"""Largest slope/sqrt(bend) for Fresnel functions: beyond it they differ from 1/2 by too few digits."""
+
+
+def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
+    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding.
+
+    Fresnel's integrals where the phase is long and bent (Bödewadt's solution for constant torques with axial part),
+    Gauss-Legendre panels elsewhere, which include bend -> 0 without cancellation.
+    """
+    slope, bend, length = (np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length))
+    # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
+    variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
+    fresnel = (variation > FRESNEL_FROM) & (np.square(slope) < FRESNEL_REACH**2 * np.abs(bend))
+    result = np.empty(slope.shape, dtype=complex)
+    if fresnel.any():
+        result[fresnel] = _by_fresnel(slope[fresnel], bend[fresnel], length[fresnel])
+    rest = ~fresnel
+    if rest.any():
+        result[rest] = _by_panels(slope[rest], bend[rest], length[rest], variation[rest])
+    return result
+
+
+def _by_fresnel(slope: Array, bend: Array, length: Array) -> ComplexArray:
+    """Completing the square: bend (s + slope/(2 bend))² - slope²/(4 bend)."""
+    from scipy.special import fresnel  # only where it is needed: loading it takes longer than a plan
+
+    size = np.abs(bend)
+    scale = np.sqrt(0.5 * math.pi / size)
+    offset = 0.5 * slope / bend
+    sine_end, cosine_end = fresnel((length + offset) / scale)
+    sine_start, cosine_start = fresnel(offset / scale)
+    spread = (cosine_end - cosine_start) + 1j * np.sign(bend) * (sine_end - sine_start)
+    return np.asarray(scale * np.exp(-1j * bend * np.square(offset)) * spread)
+
+
+def _by_panels(slope: Array, bend: Array, length: Array, variation: Array) -> ComplexArray:
+    counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    number = np.arange(len(owner)) - firsts[owner]
+    width = length[owner] / counts[owner]
+    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * NODES
+    phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
+    panels = 0.5 * width * (np.exp(1j * phase) @ WEIGHTS)
+    return np.asarray(np.add.reduceat(panels, firsts))
+
+
+def stepwise_torque(
+    times: Array, omega0: complex, spin0: float, A: float, C: float, edges: Array, torques: Array
+) -> tuple[ComplexArray, Array]:
+    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
+
+    ``times`` (n,) s in [edges[0], edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s)
+    begins at edges[0]; ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
+    """
+    edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
+    times = np.asarray(times, dtype=float)
+    a = (A - C) / A
+    spin_rates = torques[:, 2] / C
+    lengths = np.diff(edges)
+    spins = spin0 + np.concatenate([[0.0], np.cumsum(spin_rates * lengths)])
+    alphas = np.concatenate([[0.0], np.cumsum((spins[:-1] + 0.5 * spin_rates * lengths) * lengths)])
+    transverse = (torques[:, 0] + 1j * torques[:, 1]) / A
+
+    def gained(step: NDArray[np.intp], since: Array) -> ComplexArray:
+        turned = phase_integral(a * spins[step], 0.5 * a * spin_rates[step], since)
+        return np.asarray(transverse[step] * np.exp(1j * a * alphas[step]) * turned)
+
+    sums = omega0 + np.concatenate([[0.0], np.cumsum(gained(np.arange(len(lengths)), lengths))])
+    step = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(lengths) - 1)
+    since = times - edges[step]
+    spin = spins[step] + spin_rates[step] * since
+    alpha = alphas[step] + 0.5 * (spins[step] + spin) * since
+    return (sums[step] + gained(step, since)) * np.exp(-1j * a * alpha), spin
+
+
+def sampled_torque(
+    times: Array, omega0: complex, spin0: float, A: float, C: float, torques: Array
+) -> tuple[ComplexArray, Array]:
+    """General solution, Magnus 1970 (8)-(10), for torques sampled at ``times`` and linear in between.
+
+    ``times`` (n,) s ascending, the motion begins at times[0]; ``torques`` (n, 3) N m. Returns ω (n,) and ω3 (n,).
+    """
+    times, torques = np.asarray(times, dtype=float), np.asarray(torques, dtype=float)
+    a = (A - C) / A
+    lengths = np.diff(times)
+    first, last = torques[:-1, 2] / C, torques[1:, 2] / C
+    spins = spin0 + np.concatenate([[0.0], np.cumsum(0.5 * (first + last) * lengths)])
+    turns = (spins[:-1] + (2.0 * first + last) / 6.0 * lengths) * lengths
+    alphas = np.concatenate([[0.0], np.cumsum(turns)])
+    fastest = np.maximum(np.abs(spins[:-1]), np.abs(spins[1:])) + np.maximum(np.abs(first), np.abs(last)) * lengths
+    counts = np.maximum(np.ceil(abs(a) * fastest * lengths / PANEL), 1.0).astype(int)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    width = (lengths / counts)[owner]
+    s = (np.arange(len(owner)) - firsts[owner] + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * NODES
+    share = s / lengths[owner][:, None]
+    growth = (last - first)[owner][:, None]
+    alpha = alphas[owner][:, None] + s * (
+        spins[owner][:, None] + s * (0.5 * first[owner][:, None] + growth * share / 6.0)
+    )
+    transverse = torques[:, 0] + 1j * torques[:, 1]
+    torque = transverse[owner][:, None] * (1.0 - share) + transverse[owner + 1][:, None] * share
+    panels = 0.5 * width * ((torque * np.exp(1j * a * alpha)) @ WEIGHTS) / A
+    sums = omega0 + np.concatenate([[0.0], np.cumsum(np.add.reduceat(panels, firsts))])
+    return sums * np.exp(-1j * a * alphas), spins
+
+
+def rotating_torques(
+    times: Array, omega0: complex, spin: float, A: float, C: float, torques: ComplexArray, rates: Array
+) -> ComplexArray:
+    """ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
+
+    Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with ω(0) given it is
+    ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near resonance r_p = -aω3, which is (25):
+    ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2} sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3
+    the nearly space-fixed torque of (27), r_p = 0 the constant one of (11).
+
+    ``times`` (n,) s, ``torques`` (p,) N m, ``rates`` (p,) rad/s. Returns (n,) rad/s.
+    """
+    times = np.asarray(times, dtype=float)[:, None]
+    nutation = (A - C) / A * spin
+    half = 0.5 * (nutation + np.asarray(rates, dtype=float)) * times
+    # numpy.sinc(x) is sin(πx)/(πx)
+    forced = np.asarray(torques) * times * np.exp(1j * half) * np.sinc(half / math.pi) / A
+    return np.asarray((omega0 + forced.sum(axis=1)) * np.exp(-1j * nutation * times[:, 0]))
+
+
+def steady_response(A: float, C: float, spin: float, torque: complex, rate: float = 0.0) -> complex:
+    """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
+
+    For r = 0 the permanent rotation Magnus 1970 (13), K(14); for r = -ω3 the forced term of (27), K(15). Infinite at
+    resonance, r = -aω3.
+    """
+    detuning = (A - C) / A * spin + rate
+    if detuning == 0.0:
+        return complex(math.inf)
+    return -1j * torque / (A * detuning)
+
+
+class PoleCone(NamedTuple):
+    """Oblique circular cone ("Polkegel") of ω under a constant transverse torque: ω circles ``centre``, rad/s."""
+
+    centre: complex
+    radius: float
+
+
+def pole_cone(A: float, C: float, omega0: complex, spin: float, torque: complex) -> PoleCone:
+    """Base circle of the pole cone under a constant torque, Magnus 1970 after (11)."""
+    centre = steady_response(A, C, spin, torque)
+    return PoleCone(centre, abs(omega0 - centre))
+
+
+class PermanentRotation(NamedTuple):
+    """Rotation that stays constant in body and space: ω (rad/s), its rate ψ̇0 = |ω_i|, Euler angles ϑ0, φ0 (rad)."""
+
+    omega: complex
+    rate: float
+    theta: float
+    phi: float
+
+
+def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> PermanentRotation:
+    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), and its Euler angles (14).
+
+    tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
+    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
+    """
+    omega = steady_response(A, C, spin, torque)
+    rate = math.hypot(abs(omega), spin)
+    return PermanentRotation(omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag))
+
+
+def beat(A: float, C: float, spin: float, torque: complex, rate: float) -> tuple[float, float]:
+    """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling, Magnus 1970 (27).
+
+    ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at resonance.
+    """
+    detuning = abs((A - C) / A * spin + rate)
+    if detuning == 0.0:
+        return math.inf, math.inf
+    return 2.0 * abs(torque) / (A * detuning), 2.0 * math.pi / detuning
+
+
+def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: complex, nutation: float) -> float:
+    """When a resonant torque (r = -aω3) has driven the nutation angle to ``nutation`` rad, s; Magnus 1970 (25).
+
+    |ω0 + M t/A| = C|ω3| tan θ/A: the later root, since the pole curve may first run inwards; 0 if it is there already.
+    """
+    wanted = C * abs(spin) * math.tan(nutation) / A
+    speed = torque / A
+    if abs(omega0) >= wanted:
+        return 0.0
+    along = (omega0 * speed.conjugate()).real / abs(speed)
+    across = abs((omega0 * speed.conjugate()).imag) / abs(speed)
+    return (math.sqrt(wanted * wanted - across * across) - along) / abs(speed)
+
