@@ -7,6 +7,7 @@ impulses. `flown` is the judge: real widths, true moments. Both give legs that c
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics import attitude, rates, rigid
-from nutdamp.physics.rigid import Piece
+from nutdamp.physics.rigid import NOTHING, Forcing, Piece
 from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import Track, make_track
 
 
@@ -164,34 +165,93 @@ class Flight:
         return math.copysign(1.0, self.spacecraft.spin)
 
 
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """The body as one of the two models flies it, and what acts on it besides the pulses."""
+
+    moments: tuple[float, float, float]
+    constant: Vector
+    forcing: Forcing
+
+    @property
+    def free(self) -> bool:
+        """Whether coasts are torque-free arcs of a symmetric body, known in closed form."""
+        return self.moments[0] == self.moments[1] and not self.constant.any() and self.forcing == NOTHING
+
+    def path(
+        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = ()
+    ) -> tuple[Path, SpinState]:
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in."""
+        if end == start or (self.free and not torques):
+            arc = Arc(self.moments[0], self.moments[2], start, state)
+            if end == start:
+                return arc, state
+            body, quaternion = arc.motion(np.array([end]))
+            return arc, SpinState(complex(body[0, 0], body[0, 1]), float(body[0, 2]), quaternion[0])
+        torque = np.asarray(sum(torques, self.constant))
+        pieces = rigid.integrate(self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing)
+        rates_, quaternion_ = pieces[-1].final
+        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+
+    def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
+        """The state after an ``impulse`` (3,) N m s."""
+        body = state.rates + impulse / np.asarray(self.moments)
+        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+
+
+def _setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
+    """``true``: the principal moments as they are and |H| kept by dissipation; else the linear, symmetric body."""
+    inertia, disturbances = spacecraft.inertia, spacecraft.disturbances
+    symmetric = (inertia.A, inertia.A, inertia.C)
+    fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
+    transverse = sum(disturbance.transverse for disturbance in fixed)
+    return Setting(
+        moments=inertia.moments if true and not inertia.symmetric else symmetric,
+        constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
+        forcing=Forcing(
+            turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
+            growth=spacecraft.growth,
+            keep_momentum=true or spacecraft.growth == 0.0,
+        ),
+    )
+
+
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
-    """The impulse-sum solution, Magnus 1970 (17), with exact attitude arcs between the pulses.
+    """The impulse-sum solution, Magnus 1970 (17), pulse by pulse, with exact attitude arcs between.
 
     Each pulse acts at its centre with its effective impulse (`effective_impulses`); the body is the equivalent
-    symmetric one. The last leg reaches at least to ``until`` s.
+    symmetric one. Disturbances and dissipation (by its linear law) act between the pulses. The last leg reaches at
+    least to ``until`` s.
     """
-    A, C, state = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.initial
-    times = np.array([pulse.t for pulse in schedule])
-    kicks = effective_impulses(spacecraft.inertia, state.spin, schedule)
-    axial = np.array([pulse.impulse[2] for pulse in schedule])
-    omegas, spins = rates.impulse_sum(times, state.omega, state.spin, A, C, times, kicks, axial)
+    setting, state = _setting(spacecraft, true=False), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
-    for index, end in enumerate([*times.tolist(), max(until, schedule.end)]):
-        legs.append(Leg(now, end, Arc(A, C, now, state), index, jump=True))
-        if index < len(schedule):
-            quaternion = attitude.arc(A, C, state.quaternion, state.omega, state.spin, np.array(end - now))
-            state = SpinState(complex(omegas[index]), float(spins[index]), quaternion)
-            now = end
-    return Flight(spacecraft, schedule, tuple(legs), state, (A, A, C), tuple((pulse.t, pulse.t) for pulse in schedule))
+    for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
+        path, state = setting.path(state, now, pulse.t)
+        legs.append(Leg(now, pulse.t, path, index, jump=True))
+        state = setting.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
+        now = pulse.t
+    last = max(until, schedule.end)
+    path, _ = setting.path(state, now, last)
+    legs.append(Leg(now, last, path, len(schedule), jump=True))
+    return Flight(spacecraft, schedule, tuple(legs), state, setting.moments, tuple((one.t, one.t) for one in schedule))
 
 
-def effective_impulses(inertia: Inertia, spin: float, schedule: Schedule) -> NDArray[np.complex128]:
+def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
     """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`."""
+    inertia, spin = spacecraft.inertia, spacecraft.spin
+    drift = spacecraft.spin_drift
     impulses = np.empty(len(schedule), dtype=complex)
     for index, pulse in enumerate(schedule):
         axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
-        factor = rates.width_factor(inertia.a, spin, axial_torque / inertia.C, pulse.on_time)
+        factor = rates.width_factor(
+            inertia.a,
+            spin + drift * pulse.start,
+            axial_torque / inertia.C,
+            pulse.on_time,
+            growth=spacecraft.growth,
+            drift=drift,
+        )
         impulses[index] = complex(pulse.impulse[0], pulse.impulse[1]) * factor
         spin += float(pulse.impulse[2]) / inertia.C
     return impulses
@@ -200,11 +260,10 @@ def effective_impulses(inertia: Inertia, spin: float, schedule: Schedule) -> NDA
 def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """Euler's equations through the real pulse widths, with the true principal moments.
 
-    Coasts of symmetric bodies are exact arcs, everything else Taylor series at rounding accuracy. The last leg
-    reaches at least to ``until`` s.
+    Coasts of symmetric bodies left alone are exact arcs, everything else Taylor series at rounding accuracy. The last
+    leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
     """
-    inertia, state = spacecraft.inertia, spacecraft.initial
-    moments = (inertia.A, inertia.A, inertia.C) if inertia.symmetric else inertia.moments
+    setting, state = _setting(spacecraft, true=True), spacecraft.initial
     pulses = schedule.pulses
     last = max(until, schedule.end)
     edges = sorted({0.0, last, *(pulse.start for pulse in pulses), *(pulse.end for pulse in pulses)})
@@ -213,40 +272,20 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     for now, end in zip(edges, [*edges[1:], last], strict=True):
         kicks = [pulse.impulse for pulse in pulses if pulse.on_time == 0.0 and pulse.t == now]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(Leg(now, now, Arc(inertia.A, inertia.C, now, state), 0, jump=True))
-        if kicks:
-            body = state.rates + np.sum(kicks, axis=0) / np.asarray(moments)
-            state = SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+            legs.append(Leg(now, now, setting.path(state, now, now)[0], 0, jump=True))
+        for kick in kicks:
+            state = setting.kicked(state, kick)
         if now == schedule.end:
             settled = state
         torques = [
             pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start <= now and end <= pulse.end
         ]
-        path, following = _path(inertia, moments, torques, state, now, end)
+        path, following = setting.path(state, now, end, torques)
         completed = sum(pulse.end <= now for pulse in pulses)
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0))
         state = following
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
-    return Flight(spacecraft, schedule, tuple(legs), settled, moments, spans)
-
-
-def _path(
-    inertia: Inertia,
-    moments: tuple[float, float, float],
-    torques: list[Vector],
-    state: SpinState,
-    start: float,
-    end: float,
-) -> tuple[Path, SpinState]:
-    """Motion from ``start`` to ``end`` under the sum of ``torques``, and the state it ends in."""
-    if end == start or (not torques and inertia.symmetric):
-        arc = Arc(inertia.A, inertia.C, start, state)
-        body, quaternion = arc.motion(np.array([end]))
-        return arc, SpinState(complex(body[0, 0], body[0, 1]), float(body[0, 2]), quaternion[0])
-    torque = np.sum(torques, axis=0) if torques else np.zeros(3)
-    pieces = rigid.integrate(moments, torque, state.rates, state.quaternion, start, end)
-    body, quaternion = pieces[-1].final
-    return Integrated(tuple(pieces)), SpinState(complex(body[0], body[1]), float(body[2]), quaternion)
+    return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
 
 
 def _largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:

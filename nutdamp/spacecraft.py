@@ -180,6 +180,20 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
+class Disturbance:
+    """A torque that nobody commands, in principal body axes.
+
+    ``transverse`` M1 + iM2 (N m, at t = 0) turns about axis 3 of the body at ``rate`` rad/s; 0 is fixed in the body,
+    minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant.
+    """
+
+    transverse: complex
+    axial: float = 0.0
+    rate: float = 0.0
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Attitude:
     """Attitude at t = 0 as the file gives it: unit quaternion body (file axes) -> frame, scalar first."""
 
@@ -209,7 +223,8 @@ class SpinState:
 class Spacecraft:
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
-    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None.
+    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
+    which energy dissipation lets the nutation grow or decay, or None.
     """
 
     name: str
@@ -221,6 +236,20 @@ class Spacecraft:
     steerable: Steerable | None = None
     requirement: Requirement | None = None
     limits: Limits = field(default_factory=Limits)
+    disturbances: tuple[Disturbance, ...] = ()
+    dissipation: float | None = None
+
+    @property
+    def growth(self) -> float:
+        """Rate 1/τ (1/s) at which energy dissipation lets the nutation grow: prolate positive, oblate negative."""
+        if self.dissipation is None or self.inertia.a == 0.0:
+            return 0.0
+        return math.copysign(1.0 / self.dissipation, self.inertia.a)
+
+    @property
+    def spin_drift(self) -> float:
+        """Spin acceleration by the axial disturbances, rad/s²."""
+        return math.fsum(disturbance.axial for disturbance in self.disturbances) / self.inertia.C
 
     @property
     def torquer(self) -> Steerable | None:

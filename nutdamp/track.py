@@ -12,6 +12,9 @@ from nutdamp.physics import attitude
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-11
+"""rad; angles that differ by less count as equal."""
+
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -82,7 +85,9 @@ class Extremes:
 def extremes(track: Track) -> Extremes:
     """Extremes of the axis track over its rows."""
     away = attitude.angle_between(track.axis, track.momentum[0])
-    far, near = int(np.argmax(away)), int(np.argmin(away))
+    # The first of all that are equal but for rounding: after the last pulse of a good plan nothing moves any more.
+    far = int(np.argmax(away >= away.max() - ROUNDING))
+    near = int(np.argmax(away <= away.min() + ROUNDING))
     x, y = np.arcsin(np.clip(track.axis[:, :2].T, -1.0, 1.0))
     ascension = np.sort(np.arctan2(track.axis[:, 1], track.axis[:, 0]) % (2 * math.pi))
     # The widest gap between neighbouring values lies outside the range, across 0 or not.

@@ -220,4 +220,3 @@ def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: comp
     along = (omega0 * speed.conjugate()).real / abs(speed)
     across = abs((omega0 * speed.conjugate()).imag) / abs(speed)
     return (math.sqrt(wanted * wanted - across * across) - along) / abs(speed)
-

@@ -28,11 +28,13 @@ def impulse_sum(
     pulse_times: Array,
     transverse: ComplexArray,
     axial: Array,
+    growth: float = 0.0,
 ) -> tuple[ComplexArray, Array]:
     """Rates after a sum of impulses, Magnus 1970 (17), exact at any angle for symmetric bodies.
 
     ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
-    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too.
+    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. Energy
+    dissipation (``growth`` = 1/τ in 1/s, by the linear law dω/dt = (-iaω3 + 1/τ)ω) adds e^{t/τ}.
 
     ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.
     Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
@@ -41,26 +43,30 @@ def impulse_sum(
     spins = spin0 + np.concatenate([[0.0], np.cumsum(axial)]) / C
     knots = np.concatenate([[0.0], pulse_times])
     turned = np.concatenate([[0.0], np.cumsum(spins[:-1] * np.diff(knots))])
-    sums = omega0 + np.concatenate([[0.0], np.cumsum(transverse * np.exp(1j * a * turned[1:]))]) / A
+    before = np.exp(1j * a * turned[1:] - growth * pulse_times)
+    sums = omega0 + np.concatenate([[0.0], np.cumsum(transverse * before)]) / A
     given = np.searchsorted(pulse_times, times, side="right")
     alpha = turned[given] + spins[given] * (times - knots[given])
-    return sums[given] * np.exp(-1j * a * alpha), spins[given]
+    return sums[given] * np.exp(growth * times - 1j * a * alpha), spins[given]
 
 
-def width_factor(a: float, spin: float, spin_rate: float, on_time: float) -> complex:
+def width_factor(
+    a: float, spin: float, spin_rate: float, on_time: float, growth: float = 0.0, drift: float = 0.0
+) -> complex:
     """What a rectangular pulse loses on ω by its width, as a factor on its impulse at the centre.
 
     For a constant body torque with axial part, ω3 = spin + spin_rate·(time since start) with spin_rate = M3/C, the
     pulse acts on ω exactly as an impulse M τ F at its centre, when ω3 jumps there by spin_rate·τ:
     F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial part this is
-    sinc(a ω3 τ/2), sinc x = sin x / x.
+    sinc(a ω3 τ/2), sinc x = sin x / x. Energy dissipation (``growth`` = 1/τ, 1/s) turns a ω3 into a ω3 + i/τ;
+    ``drift`` (rad/s²) is a spin acceleration that goes on after the pulse.
     """
     half = 0.5 * on_time
-    if spin_rate == 0.0:
-        angle = a * spin * half
-        return complex(math.sin(angle) / angle if angle != 0.0 else 1.0)
+    if spin_rate == 0.0 and drift == 0.0:
+        angle = (a * spin + 1j * growth) * half
+        return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
     offset = 0.5 * a * spin_rate * half * half
-    slope, bend = a * (spin + spin_rate * half), 0.5 * a * spin_rate
+    slope, bend = a * (spin + (spin_rate + drift) * half) + 1j * growth, 0.5 * a * (spin_rate + drift)
     panels = math.ceil((abs(slope) + abs(bend) * half) * half / SERIES_REACH) or 1
     width = half / panels
     total = 0.0 + 0.0j
@@ -71,7 +77,7 @@ def width_factor(a: float, spin: float, spin_rate: float, on_time: float) -> com
     return total / panels
 
 
-def _mean_of_phase(slope: float, bend: float, half: float) -> complex:
+def _mean_of_phase(slope: complex, bend: float, half: float) -> complex:
     """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series about the middle."""
     before, term = 0.0 + 0.0j, 1.0 + 0.0j  # terms c_k half^k of the series of the integrand
     total, order = term, 0

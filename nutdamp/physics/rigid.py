@@ -7,19 +7,42 @@ the series is its own dense output; closed forms and plans are checked against i
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
 
 Array = NDArray[np.float64]
 
 ORDER = 22
 """Order of the series; near -ln(eps)/2 the work per radian is least for rounding accuracy."""
 
+FLAT = 0.02
+"""Cosine of the nutation angle below which dissipation counts as having reached flat spin (88.9°)."""
+
 REMAINDER = 2.0**-53
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
+
+
+class Forcing(NamedTuple):
+    """What acts on a body besides a constant torque.
+
+    ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
+    ``growth``: rate 1/τ in 1/s at which energy dissipation lets H1 and H2 grow (negative: decay). ``keep_momentum``:
+    internal dissipation cannot change |H|, so H3 gives way; False is the linear law of the closed forms, ω3 constant.
+    """
+
+    turning: tuple[tuple[complex, float], ...] = ()
+    growth: float = 0.0
+    keep_momentum: bool = True
+
+
+NOTHING = Forcing()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,21 +77,26 @@ def integrate(
     quaternion: Array,
     start: float,
     end: float,
+    forcing: Forcing = NOTHING,
 ) -> list[Piece]:
-    """Motion of a rigid body under a constant body torque, from ``start`` to ``end`` s (> start).
+    """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
+    Raises Infeasible where dissipation drives the body into flat spin.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
-    coupling = np.array([moments[1] - moments[2], moments[2] - moments[0], moments[0] - moments[1]]) / inertia
+    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
+    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     now = start
     while now < end:
+        if forcing.growth > 0.0 and forcing.keep_momentum:
+            _refuse_flat_spin(inertia * rates, now)
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
-        pace = float(np.linalg.norm(rates)) + math.sqrt(float(np.linalg.norm(acceleration)))
+        pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
         unit = 1.0 / pace if pace > 0.0 else end - now
-        series = _series(coupling, acceleration, rates, quaternion, unit)
+        series = _series(moments, acceleration, forcing, now, np.concatenate([rates, quaternion]), unit)
         step = min(_reach(series, unit) * unit, end - now)
         if end - now - step < 1e-3 * step:  # no sliver of a step at the end
             step = end - now
@@ -80,14 +108,25 @@ def integrate(
     return pieces
 
 
-def _series(coupling: Array, acceleration: Array, rates: Array, quaternion: Array, unit: float) -> Array:
+def _refuse_flat_spin(momentum: Array, now: float) -> None:
+    if abs(momentum[2]) < FLAT * float(np.linalg.norm(momentum)):
+        raise Infeasible(f"energy dissipation drives the body into flat spin within {now:.4g} s")
+
+
+def _series(
+    moments: tuple[float, float, float], acceleration: Array, forcing: Forcing, now: float, state: Array, unit: float
+) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
     dω1/dt = (I2 - I3)/I1 ω2 ω3 + M1/I1 and round, Magnus 1970 (1) for three different moments;
-    dq/dt = q (0, ω)/2.
+    dq/dt = q (0, ω)/2; dissipation lets ω1, ω2 grow and, with |H| kept, I3 ω3 dω3/dt = -(H1² + H2²)/(τ I3).
     """
+    first, second, third = moments
+    coupling = ((second - third) / first, (third - first) / second, (first - second) / third)
     series = np.zeros((ORDER + 1, 7))
-    series[0, :3], series[0, 3:] = rates, quaternion
+    series[0] = state
+    turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
+    given_up: list[float] = []  # series of (H1² + H2²)/(I3² ω3)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -102,6 +141,17 @@ def _series(coupling: Array, acceleration: Array, rates: Array, quaternion: Arra
         following[6] = 0.5 * step * (w[3, 2] + w[4, 1] - w[5, 0])
         if k == 0:
             following[:3] += unit * acceleration
+        for index, (size, turn) in enumerate(turning):
+            following[0] += step * size.real / first
+            following[1] += step * size.imag / second
+            turning[index] = (size * turn / (k + 1), turn)
+        if forcing.growth != 0.0:
+            following[:2] += step * forcing.growth * series[k, :2]
+            if forcing.keep_momentum:
+                lost = (first**2 * w[0, 0] + second**2 * w[1, 1]) / third**2
+                lost -= sum(series[j, 2] * given_up[k - j] for j in range(1, k + 1))
+                given_up.append(float(lost / series[0, 2]))
+                following[2] -= step * forcing.growth * given_up[k]
     return series
 
 
