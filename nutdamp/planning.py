@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Residual
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule
+from nutdamp.schemes.model import steady_omega
 from nutdamp.schemes.windows import SLACK
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -22,6 +23,9 @@ NO_NUTATION = 1e-12
 
 AS_GOOD = math.radians(1e-3)
 """Flown nutation in rad below which plans count as equally good; likewise within twice the least."""
+
+TELLING = math.radians(1e-6)
+"""Nutation angle in rad from which what is left is worth a remark."""
 
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
 """Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
@@ -35,6 +39,7 @@ class Plan:
     scheme: str
     schedule: Schedule | None
     why: str | None = None
+    options: schemes.Options = field(default_factory=schemes.Options)
 
     @property
     def feasible(self) -> bool:
@@ -84,6 +89,47 @@ class Plan:
             return None
         return _momentum_gained(self.flight) / mass
 
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader should know: remarks of the scheme, why nutation is left, what I1 ≠ I2 does."""
+        if self.flown is None or not len(self.pulses):
+            return self.pulses.notes
+        return (*self.pulses.notes, *self._remainder(), *self._asymmetry())
+
+    def _remainder(self) -> tuple[str, ...]:
+        """Why nutation is left."""
+        body, left = self.spacecraft, self.flight.residual.nutation
+        if left < TELLING or self.options.coarse or self.options.literal:
+            return ()
+        limits = body.limits
+        if body.disturbances and not self.options.with_disturbances:
+            reason = "the plan does not know of the disturbances (--with-disturbances)"
+        elif body.disturbances:
+            steady = body.inertia.A * abs(steady_omega(body, self.pulses.end)) / (body.inertia.C * abs(body.spin))
+            reason = f"{math.degrees(math.atan(steady)):.3g}° is the steady tilt under the disturbances"
+        elif len(self.pulses) == limits.max_pulses:
+            reason = f"limits.max_pulses = {limits.max_pulses} ends it"
+        elif limits.tick is not None and left < 0.1 * body.nutation:
+            reason = "the resolution of commands (limits.tick) or the shortest pulse leaves it"
+        else:
+            reason = "on-times, horizon or blackout windows allow no more"
+        return (f"{math.degrees(left):.3g}° of nutation remain: {reason}",)
+
+    def _asymmetry(self) -> tuple[str, ...]:
+        """What the same pulses would leave if I1 and I2 were their mean."""
+        inertia = self.spacecraft.inertia
+        if inertia.symmetric:
+            return ()
+        first, second, third = inertia.moments
+        mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, third)))
+        without = flight.flown(mean, self.pulses).residual.nutation
+        left = self.flight.residual.nutation
+        return (
+            f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % accounts for "
+            f"{math.degrees(abs(left - without)):.3g}°: these pulses leave {math.degrees(left):.3g}° of nutation, "
+            f"and would leave {math.degrees(without):.3g}° if both were their mean",
+        )
+
 
 def _momentum_gained(flown: Flight) -> Vector:
     """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
@@ -109,15 +155,17 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
     """
     if spacecraft.nutation < NO_NUTATION:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
+    options = options or schemes.Options()
+    known = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     try:
-        made = schemes.schedule(scheme, spacecraft, options or schemes.Options())
+        made = schemes.schedule(scheme, known, options)
+        judged = Plan(spacecraft, scheme, made, options=options)
+        left = judged.flown
     except Infeasible as reason:
         return Plan(spacecraft, scheme, None, str(reason))
-    judged = Plan(spacecraft, scheme, made)
     broken = broken_limits(spacecraft, made)
     if broken:
         return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
-    left = judged.flown
     if scheme != "none" and left is not None and left.nutation >= spacecraft.nutation:
         angle = math.degrees(left.nutation)
         return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")

@@ -45,6 +45,7 @@ class Quantity(click.ParamType["float"]):
 def scheme_options(command: Command) -> Command:
     """Options that the schemes read."""
     for option in (
+        click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
         click.option("--literal", is_flag=True, help="two-pulse as printed by Magnus: equal halves, small-angle wait."),
         click.option("--coarse", is_flag=True, help="four-pulse with full pulses only, no shorter one at the end."),
         click.option("--on-time", type=Quantity("time"), help="Pulse length of four-pulse, such as 200ms."),

@@ -33,6 +33,7 @@ def command(
     on_time: float | None,
     coarse: bool,
     literal: bool,
+    with_disturbances: bool,
     csv: str | None,
     json: str | None,
     quiet: bool,
@@ -53,7 +54,7 @@ def command(
 
     from nutdamp.planning import compare
 
-    compared = compare(body, names or CLASSIC, Options(on_time=on_time, coarse=coarse, literal=literal))
+    compared = compare(body, names or CLASSIC, Options(on_time, coarse, literal, with_disturbances))
     chosen = compared.recommended
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:

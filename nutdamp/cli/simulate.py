@@ -39,6 +39,7 @@ def command(
     on_time: float | None,
     coarse: bool,
     literal: bool,
+    with_disturbances: bool,
     real: bool,
     until: float | None,
     samples: int,
@@ -70,11 +71,11 @@ def command(
         for warning in (*warnings, *planning.broken_limits(body, pulses)):
             remark(f"warning: {warning}")
     else:
-        plan = planning.plan(body, scheme or "none", Options(on_time=on_time, coarse=coarse, literal=literal))
+        plan = planning.plan(body, scheme or "none", Options(on_time, coarse, literal, with_disturbances))
         if plan.why is not None:
             raise Infeasible(f"{scheme} is infeasible: {plan.why}")
         pulses = plan.pulses
-        for note in pulses.notes:
+        for note in plan.remarks:
             remark(note)
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)

@@ -62,7 +62,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "spin_change_rad_s": plan.spin_change,
         "residual": residual_json(plan.residual),
         "flown": residual_json(plan.flown),
-        "notes": list(plan.pulses.notes),
+        "notes": list(plan.remarks),
     }
 
 

@@ -123,7 +123,7 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
     """Why a scheme is infeasible, and the remarks of the others."""
     lines: list[RenderableType] = []
     for plan in compared.plans:
-        for remark in (plan.why,) if plan.why is not None else plan.pulses.notes:
+        for remark in (plan.why,) if plan.why is not None else plan.remarks:
             lines.append(Text.assemble((f"{plan.scheme}: ", "bold"), remark or ""))
     return [Text(), *lines] if lines else []
 

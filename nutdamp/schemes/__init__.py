@@ -19,21 +19,32 @@ class Options(NamedTuple):
     """What a user may ask of the schemes; each reads what concerns it.
 
     ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)). ``coarse``: four-pulse without a
-    last, shorter pulse. ``literal``: two-pulse as printed in Magnus 1970.
+    last, shorter pulse. ``literal``: two-pulse as printed in Magnus 1970. ``with_disturbances``: plan on the motion
+    with the disturbances of the file, which is otherwise only judged with them.
     """
 
     on_time: float | None = None
     coarse: bool = False
     literal: bool = False
+    with_disturbances: bool = False
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
-    """Pulses of the scheme ``name``.
+    """Pulses of the scheme ``name``, disturbances and all.
 
-    Raises Infeasible with the reason where the scheme cannot work on this spacecraft within its limits, and
-    KeyError for a name not in `NAMES`.
+    The scheme plans on the symmetric, undisturbed `model` of the spacecraft; where that is not exact, the last pulse
+    (both of two-pulse) is trimmed on the true motion. Raises Infeasible with the reason where the scheme cannot work
+    within the limits, and KeyError for a name not in `NAMES`.
     """
     if name not in NAMES:
         raise KeyError(name)
-    module = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
-    return cast("Schedule", module.schedule(spacecraft, options))
+    from nutdamp.schemes import trim
+    from nutdamp.schemes.model import model_of
+
+    model = model_of(spacecraft)
+    scheme = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
+    made = model.translate(cast("Schedule", scheme.schedule(model.body, options)))
+    if model.exact or options.coarse or options.literal or not made.pulses:
+        return made
+    pair = name == "two-pulse"
+    return trim.refine(spacecraft, made, count=2 if pair else 1, momentum=pair)

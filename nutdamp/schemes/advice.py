@@ -28,7 +28,7 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         )
     walk = Walk(spacecraft, endless=True)
     pulses = [walk.align(channel, max(channel.min_on_time, 0.0)) for channel in channels]
-    ends = [pulse.end for pulse in pulses if pulse is not None and walk.left_after(pulse) < walk.left]
+    ends = [pulse.end for pulse in pulses if pulse is not None and walk.helps(pulse)]
     if not ends:
         least = min(walk.left_after(pulse) for pulse in pulses if pulse is not None)
         return (
@@ -39,17 +39,3 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
         f"the first does until {min(ends):.4g} s: set limits.horizon beyond that"
     )
-
-
-def remainder(walk: Walk) -> tuple[str, ...]:
-    """A remark on what the pulses leave, and what ended them; none where they leave nothing."""
-    if walk.settled:
-        return ()
-    theta = math.degrees(math.atan2(walk.left, walk.C * abs(walk.spin)))
-    if walk.full:
-        reason = f"limits.max_pulses = {walk.spacecraft.limits.max_pulses} ends it"
-    elif walk.spacecraft.limits.tick is not None and theta < math.degrees(walk.spacecraft.nutation) * 0.1:
-        reason = "the resolution of commands (limits.tick) or the shortest pulse leaves it"
-    else:
-        reason = "on-times, horizon or blackout windows allow no more"
-    return (f"{theta:.3g}° of nutation remain: {reason}",)

@@ -8,7 +8,7 @@ import math
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import Options
-from nutdamp.schemes.advice import no_alignment, no_channels, remainder
+from nutdamp.schemes.advice import no_alignment, no_channels
 from nutdamp.schemes.walk import Walk
 from nutdamp.spacecraft import Channel, Spacecraft
 
@@ -35,13 +35,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
         _turning(walk, channels, on_times, options)
     if not walk.pulses:
         raise Infeasible(no_alignment(spacecraft, channels))
-    return walk.schedule(*_remarks(walk, options))
-
-
-def _remarks(walk: Walk, options: Options) -> tuple[str, ...]:
-    if options.coarse and not walk.full:
-        return ()  # what coarse pulses leave is what was asked for
-    return remainder(walk)
+    return walk.schedule()
 
 
 def _on_time(walk: Walk, channel: Channel, asked: float | None) -> float:
@@ -60,7 +54,7 @@ def _turning(walk: Walk, channels: list[Channel], on_times: dict[str, float], op
     """Alignment after alignment, whichever helpful channel comes first."""
     while not walk.full and not walk.settled:
         pulses = [_next(walk, channel, on_times[channel.name], options.coarse) for channel in channels]
-        helpful = [pulse for pulse in pulses if pulse is not None and walk.left_after(pulse) < walk.left]
+        helpful = [pulse for pulse in pulses if pulse is not None and walk.helps(pulse)]
         if not helpful:
             return
         walk.fire(min(helpful, key=lambda pulse: pulse.t))
@@ -86,7 +80,7 @@ def _standing(walk: Walk, channels: list[Channel], options: Options) -> None:
             if walk.full or start is None:
                 return
             pulse = channel_pulse(channel, start + 0.5 * on_time, on_time)
-            if walk.left_after(pulse) >= walk.left:
+            if not walk.helps(pulse):
                 break
             walk.fire(pulse)
 

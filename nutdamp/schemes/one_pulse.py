@@ -9,12 +9,15 @@ from nutdamp.errors import Infeasible
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import Options
-from nutdamp.schemes.advice import no_alignment, no_channels, remainder
+from nutdamp.schemes.advice import no_alignment, no_channels
 from nutdamp.schemes.walk import Walk
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable
 
 TRAIN_SHARE = 0.25
 """Longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width."""
+
+LEFT_OVER = 0.01
+"""Share of A|ω0| from which a remainder counts against a channel."""
 
 
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG001 - the signature of a scheme
@@ -27,7 +30,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG
     if torquer is not None:
         walk = _steered(spacecraft, torquer)
         if walk.pulses:
-            return walk.schedule(*remainder(walk))
+            return walk.schedule()
         raise Infeasible(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = [channel for channel in spacecraft.channels if channel.damps]
     if not channels:
@@ -36,55 +39,69 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG
     if not walks:
         raise Infeasible(no_alignment(spacecraft, channels))
     best = min(walks, key=_preference)
-    return best.schedule(*remainder(best))
+    return best.schedule()
 
 
 def _preference(walk: Walk) -> tuple[bool, int, float, float]:
     chosen = walk.schedule()
     cost = chosen.total_impulse if chosen.propellant is None else chosen.propellant
-    return not walk.settled and walk.left > 0.01 * walk.spacecraft.least_impulse, len(chosen), cost, chosen.end
+    return not walk.settled and walk.left > LEFT_OVER * walk.spacecraft.least_impulse, len(chosen), cost, chosen.end
 
 
 def _fixed(spacecraft: Spacecraft, channel: Channel) -> Walk:
     """Pulses of one channel at its successive alignments."""
-    walk = Walk(spacecraft)
 
-    def fire(impulse: float) -> Pulse | None:
+    def fire(walk: Walk, impulse: float) -> Pulse | None:
         on_time = walk.on_time_for(channel, impulse)
         return walk.align(channel, channel.max_on_time if on_time is None else on_time)
 
-    spin_rate = channel.axial / walk.C
-    _train(walk, abs(channel.transverse), spin_rate, channel.max_on_time, fire)
-    return walk
+    spin_rate = channel.axial / spacecraft.inertia.C
+    return _train(spacecraft, abs(channel.transverse), spin_rate, channel.max_on_time, fire)
 
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable) -> Walk:
     """Pulses of a steerable torquer, one behind the other."""
-    walk = Walk(spacecraft)
     torque = math.inf if torquer.torque is None else torquer.torque
-    _train(walk, torque, 0.0, math.inf, lambda impulse: walk.steer(torquer, impulse))
-    return walk
+    return _train(spacecraft, torque, 0.0, math.inf, lambda walk, impulse: walk.steer(torquer, impulse))
 
 
 def _train(
-    walk: Walk, torque: float, spin_rate: float, max_on_time: float, fire: Callable[[float], Pulse | None]
-) -> None:
-    """Fire the fewest equal pulses that take out what is left; stop where the limits end it or nothing is gained."""
+    spacecraft: Spacecraft,
+    torque: float,
+    spin_rate: float,
+    max_on_time: float,
+    fire: Callable[[Walk, float], Pulse | None],
+) -> Walk:
+    """The fewest equal pulses that take out what is left; fewer where the limits end it or nothing is gained."""
+    start = Walk(spacecraft)
 
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
             return math.inf
-        return torque * on_time * abs(rates.width_factor(walk.a, walk.spin, spin_rate, on_time))
+        return torque * on_time * abs(rates.width_factor(start.a, start.spin, spin_rate, on_time))
 
-    longest = min(max_on_time, 0.5 * walk.period)
+    longest = min(max_on_time, 0.5 * start.period)
     count = 1
-    if walk.left > capacity(longest):
-        count = math.ceil(walk.left / capacity(min(max_on_time, TRAIN_SHARE * walk.period)))
-        most = walk.spacecraft.limits.max_pulses
+    if start.left > capacity(longest):
+        count = math.ceil(start.left / capacity(min(max_on_time, TRAIN_SHARE * start.period)))
+        most = spacecraft.limits.max_pulses
         if most is not None and count > most:  # rather longer pulses than too many
-            count = min(most, math.ceil(walk.left / capacity(longest)))
+            count = min(most, math.ceil(start.left / capacity(longest)))
+    walk = _fire_train(spacecraft, count, capacity(longest), fire)
+    if spacecraft.growth > 0.0 and walk.pulses and walk.left > LEFT_OVER * start.left:
+        # The nutation grows while the train waits for its moments: a pulse more than it takes now.
+        longer = _fire_train(spacecraft, count + 1, capacity(longest), fire)
+        walk = min(walk, longer, key=lambda one: one.left)
+    return walk
+
+
+def _fire_train(
+    spacecraft: Spacecraft, count: int, strongest: float, fire: Callable[[Walk, float], Pulse | None]
+) -> Walk:
+    walk = Walk(spacecraft)
     for remaining in range(count, 0, -1):
-        pulse = fire(min(walk.left / remaining, capacity(longest)))
-        if pulse is None or walk.left_after(pulse) >= walk.left:
-            return
+        pulse = fire(walk, min(walk.left / remaining, strongest))
+        if walk.full or pulse is None or not walk.helps(pulse):
+            break
         walk.fire(pulse)
+    return walk

@@ -6,14 +6,18 @@ takes longer than a whole plan.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from nutdamp import flight
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.model import steady_omega
+from nutdamp.schemes.windows import Windows
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 CONVERGED = 1e-14
 """rad; a few roundings of the integration."""
@@ -30,7 +34,8 @@ PROGRESS = 0.01
 def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; shift of H in two.
 
-    All four are zero exactly when no nutation is left and H is back where it was.
+    All four are zero exactly when no nutation is left and H is back where it was. Under disturbances the tilt counts
+    from the steady response to them, about which nothing is to be damped.
     """
     flight_ = flight.flown(spacecraft, schedule)
     moments = np.asarray(flight_.moments)
@@ -38,6 +43,8 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     before = attitude.rotate(start.quaternion, start.rates * moments)
     body = flight_.settled.rates * moments
     after = attitude.rotate(flight_.settled.quaternion, body)
+    steady = steady_omega(spacecraft, schedule.end)
+    body[:2] -= moments[:2] * (steady.real, steady.imag)
     return np.concatenate([body[:2], _across(before, after)]) / float(np.linalg.norm(body))
 
 
@@ -48,6 +55,91 @@ def _across(axis: Vector, vector: Vector) -> Vector:
     first = np.cross(unit, other)
     first /= float(np.linalg.norm(first))
     return np.array([first @ vector, np.cross(unit, first) @ vector])
+
+
+def refine(spacecraft: Spacecraft, made: Schedule, *, count: int, momentum: bool) -> Schedule:
+    """``made`` with its last ``count`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
+
+    Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
+    brought back, not only the nutation taken out.
+    """
+    kept, free = made.pulses[:-count], made.pulses[-count:]
+    knobs = [_Knob(spacecraft, pulse) for pulse in free]
+    ends = np.cumsum([len(knob.start) for knob in knobs])
+
+    def build(x: Vector) -> Schedule:
+        parts = np.split(x, ends[:-1])
+        return Schedule((*kept, *(knob.turn(part) for knob, part in zip(knobs, parts, strict=True))), made.notes)
+
+    def left(made: Schedule) -> Vector:
+        return misses(spacecraft, made)[: 4 if momentum else 2]
+
+    start, scale, lower, upper = (
+        np.concatenate([getattr(knob, name) for knob in knobs]) for name in ("start", "scale", "lower", "upper")
+    )
+    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper)
+    trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes)
+    better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
+    return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made
+
+
+class _Knob:
+    """What can be turned of a pulse: (start, on-time) of a channel, (start, impulse, angle) of a steerable torquer."""
+
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse) -> None:
+        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
+        self.channel = _channel(spacecraft, pulse)
+        self.torquer = spacecraft.torquer
+        if self.channel is not None:
+            self.start = np.array([pulse.start, pulse.on_time])
+            self.scale = np.array([pace, pulse.on_time])
+            self.lower = np.array([earliest, self.channel.min_on_time])
+            self.upper = np.array([np.inf, self.channel.max_on_time])
+        else:
+            self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
+            self.scale = np.array([pace, pulse.magnitude, 1.0])
+            self.lower = np.array([earliest, 0.0, -np.inf])
+            self.upper = np.full(3, np.inf)
+
+    def turn(self, x: Vector) -> Pulse:
+        """The pulse with these settings."""
+        if self.channel is not None:
+            return channel_pulse(self.channel, x[0] + 0.5 * x[1], float(x[1]))
+        assert self.torquer is not None
+        torque = self.torquer.torque
+        on_time = 0.0 if torque is None else x[1] / torque
+        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[2]), impulse=float(x[1]))
+
+
+def _channel(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
+    """The channel that fires the pulse; None for a steerable torquer."""
+    return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
+
+
+def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
+    """The pulse with start and on-time on the ticks of the commands."""
+    if spacecraft.limits.tick is None:
+        return pulse
+    windows, channel = Windows(spacecraft), _channel(spacecraft, pulse)
+    bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+    on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
+    t = windows.nearest_tick(pulse.start) + 0.5 * on_time
+    if channel is not None:
+        return channel_pulse(channel, t, on_time)
+    scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
+    propellant = None if pulse.propellant is None else pulse.propellant * scale
+    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
+
+
+def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
+    """Whether the pulses, in order, keep every limit on their times."""
+    windows = Windows(spacecraft)
+    ready = windows.limits.earliest
+    for pulse in pulses:
+        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
+            return False
+        ready = pulse.end + windows.limits.gap
+    return True
 
 
 def solve(

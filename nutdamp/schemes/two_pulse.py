@@ -19,6 +19,7 @@ from nutdamp.physics import damping, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, trim
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
 from nutdamp.schemes.windows import Windows
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
@@ -73,7 +74,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
         wait = turns * halves.wait
         for start in _starts(windows, spacecraft.limits.earliest, on_times, wait):
             pulses = _pair(spacecraft, torquer, halves, start, wait, on_times)
-            if _allowed(windows, pulses) and (best is None or pulses[1].end < best[1].end):
+            if trim.keeps_limits(spacecraft, pulses) and (best is None or pulses[1].end < best[1].end):
                 best = pulses
         if best is not None:
             break
@@ -82,9 +83,9 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
             f"together; horizon ({windows.horizon:.4g} s), gap and blackout windows leave no room for both"
         )
-    if torquer.torque is None or options.literal:
+    if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
-    return _trim_steered(spacecraft, torquer, best)
+    return trim.refine(spacecraft, Schedule(best), count=2, momentum=True)
 
 
 def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
@@ -132,39 +133,6 @@ def _pair(
     return pulses[0], pulses[1]
 
 
-def _trim_steered(spacecraft: Spacecraft, torquer: Steerable, pulses: tuple[Pulse, Pulse]) -> Schedule:
-    """Trim directions, on-times and the second moment on the real widths; the first start stays."""
-    torque = torquer.torque
-    assert torque is not None
-    start = pulses[0].start
-
-    def build(x: Vector) -> Schedule:
-        first = steerable_pulse(torquer, start + 0.5 * x[0], x[1], impulse=torque * x[0])
-        return Schedule((first, steerable_pulse(torquer, x[2], x[4], impulse=torque * x[3])))
-
-    angles = [math.atan2(pulse.impulse[1], pulse.impulse[0]) for pulse in pulses]
-    x0 = np.array([pulses[0].on_time, angles[0], pulses[1].t, pulses[1].on_time, angles[1]])
-    pace = 1.0 / abs(spacecraft.spin)
-    scale = np.array([x0[0], 1.0, pace, x0[3], 1.0])
-    lower = np.array([0.0, -np.inf, -np.inf, 0.0, -np.inf])
-    x, _ = trim.solve(lambda x: trim.misses(spacecraft, build(x)), x0, scale, lower, np.full(5, np.inf))
-    windows = Windows(spacecraft)
-    x[0], x[3] = (windows.on_time(on_time, 0.0, math.inf) for on_time in (x[0], x[3]))
-    x[2] = windows.nearest_tick(x[2] - 0.5 * x[3]) + 0.5 * x[3]
-    trimmed = build(x)
-    return trimmed if _allowed(windows, trimmed.pulses) else Schedule(pulses)
-
-
-def _allowed(windows: Windows, pulses: tuple[Pulse, ...]) -> bool:
-    """Whether both pulses keep the limits."""
-    ready = windows.limits.earliest
-    for pulse in pulses:
-        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
-            return False
-        ready = pulse.end + windows.limits.gap
-    return True
-
-
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
@@ -175,8 +143,8 @@ class Candidate(NamedTuple):
     cost: float
     end: float
     channels: tuple[Channel, Channel]
-    x: tuple[float, float, float, float]
-    """Centre and on-time of the first pulse, centre and on-time of the second, s."""
+    timing: tuple[tuple[float, float], tuple[float, float]]
+    """Centre and on-time of both pulses, s."""
     miss: float
     """ψ, rad."""
     factor: float
@@ -199,7 +167,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) ->
     best: tuple[float, Schedule] | None = None
     for candidate in [*near, *others][:SHORTLIST]:
         made, left = _trimmed(spacecraft, candidate, options.literal)
-        if _allowed(Windows(spacecraft), made.pulses) and (best is None or left < CLEARLY * best[0]):
+        if trim.keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
             best = left, made
             if left <= EXACT:
                 break
@@ -210,27 +178,13 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) ->
 
 def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, trimmed on the real widths and made commandable, and its flown residual in rad."""
-    one, two = candidate.channels
-    windows = Windows(spacecraft)
-
-    def build(x: Vector) -> Schedule:
-        return Schedule((channel_pulse(one, x[0], x[1]), channel_pulse(two, x[2], x[3])))
-
-    x = np.array(candidate.x)
+    pulses = tuple(
+        trim.commandable(spacecraft, channel_pulse(channel, t, on_time))
+        for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
+    )
+    made = Schedule(pulses)
     if not literal:
-        pace = 1.0 / abs(spacecraft.spin)
-        x, _ = trim.solve(
-            lambda x: trim.misses(spacecraft, build(x)),
-            x,
-            np.array([pace, x[1], pace, x[3]]),
-            np.array([0.0, one.min_on_time, 0.0, two.min_on_time]),
-            np.array([np.inf, one.max_on_time, np.inf, two.max_on_time]),
-        )
-    for index, channel in ((0, one), (2, two)):
-        on_time = windows.on_time(x[index + 1], channel.min_on_time, channel.max_on_time)
-        x[index] = windows.nearest_tick(x[index] - 0.5 * on_time) + 0.5 * on_time
-        x[index + 1] = on_time
-    made = build(x)
+        made = trim.refine(spacecraft, made, count=2, momentum=True)
     left = float(np.linalg.norm(trim.misses(spacecraft, made)))
     return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
 
@@ -323,7 +277,7 @@ def _place(
         first += max(math.ceil((earliest + 0.5 * on_times[0] - first) / period), 0) * period
     while first + wait + 0.5 * on_times[1] <= windows.horizon:
         pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-        if _allowed(windows, pulses):
+        if trim.keeps_limits(spacecraft, pulses):
             made = Schedule(pulses)
             cost = made.total_impulse if made.propellant is None else made.propellant
             return Candidate(
@@ -331,7 +285,7 @@ def _place(
                 cost,
                 made.end,
                 (one, two),
-                (first, on_times[0], first + wait, on_times[1]),
+                ((first, on_times[0]), (first + wait, on_times[1])),
                 miss,
                 factor,
             )

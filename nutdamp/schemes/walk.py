@@ -5,10 +5,12 @@ from __future__ import annotations
 import cmath
 import math
 
-from nutdamp.physics import damping, rates
+import numpy as np
+
+from nutdamp.physics import damping, forced, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.windows import SLACK, Windows
-from nutdamp.spacecraft import Channel, Spacecraft, Steerable
+from nutdamp.spacecraft import Channel, Disturbance, Spacecraft, Steerable
 
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
@@ -53,31 +55,59 @@ class Walk:
         rate = abs(self.a * self.spin)
         return 2.0 * math.pi / rate if rate > 0.0 else math.inf
 
+    @property
+    def uniform(self) -> bool:
+        """Whether ω turns in the body at a constant rate between pulses."""
+        return not self.spacecraft.disturbances
+
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
-        return self.omega * cmath.exp(-1j * self.a * self.spin * (time - self.now))
+        since = time - self.now
+        angle = self.a * (self.spin + 0.5 * self.spacecraft.spin_drift * since) * since
+        free = self.omega * cmath.exp(self.spacecraft.growth * since - 1j * angle)
+        if self.uniform:
+            return free
+        return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)
+
+    def _driven(self, disturbance: Disturbance, since: float) -> complex:
+        """What a turning disturbance has added to ω since the last pulse (`forced.rotating_torques` for one)."""
+        if disturbance.transverse == 0.0:
+            return 0.0 + 0.0j
+        torque = disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)
+        driven = forced.rotating_torques(
+            np.array([since]), 0.0, self.spin, self.A, self.C, np.array([torque]), np.array([disturbance.rate])
+        )
+        return complex(driven[0])
 
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
         axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
-        factor = rates.width_factor(self.a, self.spin, axial / self.C, pulse.on_time)
+        drift = self.spacecraft.spin_drift
+        spin = self.spin + drift * (pulse.start - self.now)
+        factor = rates.width_factor(
+            self.a, spin, axial / self.C, pulse.on_time, growth=self.spacecraft.growth, drift=drift
+        )
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
     def left_after(self, pulse: Pulse) -> float:
         """What would be left, N m s, if ``pulse`` were fired next."""
         return abs(self.A * self.omega_at(pulse.t) + self.acts(pulse))
 
+    def helps(self, pulse: Pulse) -> bool:
+        """Whether less is left with ``pulse`` than without."""
+        return self.left_after(pulse) < abs(self.A * self.omega_at(pulse.t))
+
     def fire(self, pulse: Pulse) -> None:
         """Take ``pulse`` into the schedule."""
         self.omega = self.omega_at(pulse.t) + self.acts(pulse) / self.A
-        self.spin += float(pulse.impulse[2]) / self.C
+        self.spin += float(pulse.impulse[2]) / self.C + self.spacecraft.spin_drift * (pulse.t - self.now)
         self.now = pulse.t
         self.ready = pulse.end + self.spacecraft.limits.gap
         self.pulses.append(pulse)
 
-    def schedule(self, *notes: str) -> Schedule:
+    def schedule(self) -> Schedule:
         """What has been chosen."""
-        return Schedule(tuple(self.pulses), notes)
+        return Schedule(tuple(self.pulses))
 
     def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
         """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
@@ -98,6 +128,8 @@ class Walk:
         while True:
             turns = math.ceil((ready + 0.5 * on_time - first - slack) / self.period)
             centre = first + turns * self.period
+            if not self.uniform:
+                centre = self._opposed_near(channel, centre, on_time)
             start = centre - 0.5 * on_time
             if self.windows.limits.tick is not None:
                 start = self.windows.nearest_tick(start)
@@ -110,6 +142,15 @@ class Walk:
                 break
             ready = max(free, ready + SLACK)
         return channel_pulse(channel, centre, on_time) if self.windows.allows(start, on_time, self.ready) else None
+
+    def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
+        """Moment near ``centre`` at which a disturbed ω opposes the pulse: each step mends the angle still missing."""
+        for _ in range(20):
+            turn = damping.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
+            centre += turn / (self.a * self.spin)
+            if abs(turn) < ALIGNED:
+                break
+        return centre
 
     def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
         """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
