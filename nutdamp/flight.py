@@ -115,7 +115,7 @@ class Flight:
         after = attitude.rotate(self.settled.quaternion, body)
         shift = float(attitude.angle_between(before, after))
         omega, spin = abs(self.settled.omega), self.settled.spin * self._sense
-        nutation = _largest_nutation(self.moments, body, self._sense)
+        nutation = largest_nutation(self.moments, body, self._sense)
         body_cone = math.atan2(omega, spin)
         tilt = math.atan2(math.hypot(body[0], body[1]), self._sense * body[2])
         return Residual(nutation, body_cone, tilt - body_cone, shift, shift)
@@ -288,7 +288,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
 
 
-def _largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:
+def largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:
     """Largest angle in rad between H and the spin axis on the torque-free motion through ``momentum`` (body axes).
 
     On the polhode 2T - H²/I3 = Σ H_j² (1/I_j - 1/I3), j = 1, 2, is constant; H is farthest from axis 3 where it

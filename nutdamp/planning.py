@@ -172,6 +172,15 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
     return judged
 
 
+def unrounded(plan_: Plan) -> Schedule | None:
+    """The schedule as it would be with commands of any resolution; None where there is no tick, or no such schedule."""
+    body = plan_.spacecraft
+    if body.limits.tick is None:
+        return None
+    smooth = plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options)
+    return smooth.schedule
+
+
 def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
     """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all."""
     limits, horizon = spacecraft.limits, spacecraft.horizon

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
 
 Vector = NDArray[np.float64]
@@ -241,9 +242,17 @@ class Spacecraft:
 
     @property
     def growth(self) -> float:
-        """Rate 1/τ (1/s) at which energy dissipation lets the nutation grow: prolate positive, oblate negative."""
+        """Rate 1/τ (1/s) at which energy dissipation lets the nutation grow: prolate positive, oblate negative.
+
+        Raises BadRequest where that is faster than the nutation itself.
+        """
         if self.dissipation is None or self.inertia.a == 0.0:
             return 0.0
+        if self.dissipation < self.inertial_period:
+            raise BadRequest(
+                f"dissipation.time_constant: {self.dissipation:.4g} s is shorter than one nutation period "
+                f"({self.inertial_period:.4g} s), within which dissipation must be small"
+            )
         return math.copysign(1.0 / self.dissipation, self.inertia.a)
 
     @property

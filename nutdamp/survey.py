@@ -6,8 +6,8 @@ import cmath
 import math
 from dataclasses import dataclass
 
-from nutdamp.physics import damping, rates
-from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.physics import cones, damping, forced, rates, stability
+from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +72,84 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
         for two in usable
     ]
     return min(pairs, key=lambda pair: abs(pair.miss), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Consequence:
+    """What one disturbance does in the long run.
+
+    ``tilt`` (rad) is the steady angle between H and the spin axis that it forces, Magnus 1970 (13)/(14), K(14), K(15).
+    From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), both
+    angles are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
+    part changes the spin at ``spin_rate`` rad/s².
+    """
+
+    disturbance: Disturbance
+    tilt: float | None
+    beat: float | None
+    beat_period: float
+    resonant: tuple[tuple[float, float], ...]
+    spin_rate: float
+
+
+MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
+"""Nutation angles for which the time is told that a resonant disturbance takes to drive it there."""
+
+
+RESONANT = 3.0
+"""Beat period over horizon from which a disturbance counts as resonant."""
+
+
+def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
+    """What each disturbance does, in the order of the file."""
+    return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
+
+
+def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
+    inertia, spin = spacecraft.inertia, spacecraft.spin
+    A, C = inertia.A, inertia.C
+    spin_rate = one.axial / C
+    if one.transverse == 0.0:
+        return Consequence(one, 0.0, 0.0, math.inf, (), spin_rate)
+    largest, period = forced.beat(A, C, spin, one.transverse, one.rate)
+    # A beat that takes longer than everything planned, several times over, is a resonance for the user.
+    if period > RESONANT * spacecraft.horizon:
+        omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+        times = tuple(
+            (mark, forced.resonant_time(A, C, omega0, spin, one.transverse, mark))
+            for mark in MARKS
+            if mark > spacecraft.nutation
+        )
+        return Consequence(one, None, None, period, times, spin_rate)
+    steady = abs(forced.steady_response(A, C, spin, one.transverse, one.rate))
+    tilt, swell = (cones.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
+    return Consequence(one, float(tilt), float(swell), period, (), spin_rate)
+
+
+@dataclass(frozen=True, slots=True)
+class SpinAxis:
+    """Axis 3 as nature sees it.
+
+    ``kind`` of `stability.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `stability.growth`; ``tilt``
+    (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the
+    despun frame and inertially, K(7), K(10), K(13), rad/s.
+    """
+
+    kind: str
+    exponent: float
+    growth_time: float
+    tilt: float
+    rates: stability.NutationRates
+
+
+def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
+    """Class, stability and nutation rates of the spin axis."""
+    inertia = spacecraft.inertia
+    grows = stability.growth(inertia.moments, spacecraft.spin)
+    return SpinAxis(
+        stability.axis_class(inertia.moments),
+        grows.squared_exponent,
+        grows.growth_time,
+        stability.principal_tilt(inertia.axes),
+        stability.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin),
+    )

@@ -49,9 +49,35 @@ def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
             }
             for steps in survey.channel_steps(spacecraft)
         ],
+        "spin_axis": _spin_axis_json(spacecraft),
+        "disturbances": [
+            {
+                "name": found.disturbance.name or None,
+                "forced_tilt_deg": None if found.tilt is None else math.degrees(found.tilt),
+                "beat_deg": None if found.beat is None else math.degrees(found.beat),
+                "beat_period_s": found.beat_period,
+                "reaches": [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in found.resonant],
+                "spin_rate_rad_s2": found.spin_rate,
+            }
+            for found in survey.consequences(spacecraft)
+        ],
         "two_pulse": {
             "mounting_angle_deg": math.degrees(survey.mounting_angle(spacecraft)),
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
             "nearest_off_deg": None if pair is None else abs(math.degrees(pair.miss)),
         },
+    }
+
+
+def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    found = survey.spin_axis(spacecraft)
+    return {
+        "class": found.kind,
+        "squared_exponent_1_s2": found.exponent,
+        "growth_time_s": found.growth_time,
+        "tilt_deg": math.degrees(found.tilt),
+        "nutation_rate_body_rad_s": found.rates.body,
+        "nutation_rate_despun_rad_s": found.rates.despun,
+        "nutation_rate_inertial_rad_s": found.rates.inertial,
+        "dissipation_growth_1_s": spacecraft.growth,
     }

@@ -6,6 +6,7 @@ One table holds the wording of pydantic's errors.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterator
 from typing import Any, get_args
 
@@ -72,9 +73,9 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath) -> Itera
 
 
 def _meant(key: str, fields: list[str]) -> str | None:
-    """The field that a misspelt key stands for, whatever its case."""
+    """The field that a misspelt key or word stands for, whatever its case."""
     folded = {field.casefold(): field for field in fields}
-    close = difflib.get_close_matches(key.casefold(), folded, n=1)
+    close = difflib.get_close_matches(key.casefold(), folded, n=1, cutoff=0.7)
     return folded[close[0]] if close else None
 
 
@@ -118,13 +119,19 @@ def _count(details: ErrorDetails) -> str:
     return f"{found} {'entry stands' if found == 1 else 'entries stand'} where {wanted} are wanted"
 
 
+def _choice(details: ErrorDetails) -> str:
+    expected, given = details["ctx"]["expected"], details["input"]
+    meant = _meant(given, re.findall("'([^']*)'", expected)) if isinstance(given, str) else None
+    return _stands(details, expected) + (f"; did you mean {shown(meant)}?" if meant else "")
+
+
 _WORDING: dict[str, Callable[[ErrorDetails], str]] = {
     "missing": lambda details: f"missing; {_description(details['loc'])}",
     "model_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
     "dict_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
     "list_type": lambda details: _stands(details, "a list, [value, …],"),
     "int_type": lambda details: _stands(details, "a whole number"),
-    "literal_error": lambda details: _stands(details, details["ctx"]["expected"]),
+    "literal_error": _choice,
     "greater_than_equal": lambda details: _stands(details, f"at least {details['ctx']['ge']}"),
     "less_than_equal": lambda details: _stands(details, f"at most {details['ctx']['le']}"),
     "string_type": _text,

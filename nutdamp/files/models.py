@@ -11,7 +11,15 @@ import operator
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Strict,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from nutdamp.units import KINDS, parse, pattern, shown
@@ -63,6 +71,23 @@ class Quantity:
         return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
 
 
+class AxialShorthand:
+    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
+
+    single = Quantity("torque")
+
+    def check(self, value: object, vector: core_schema.ValidatorFunctionWrapHandler) -> object:
+        """Three components; raises ValueError, which says what would be right."""
+        return vector(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        single = self.single.__get_pydantic_json_schema__(schema, handler)
+        return {"anyOf": [handler(schema), *single["anyOf"]]}
+
+
 def _epoch(text: str) -> str:
     """Refuses what is not a date and a time; their text is passed on as it stands."""
     try:
@@ -94,6 +119,7 @@ Rates = Annotated[list[Rate], _THREE]
 Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
 Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
 Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
+DisturbingTorques = Annotated[Torques, AxialShorthand()]
 Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
 Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Field(min_length=4, max_length=4)]
 Window = Annotated[list[Time], Field(min_length=2, max_length=2)]
@@ -215,6 +241,46 @@ class LimitsSection(Section):
     blackout: list[Window] = Field(default=[], description="Windows [begin, end], s, in which no pulse may be on.")
 
 
+_TURNING = [{"required": ["rate"]}, {"required": ["fixed_in"]}]
+_KINDS: list[Any] = [
+    {"properties": {"kind": {"const": "constant"}, "torque": {"type": "array"}}, "not": {"anyOf": _TURNING}},
+    {"properties": {"kind": {"const": "rotating"}, "torque": {"type": "array"}}, "oneOf": _TURNING},
+    {"properties": {"kind": {"const": "axial"}}, "required": ["kind"], "not": {"anyOf": _TURNING}},
+]
+"""JSON Schema for the kinds of a disturbance, the first two also without the key."""
+
+
+class DisturbanceSection(Section):
+    """A torque that nobody commands, in the axes of the file."""
+
+    model_config = ConfigDict(json_schema_extra={"oneOf": _KINDS})
+
+    name: Name | None = Field(default=None, description="Name of the disturbance, for reports.")
+    kind: Literal["constant", "rotating", "axial"] | None = Field(
+        default=None,
+        description="constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
+        "Default: rotating where rate or fixed_in is given, else constant.",
+    )
+    torque: DisturbingTorques = Field(
+        description="Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
+        "of an axial one a single torque."
+    )
+    rate: Rate | None = Field(
+        default=None, description="Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s."
+    )
+    fixed_in: Literal["inertial"] | None = Field(
+        default=None, description="inertial: a rotating torque nearly fixed in space; its rate is minus the spin."
+    )
+
+
+class DissipationSection(Section):
+    """Energy dissipation within the body, by flexible parts or liquids."""
+
+    time_constant: PositiveTime = Field(
+        description="Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e."
+    )
+
+
 class SpacecraftFile(Section):
     """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers are SI."""
 
@@ -237,6 +303,10 @@ class SpacecraftFile(Section):
         description="Names of thrusters that fire together; without it each thruster is a channel of its own.",
     )
     steerable: SteerableSection | None = Field(default=None, description="A torquer for any transverse axis.")
+    disturbances: list[DisturbanceSection] = Field(default=[], description="Torques that nobody commands.")
+    dissipation: DissipationSection | None = Field(
+        default=None, description="Energy dissipation; without it the body is rigid."
+    )
     requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
     limits: LimitsSection | None = Field(default=None, description="Limits that every schedule keeps.")
 

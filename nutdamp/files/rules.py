@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from nutdamp.files.models import SMALLEST
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
+from nutdamp.physics import stability
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
 from nutdamp.units import parse, shown
@@ -75,7 +76,7 @@ class Facts:
 def findings(root: Node) -> Iterator[Finding]:
     """Everything wrong between the keys of a file."""
     facts = Facts(root)
-    for rule in (_names, _inertia, _motion, _attitude, _thrusters, _channels, _limits):
+    for rule in (_names, _inertia, _motion, _attitude, _thrusters, _channels, _disturbances, _dissipation, _limits):
         yield from rule(facts)
 
 
@@ -96,20 +97,21 @@ def _norm(vector: Vector) -> float:
 
 
 def _names(facts: Facts) -> Iterator[Finding]:
-    paths: list[KeyPath] = [("name",), *(("thrusters", index, "name") for index, _ in facts.children("thrusters"))]
-    named = [(path, facts.text(*path), False) for path in paths]
+    lists = ("thrusters", "disturbances")
+    entries: list[KeyPath] = [(key, index, "name") for key in lists for index, _ in facts.children(key)]
+    named = [(path, facts.text(*path), False) for path in (("name",), *entries)]
     named += [(("channels", key), str(key), True) for key, _ in facts.children("channels")]
     for path, name, at_key in named:
         if name is None:
             continue
         if not name.strip() or not name.isprintable():
             yield Finding(path, f"{shown(name)} is no name; printable characters are wanted", at_key)
-        elif name == STEERABLE and path != ("name",):
+        elif name == STEERABLE and path[0] in ("thrusters", "channels"):
             yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
-    first: dict[str, KeyPath] = {}
-    for path, name, _ in named[1 : len(paths)]:
-        if name is not None and first.setdefault(name, path) != path:
-            other = first[name]
+    first: dict[tuple[str | int, str], KeyPath] = {}
+    for path in entries:
+        name = facts.text(*path)
+        if name is not None and (other := first.setdefault((path[0], name), path)) != path:
             line = facts.root.place_of(other)[0]
             yield Finding(path, f"duplicate name; {dotted(other[:2])} has it already (line {line}); take another")
 
@@ -120,7 +122,7 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         if len(keys) > 1:
             yield Finding(("inertia", "tensor"), "stands beside A or C; keep either tensor, or A and C", True)
         tensor = _tensor(facts)
-        fault = None if tensor is None else _tensor_fault(tensor)
+        fault = None if tensor is None else _tensor_fault(tensor) or _spin_axis_fault(tensor, _spin(facts))
         if fault is not None:
             yield fault
     elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict):
@@ -152,12 +154,39 @@ def _tensor_fault(tensor: Vector) -> Finding | None:
         return Finding((*path, row, column), problem)
     moments = np.linalg.eigvalsh(symmetric(tensor))
     values = ", ".join(f"{moment:g}" for moment in moments)
-    if moments[0] <= max(SMALLEST, 1e-14 * moments[2]):
-        return Finding(path, f"principal moments {values} kg m^2; all three must be above 0")
+    least = max(SMALLEST, 1e-14 * moments[2])
+    if moments[0] <= least:
+        wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= least)
+        return Finding(path, f"principal moments {values} kg m^2; all three must be above 0, not {wrong}")
     if moments[2] > (moments[0] + moments[1]) * (1 + SYMMETRIC):
         problem = f"principal moments {values} kg m^2: the largest must not exceed the sum of the other two"
         return Finding(path, f"{problem} (triangle inequality)")
     return None
+
+
+def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
+    """What makes free spin about principal axis 3 unstable, and how fast at this ``spin``, if known."""
+    moments = principal_axes(symmetric(tensor))[0]
+    named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
+    values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
+    kind, growth = stability.axis_class(moments), ""
+    if kind == "degenerate":
+        problem, growth = f"the same principal moment as just one other axis ({values} kg m^2)", " and drifts evenly"
+    elif kind == "intermediate":
+        problem = f"the middle principal moment ({values} kg m^2)"
+        if spin is not None:
+            growth = f" and grows e-fold in {stability.growth(moments, spin).growth_time:.2g} s"
+    else:
+        return None
+    cure = "spin about the axis of the smallest or largest moment"
+    problem = f"the spin axis has {problem}: free spin about it is unstable{growth}; {cure}"
+    return Finding(("inertia", "tensor"), problem)
+
+
+def _spin(facts: Facts) -> float | None:
+    """The rate about principal axis 3; None where it is zero or cannot be read."""
+    spin = _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
+    return spin if spin is not None and abs(spin) >= SMALLEST else None
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
@@ -295,6 +324,69 @@ def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Itera
     if least > most and all(shortest <= longest for shortest, longest in times):
         problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
         yield Finding(path, f"{problem}; let them fire in channels of their own")
+
+
+def disturbance_kind(kind: str | None, turns: bool) -> str:
+    """Kind of a disturbance that says ``kind`` or nothing; ``turns``: rate or fixed_in is given."""
+    return kind or ("rotating" if turns else "constant")
+
+
+def _disturbances(facts: Facts) -> Iterator[Finding]:
+    for index, node in facts.children("disturbances"):
+        if isinstance(node.value, dict):
+            path = ("disturbances", index)
+            turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
+            kind = disturbance_kind(facts.text(*path, "kind"), bool(turning))
+            if facts.has(*path, "kind") and facts.text(*path, "kind") is None:
+                kind = ""  # what it is cannot be read
+            yield from _turning(facts, path, kind, turning)
+            yield from _disturbing_torque(facts, path, kind)
+
+
+def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iterator[Finding]:
+    """What is wrong with rate and fixed_in of a disturbance, of which ``turning`` are given."""
+    if kind in ("constant", "axial"):
+        for key in turning:
+            yield Finding((*path, key), f"goes with kind rotating, not {kind}; leave one of the two out", True)
+        return
+    if len(turning) == 2:
+        yield Finding((*path, "fixed_in"), "stands beside rate; keep one of the two", True)
+    elif kind == "rotating" and not turning:
+        yield Finding((*path, "rate"), "missing; give rate: … rad/s, as seen in the body, or fixed_in: inertial")
+    rate = facts.number("rate", *path, "rate")
+    if rate is not None and abs(rate) < SMALLEST:
+        yield Finding((*path, "rate"), "zero; for a torque fixed in the body say kind: constant and leave rate out")
+    if facts.text(*path, "fixed_in") == "body":
+        problem = "'body' stands where 'inertial' is wanted; for a torque fixed in the body say kind: constant"
+        yield Finding((*path, "fixed_in"), f"{problem} and leave fixed_in out")
+
+
+def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Finding]:
+    single, torque = facts.number("torque", *path, "torque"), facts.vector("torque", 3, *path, "torque")
+    path = (*path, "torque")
+    if single is not None and kind in ("constant", "rotating"):
+        cure = "; or, for a torque about axis 3 only, kind: axial" if kind == "constant" else ""
+        yield Finding(path, f"a single torque stands where three components, [M1, M2, M3], are wanted{cure}")
+    elif single is not None and abs(single) < SMALLEST:
+        yield Finding(path, "zero; a torque other than 0 is wanted")
+    if torque is None:
+        return
+    size = _norm(torque)
+    if size < SMALLEST:
+        yield Finding(path, "zero; at least one component other than 0 is wanted")
+    elif kind == "axial" and _norm(torque[:2]) > CANCELLED * size:
+        problem = "transverse components stand in an axial torque; [0, 0, M3] is wanted, or kind: constant"
+        yield Finding(path, problem)
+    elif kind == "rotating" and abs(torque[2]) > CANCELLED * size:
+        problem = "a rotating torque has no part about axis 3; 0 is wanted"
+        yield Finding((*path, 2), f"{problem}, and this part as a disturbance of its own, kind: axial")
+
+
+def _dissipation(facts: Facts) -> Iterator[Finding]:
+    time_constant = facts.number("time", "dissipation", "time_constant")
+    if time_constant == 0.0:
+        cure = "a time above 0 is wanted, or leave dissipation out for none"
+        yield Finding(("dissipation", "time_constant"), f"zero; {cure}")
 
 
 def _limits(facts: Facts) -> Iterator[Finding]:

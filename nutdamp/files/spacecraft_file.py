@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from nutdamp.files.faults import read_contents
 from nutdamp.files.models import (
     AttitudeSection,
+    DisturbanceSection,
     InertiaSection,
     LimitsSection,
     RequirementSection,
@@ -20,10 +21,20 @@ from nutdamp.files.models import (
     ThrusterSection,
     json_schema,
 )
-from nutdamp.files.rules import force_vector, symmetric
+from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
 from nutdamp.files.yaml_tree import read_text
 from nutdamp.physics.inertia import principal_axes
-from nutdamp.spacecraft import Attitude, Channel, Inertia, Limits, Requirement, Spacecraft, Steerable, Thruster
+from nutdamp.spacecraft import (
+    Attitude,
+    Channel,
+    Disturbance,
+    Inertia,
+    Limits,
+    Requirement,
+    Spacecraft,
+    Steerable,
+    Thruster,
+)
 
 __all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spacecraft"]
 
@@ -42,12 +53,13 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
     """
     contents = read_contents(text, name)
     inertia = _inertia(contents.inertia)
+    omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     return Spacecraft(
         name=contents.name,
         inertia=inertia,
-        omega0=_rates(contents, inertia),
+        omega0=omega0,
         mass=contents.mass,
         attitude=_attitude(contents.attitude),
         channels=tuple(
@@ -56,6 +68,8 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
         steerable=_steerable(contents.steerable),
         requirement=_requirement(contents.requirement),
         limits=_limits(contents.limits),
+        disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
+        dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
     )
 
 
@@ -107,6 +121,22 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         min_on_time=entry.min_on_time,
         max_on_time=math.inf if entry.max_on_time is None else entry.max_on_time,
     )
+
+
+def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
+    """A disturbance in principal axes; ``spin`` is ω3 at t = 0, rad/s.
+
+    What is fixed in space turns in the body at minus the spin, Magnus 1970 (27). Where the principal axes are
+    tilted, a transverse torque has a part about axis 3, which does not turn.
+    """
+    torque = np.array(entry.torque)
+    if not inertia.aligned:
+        torque = inertia.axes.T @ torque
+        torque[np.abs(torque) <= CANCELLED * math.hypot(*torque)] = 0.0
+    rate = 0.0
+    if disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None) == "rotating":
+        rate = -spin if entry.rate is None else entry.rate
+    return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
 def _attitude(section: AttitudeSection | None) -> Attitude | None:

@@ -25,6 +25,9 @@ ORDER = 22
 FLAT = 0.02
 """Cosine of the nutation angle below which dissipation counts as having reached flat spin (88.9°)."""
 
+LONGEST = 3e5
+"""Radians that one integration may run over: some two hundred thousand steps."""
+
 REMAINDER = 2.0**-53
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
 
@@ -82,7 +85,7 @@ def integrate(
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    Raises Infeasible where dissipation drives the body into flat spin.
+    Raises Infeasible where dissipation drives the body into flat spin, and for motions over more than `LONGEST` rad.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
@@ -95,6 +98,11 @@ def integrate(
             _refuse_flat_spin(inertia * rates, now)
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
         pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
+        if pace * (end - now) > LONGEST:
+            raise Infeasible(
+                f"the motion from {now:.4g} s to {end:.4g} s runs over {pace * (end - now):.2g} rad, too many to be "
+                f"integrated; shorten the time, or look for a torque or rate that is too large"
+            )
         unit = 1.0 / pace if pace > 0.0 else end - now
         series = _series(moments, acceleration, forcing, now, np.concatenate([rates, quaternion]), unit)
         step = min(_reach(series, unit) * unit, end - now)
@@ -119,14 +127,14 @@ def _series(
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
     dω1/dt = (I2 - I3)/I1 ω2 ω3 + M1/I1 and round, Magnus 1970 (1) for three different moments;
-    dq/dt = q (0, ω)/2; dissipation lets ω1, ω2 grow and, with |H| kept, I3 ω3 dω3/dt = -(H1² + H2²)/(τ I3).
+    dq/dt = q (0, ω)/2, and the terms of `_Sink` where energy is dissipated.
     """
     first, second, third = moments
     coupling = ((second - third) / first, (third - first) / second, (first - second) / third)
     series = np.zeros((ORDER + 1, 7))
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
-    given_up: list[float] = []  # series of (H1² + H2²)/(I3² ω3)
+    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -135,24 +143,48 @@ def _series(
         following[0] = step * coupling[0] * w[1, 2]
         following[1] = step * coupling[1] * w[2, 0]
         following[2] = step * coupling[2] * w[0, 1]
-        following[3] = -0.5 * step * (w[4, 0] + w[5, 1] + w[6, 2])
-        following[4] = 0.5 * step * (w[3, 0] + w[5, 2] - w[6, 1])
-        following[5] = 0.5 * step * (w[3, 1] + w[6, 0] - w[4, 2])
-        following[6] = 0.5 * step * (w[3, 2] + w[4, 1] - w[5, 0])
         if k == 0:
             following[:3] += unit * acceleration
         for index, (size, turn) in enumerate(turning):
             following[0] += step * size.real / first
             following[1] += step * size.imag / second
             turning[index] = (size * turn / (k + 1), turn)
-        if forcing.growth != 0.0:
-            following[:2] += step * forcing.growth * series[k, :2]
-            if forcing.keep_momentum:
-                lost = (first**2 * w[0, 0] + second**2 * w[1, 1]) / third**2
-                lost -= sum(series[j, 2] * given_up[k - j] for j in range(1, k + 1))
-                given_up.append(float(lost / series[0, 2]))
-                following[2] -= step * forcing.growth * given_up[k]
+        if sink is not None:
+            following[:3] += step * sink.acceleration(series, k, w)
+            w = series[: k + 1].T @ (series[k::-1, :3] + sink.slip[k::-1])
+        following[3] = -0.5 * step * (w[4, 0] + w[5, 1] + w[6, 2])
+        following[4] = 0.5 * step * (w[3, 0] + w[5, 2] - w[6, 1])
+        following[5] = 0.5 * step * (w[3, 1] + w[6, 0] - w[4, 2])
+        following[6] = 0.5 * step * (w[3, 2] + w[4, 1] - w[5, 0])
     return series
+
+
+class _Sink:
+    """Energy dissipation inside the body, as series: what it does to H in body axes, and how the body turns under it.
+
+    D = (H1, H2, -(H1² + H2²)/H3)/τ is added to dH/dt in the body (the linear law drops its third part). An internal
+    process cannot turn H in space: the body slips against it at D × H/|H|², beside ω = H/I.
+    """
+
+    def __init__(self, moments: Array, forcing: Forcing) -> None:
+        self.moments, self.forcing = moments, forcing
+        self.drive = np.zeros((ORDER, 3))  # D
+        self.slip = np.zeros((ORDER, 3))  # D × H/|H|²
+        self.lost = np.zeros(ORDER)  # (H1² + H2²)/H3
+
+    def acceleration(self, series: Array, k: int, w: Array) -> Array:
+        """Coefficient k of D/I, (3,); makes that of ``slip`` on the way. ``w`` as in `_series`."""
+        first, second = self.moments[:2]
+        momentum = series[: k + 1, :3] * self.moments
+        self.drive[k, :2] = self.forcing.growth * momentum[k, :2]
+        if self.forcing.keep_momentum:
+            transverse = first**2 * w[0, 0] + second**2 * w[1, 1]
+            self.lost[k] = (transverse - momentum[1:, 2] @ self.lost[k - 1 :: -1][:k]) / momentum[0, 2]
+            self.drive[k, 2] = -self.forcing.growth * self.lost[k]
+        crossed = np.cross(self.drive[: k + 1], momentum[::-1]).sum(axis=0)
+        squares = np.array([momentum[: j + 1].ravel() @ momentum[j::-1].ravel() for j in range(k + 1)])
+        self.slip[k] = (crossed - squares[1:] @ self.slip[k - 1 :: -1][:k]) / squares[0]
+        return np.asarray(self.drive[k] / self.moments)
 
 
 def _reach(series: Array, unit: float) -> float:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp import survey
-from nutdamp.report.layout import columns, facts
+from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header
 from nutdamp.report.text import degrees, duration, vector
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -17,20 +18,53 @@ from nutdamp.spacecraft import Channel, Spacecraft
 
 def check_screen(spacecraft: Spacecraft) -> RenderableType:
     """Everything that ``check`` shows of one valid file."""
-    parts: list[RenderableType] = [header(spacecraft)]
-    if not spacecraft.inertia.aligned:
-        parts.append(_axes(spacecraft))
+    parts: list[RenderableType] = [header(spacecraft, _spin_axis(spacecraft))]
     if spacecraft.channels:
         parts += [Text(), _channels(spacecraft)]
+    if spacecraft.disturbances:
+        parts += [Text(), _disturbances(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
     return Group(*parts)
 
 
-def _axes(spacecraft: Spacecraft) -> RenderableType:
-    table = facts()
-    for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
-        table.add_row(f"principal axis {number}", f"{vector(axis)} in the axes of the file")
+def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    found = survey.spin_axis(spacecraft)
+    stable = f"stable, p² = {found.exponent:.4g} / s²" if found.exponent < 0.0 else "a sphere, no axis is special"
+    warning = " (not under dissipation)" if found.kind == "minimum" else ""
+    yield "spin axis", f"{found.kind} moment of inertia; {stable}{warning}"
+    body, despun, inertial = found.rates
+    yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
+    if spacecraft.growth != 0.0:
+        what = "grows" if spacecraft.growth > 0.0 else "decays"
+        yield "dissipation", f"the nutation {what} e-fold in {duration(abs(1.0 / spacecraft.growth))}"
+    if not spacecraft.inertia.aligned:
+        yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
+        for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
+            yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
+
+
+def _disturbances(spacecraft: Spacecraft) -> Table:
+    """The forced tilt, the beat, or the times to reach a cone at resonance."""
+    table = columns("disturbance", "does", text=("does",))
+    for number, found in enumerate(survey.consequences(spacecraft), start=1):
+        name = found.disturbance.name or f"number {number}"
+        table.add_row(name, "; ".join(_consequences(found)))
     return table
+
+
+def _consequences(found: survey.Consequence) -> list[str]:
+    texts = []
+    if found.resonant or found.tilt is None:
+        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in found.resonant)
+        texts.append(f"resonant with the nutation: drives it to {reached}")
+    elif found.disturbance.transverse != 0.0:
+        texts.append(
+            f"forces a tilt of {degrees(found.tilt)}; from rest the nutation beats up to {degrees(found.beat)} "
+            f"every {duration(found.beat_period)}"
+        )
+    if found.spin_rate != 0.0:
+        texts.append(f"changes the spin by {found.spin_rate:.4g} rad/s²")
+    return texts
 
 
 def _channels(spacecraft: Spacecraft) -> Table:

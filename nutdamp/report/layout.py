@@ -9,7 +9,7 @@ def facts() -> Table:
     """Names to the left, what they are to the right."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim")
-    table.add_column()
+    table.add_column(overflow="fold")
     return table
 
 

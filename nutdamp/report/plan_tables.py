@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -32,8 +32,8 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     return Group(*parts)
 
 
-def header(spacecraft: Spacecraft) -> RenderableType:
-    """Name and derived quantities of the spacecraft at t = 0."""
+def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
+    """Name and derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
     A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
     body, space = cones.body_cone(omega, spin), cones.space_cone(A, C, omega, spin)
@@ -49,8 +49,12 @@ def header(spacecraft: Spacecraft) -> RenderableType:
     )
     turns = "stands still in the body" if math.isinf(spacecraft.body_period) else duration(spacecraft.body_period)
     table.add_row("nutation period", f"{turns} in the body, {duration(spacecraft.inertial_period)} inertially")
-    table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; no schedule needs less")
+    alone = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
+    floor = "no schedule needs less" if alone else "the floor of a symmetric body left alone"
+    table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     table.add_row("actuators", _actuators(spacecraft))
+    for name, value in more:
+        table.add_row(name, value)
     return Group(Text(spacecraft.name, style="bold"), table)
 
 

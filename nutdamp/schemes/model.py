@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nutdamp.physics import forced
+from nutdamp.physics import forced, triaxial
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Channel, Disturbance, Inertia, Spacecraft, Steerable, Thruster, Vector
 
@@ -53,9 +53,7 @@ def model_of(spacecraft: Spacecraft) -> Model:
         return Model(spacecraft, undisturbed, np.ones(2))
     first, second, C = inertia.moments
     # a ω3 is the true nutation rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
-    square = (first - C) * (second - C) / (first * second)
-    a = math.copysign(math.sqrt(max(square, 0.0)), first - C)
-    A = C / (1.0 - a)
+    A = C / (1.0 - triaxial.body_nutation_rate(inertia.moments, 1.0))
     circle = (first * (first - C) / (second * (second - C))) ** 0.25
     scale = np.array([circle, 1.0 / circle])
     stretch = scale * A / np.array([first, second])  # for torques and impulses

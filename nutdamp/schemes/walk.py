@@ -15,6 +15,9 @@ from nutdamp.spacecraft import Channel, Disturbance, Spacecraft, Steerable
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
 
+FOR_EVER = 300.0
+"""Exponent at which a growing nutation has lost all meaning, short of overflow."""
+
 
 class Walk:
     """The transverse rate as it will be, and the pulses chosen so far.
@@ -64,7 +67,8 @@ class Walk:
         """ω at ``time`` s if nothing more is fired."""
         since = time - self.now
         angle = self.a * (self.spin + 0.5 * self.spacecraft.spin_drift * since) * since
-        free = self.omega * cmath.exp(self.spacecraft.growth * since - 1j * angle)
+        grown = min(self.spacecraft.growth * since, FOR_EVER)
+        free = self.omega * cmath.exp(grown - 1j * angle)
         if self.uniform:
             return free
         return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)

@@ -152,11 +152,29 @@ def test_a_mutated_example_is_read_or_refused(data: bytes, tmp_path: Path) -> No
 
 
 SECTIONS = ["inertia", "omega0", "state", "attitude", "thrusters", "channels", "steerable", "requirement", "limits"]
+SECTIONS += ["disturbances", "dissipation"]
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats() | st.sampled_from(["3 kg", "x", "1 s"]),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=4),
     max_leaves=6,
 )
+
+
+DISTURBANCES = st.fixed_dictionaries(
+    {"torque": VALUES | st.lists(st.floats(-1, 1) | st.just(0), min_size=3, max_size=3)},
+    optional={
+        "name": st.sampled_from(["a", "b", ""]) | VALUES,
+        "kind": st.sampled_from(["constant", "rotating", "axial", "x"]) | VALUES,
+        "rate": st.just("-3 rad/s") | VALUES,
+        "fixed_in": st.sampled_from(["inertial", "body"]) | VALUES,
+    },
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(entries=st.lists(DISTURBANCES, max_size=3))
+def test_any_disturbances_are_read_or_refused(entries: list[object]) -> None:
+    judge(lambda: read_spacecraft(f"{BASE}disturbances: {json.dumps(entries)}", "f.yaml"))
 
 
 @settings(max_examples=200, deadline=None)

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Limits, Spacecraft
+from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Disturbance, Limits, Spacecraft
 
 EVERYTHING = """\
 name: Sounder-1
@@ -76,6 +76,7 @@ def test_the_least_a_file_must_say() -> None:
         None,
     )
     assert craft.limits == Limits()
+    assert (craft.disturbances, craft.dissipation, craft.growth) == ((), None, 0.0)
     assert craft.torquer is not None
     assert craft.torquer.torque is None
 
@@ -220,6 +221,87 @@ def test_the_state_of_a_tensor_file_is_about_its_principal_axis() -> None:
     assert craft.nutation == pytest.approx(math.radians(5), rel=1e-12)
 
 
+BODY = "name: S\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0.2, -3]\n"
+
+
+@pytest.mark.parametrize(
+    ("entry", "disturbance"),
+    [
+        ("{name: leak, torque: [20 mN m, 0.1, 1e-3]}", Disturbance(0.02 + 0.1j, 0.001, 0.0, "leak")),
+        ("{kind: constant, torque: [0, 0, -1]}", Disturbance(0j, -1.0)),
+        ("{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}", Disturbance(0.005 - 1j, 0.0, 2 * math.pi)),
+        ("{torque: [0, 2, 0], rate: -3}", Disturbance(2j, 0.0, -3.0)),
+        ("{kind: rotating, torque: [1, 0, 0], fixed_in: inertial}", Disturbance(1 + 0j, 0.0, 3.0)),
+        ("{torque: [1, 0, 0], fixed_in: inertial}", Disturbance(1 + 0j, 0.0, 3.0)),
+        ("{kind: axial, torque: -1 mN m}", Disturbance(0j, -0.001)),
+        ("{kind: axial, torque: 2}", Disturbance(0j, 2.0)),
+        ("{kind: axial, torque: [0, 0, 2 N m]}", Disturbance(0j, 2.0)),
+        ("{torque: [1, 0, 1e-13], rate: 2}", Disturbance(1 + 0j, 1e-13, 2.0)),  # rounding, but not dropped
+    ],
+)
+def test_disturbances(entry: str, disturbance: Disturbance) -> None:
+    assert read(f"{BODY}disturbances: [{entry}]").disturbances == (disturbance,)
+
+
+def test_an_empty_list_of_disturbances_disturbs_nothing() -> None:
+    assert read(f"{BODY}disturbances: []").disturbances == ()
+
+
+def test_disturbances_keep_their_order_and_may_share_names_with_thrusters() -> None:
+    craft = read(
+        f"{BODY}thrusters: [{{name: T, torque: [1, 0, 0]}}]\n"
+        "disturbances: [{name: T, torque: [1, 0, 0]}, {torque: [0, 1, 0]}, {torque: [0, 0, 1]}]"
+    )
+    assert [one.name for one in craft.disturbances] == ["T", "", ""]
+    assert [one.transverse for one in craft.disturbances] == [1, 1j, 0]
+
+
+def test_disturbances_are_turned_to_principal_axes_with_nothing_dropped() -> None:
+    craft = read(
+        "{name: S, inertia: {tensor: [[120, 0, 3], [0, 118, 2], [3, 2, 80]]}, omega0: [0.1, 0.2, 3], disturbances: ["
+        "{torque: [0.1, 0.2, 0.3]}, {torque: [0.1, 0.2, 0], rate: 2}, {torque: [0.1, 0.2, 0], fixed_in: inertial}, "
+        "{kind: axial, torque: 0.3}]}"
+    )
+    assert [one.rate for one in craft.disturbances] == [0.0, 2.0, -craft.spin, 0.0]
+    for one, torque in zip(craft.disturbances, [(0.1, 0.2, 0.3), *[(0.1, 0.2, 0)] * 2, (0, 0, 0.3)], strict=True):
+        principal = np.array([one.transverse.real, one.transverse.imag, one.axial])
+        assert np.all(principal != 0.0)
+        assert_allclose(craft.inertia.axes @ principal, torque, atol=1e-16)
+
+
+def test_a_turn_about_axis_3_alone_leaves_no_axial_dust() -> None:
+    craft = read(
+        "{name: S, inertia: {tensor: [[120, 3, 0], [3, 118, 0], [0, 0, 80]]}, omega0: [0.1, 0.2, 3], "
+        "disturbances: [{torque: [0.1, 0.2, 0], rate: 2}, {kind: axial, torque: 1}]}"
+    )
+    turning, axial = craft.disturbances
+    assert turning.axial == 0.0
+    assert abs(turning.transverse) == pytest.approx(math.hypot(0.1, 0.2))
+    assert (axial.transverse, axial.axial) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(("A", "C", "growth"), [(120, 80, 1 / 600), (80, 120, -1 / 600), (80, 80, 0.0)])
+def test_dissipation_lets_nutation_grow_or_decay_by_shape(A: float, C: float, growth: float) -> None:
+    craft = read(f"{{name: S, inertia: {{A: {A}, C: {C}}}, omega0: [0, 0, 1], dissipation: {{time_constant: 10 min}}}}")
+    assert craft.dissipation == 600.0
+    assert craft.growth == pytest.approx(growth)
+
+
+@pytest.mark.parametrize(
+    "tensor",
+    [
+        "[[120, 0, 0], [0, 80, 0], [0, 0, 79.999]]",
+        "[[120, 0, 0], [0, 80, 0], [0, 0, 120.001]]",
+        "[[120, 0, 0], [0, 120, 0], [0, 0, 80]]",
+        "[[80, 0, 0], [0, 80.00000001, 0], [0, 0, 80.00000002]]",
+        "[[80, 0, 0], [0, 80, 0], [0, 0, 80]]",
+        "[[80, 1e-9, 0], [1e-9, 80, 2e-9], [0, 2e-9, 80]]",
+    ],
+)
+def test_spin_about_an_outer_axis_or_of_a_sphere_is_sound(tensor: str) -> None:
+    assert read(f"{{name: S, inertia: {{tensor: {tensor}}}, omega0: [0, 0.1, 1]}}").spin == pytest.approx(1.0, rel=0.2)
+
+
 def test_the_example_is_the_one_it_describes() -> None:
     craft = read(built_in_example_text())
     assert (craft.name, craft.mass, craft.inertia.moments) == ("Sounder-1", 250.0, (120.0, 120.0, 80.0))
@@ -241,12 +323,21 @@ def uncommented(text: str, *keys: str) -> str:
 
 
 def test_what_the_example_shows_in_comments_works() -> None:
-    text = uncommented(built_in_example_text(), "attitude", "channels", "steerable", "limits")
+    text = uncommented(
+        built_in_example_text(), "attitude", "channels", "steerable", "limits", "disturbances", "dissipation"
+    )
     craft = read(text.replace("  # - {", "  - {"))
     assert craft.attitude is not None
     assert craft.steerable is not None
     assert [channel.name for channel in craft.channels] == ["upper", "lower"]
     assert (craft.limits.horizon, craft.limits.blackout) == (120.0, ((10.0, 20.0),))
+    assert [(one.name, one.rate) for one in craft.disturbances] == [
+        ("leak", 0.0),
+        ("pump", -3.0),
+        ("sunlight", -craft.spin),
+        ("drag", 0.0),
+    ]
+    assert (craft.spin_drift, craft.dissipation) == (-0.001 / 80, 600.0)
     others = re.sub(r"^(state|inertia): .*\n", "", built_in_example_text(), flags=re.MULTILINE)
     craft = read(uncommented(others, "inertia", "omega0"))
     assert craft.nutation == pytest.approx(math.radians(5), rel=0.05)

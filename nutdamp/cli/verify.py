@@ -1,0 +1,80 @@
+"""``nutdamp verify``: fly a schedule by independent means, with an error budget."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from nutdamp.cli.boundary import UNREADABLE
+from nutdamp.cli.common import (
+    load,
+    one_stdout,
+    quiet_option,
+    remarks,
+    scheme_options,
+    show,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.schemes import CLASSIC, NAMES, Options
+
+
+@click.command("verify")
+@spacecraft_argument
+@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to verify; default the recommended one.")
+@click.option("--schedule", metavar="FILE", help="Verify the pulses of a CSV file, as `plan --csv` writes it.")
+@scheme_options
+@click.option("--json", metavar="FILE", help="Write methods, differences and error budget.")
+@quiet_option
+def command(
+    spacecraft: str | None,
+    scheme: str | None,
+    schedule: str | None,
+    on_time: float | None,
+    coarse: bool,
+    literal: bool,
+    with_disturbances: bool,
+    json: str | None,
+    quiet: bool,
+) -> None:
+    """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
+
+    Shows the largest differences, what is conserved, and what each imperfection alone costs.
+    """
+    if scheme is not None and schedule is not None:
+        raise click.UsageError("name what to verify: either --scheme or --schedule")
+    silent = one_stdout(json=json)
+    body = load(spacecraft, remarks(quiet))
+
+    from nutdamp import planning
+    from nutdamp.errors import Infeasible
+    from nutdamp.verification import verify
+
+    options = Options(on_time, coarse, literal, with_disturbances)
+    if schedule is not None:
+        from nutdamp.files.pulses_csv import read_pulses
+
+        pulses, warnings = read_pulses(schedule, body)
+        for warning in warnings:
+            remarks(quiet)(f"warning: {warning}")
+        name, unrounded = schedule, None
+    else:
+        plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
+        if plan is None or plan.why is not None:
+            raise Infeasible(f"{scheme} is infeasible: {plan.why}" if plan else "no scheme is feasible")
+        pulses, name = plan.pulses, plan.scheme
+        unrounded = planning.unrounded(plan)
+    found = verify(body, pulses, unrounded)
+    if json is not None:
+        from nutdamp.files.output import json_text
+        from nutdamp.files.verification_json import verification_json
+
+        write_all([(json, json_text(verification_json(body, name, found)))])
+    if not silent:
+        from nutdamp.report.verify_tables import verification_screen
+
+        show(verification_screen(body, name, found))
+    if not found.agree:
+        click.echo("nutdamp: the flown motion and DOP853 do not agree; please report this", err=True)
+        sys.exit(UNREADABLE)

@@ -1,0 +1,47 @@
+"""What ``verify --json`` gives."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.verification import Verification
+
+
+def verification_json(spacecraft: Spacecraft, name: str, found: Verification) -> dict[str, Any]:
+    """Methods with their differences from the flown motion (rad), conservation, error budget."""
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(spacecraft),
+        "scheme": name,
+        "agree": found.agree,
+        "methods": [
+            {
+                "name": method.name,
+                "nutation_deg": _degrees(method.nutation),
+                "momentum_shift_deg": _degrees(method.momentum_shift),
+                "axis_difference_rad": method.axis,
+                "momentum_difference_rad": method.momentum,
+                "rate_difference": method.rate,
+                "missing": method.missing or None,
+            }
+            for method in found.methods
+        ],
+        "momentum_drift": found.momentum_drift,
+        "energy_drift": found.energy_drift,
+        "budget": [
+            {
+                "imperfection": row.name,
+                "nutation_deg": math.degrees(row.nutation),
+                "momentum_shift_deg": math.degrees(row.momentum_shift),
+            }
+            for row in found.budget
+        ],
+    }
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)

@@ -1,0 +1,65 @@
+"""The screen of ``verify``: methods side by side, conservation, and what each imperfection costs."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.report.layout import columns
+from nutdamp.report.plan_tables import header
+from nutdamp.report.text import MISSING, degrees
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.verification import AGREE, Verification
+
+
+def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
+    """Everything that ``verify`` shows of the schedule called ``name``."""
+    missing = [Text(f"{method.name}: {method.missing}") for method in found.methods if method.missing]
+    verdict = "agree" if found.agree else "DO NOT AGREE"
+    return Group(
+        header(spacecraft),
+        Text(),
+        Text(f"{name}, flown by independent means", style="bold"),
+        Text(),
+        _methods(found),
+        *missing,
+        Text(),
+        Text(f"Taylor series and DOP853 {verdict} (within {AGREE:g} rad)."),
+        Text(_conservation(spacecraft, found)),
+        Text(),
+        Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
+        Text(),
+        _budget(found),
+    )
+
+
+def _conservation(spacecraft: Spacecraft, found: Verification) -> str:
+    drifts = f"|H| by at most {found.momentum_drift:.1e}, the energy by {found.energy_drift:.1e} of itself"
+    if spacecraft.disturbances or spacecraft.growth != 0.0:
+        return f"On coasts disturbances or dissipation change {drifts}."
+    return f"On coasts, where both should stay, rounding changes {drifts}."
+
+
+def _methods(found: Verification) -> Table:
+    names = ("method", "nutation", "shift of H", "axis", "H", "rates")
+    units = ("", "left, deg", "deg", "differs, rad", "rad", "relative")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)))
+    for method in found.methods:
+        if not method.missing:
+            differences = (method.axis, method.momentum, method.rate)
+            table.add_row(
+                method.name,
+                degrees(method.nutation).removesuffix(" deg"),
+                degrees(method.momentum_shift).removesuffix(" deg"),
+                *(MISSING if value is None else f"{value:.1e}" for value in differences),
+            )
+    return table
+
+
+def _budget(found: Verification) -> Table:
+    table = columns("imperfection\n", "nutation left\ndeg", "shift of H\ndeg")
+    for row in found.budget:
+        angles = (row.nutation, row.momentum_shift)
+        table.add_row(row.name, *(degrees(angle).removesuffix(" deg") for angle in angles))
+    return table

@@ -1,0 +1,324 @@
+"""Fly a schedule by independent means, and tell what each imperfection costs: an error budget a reviewer can sign."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nutdamp import basilisk, flight
+from nutdamp.errors import Infeasible, MissingExtra
+from nutdamp.flight import Flight, Residual
+from nutdamp.physics import attitude, rates
+from nutdamp.schedule import Pulse, Schedule
+from nutdamp.schemes import trim
+from nutdamp.spacecraft import Spacecraft, Vector
+
+SAMPLES = 201
+"""Even times at which two flights are compared, besides the edges of the pulses."""
+
+AGREE = 1e-9
+"""rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One way to fly the schedule: its residual (rad), or why it could not be flown.
+
+    ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
+    """
+
+    name: str
+    nutation: float | None = None
+    momentum_shift: float | None = None
+    axis: float | None = None
+    momentum: float | None = None
+    rate: float | None = None
+    missing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Imperfection:
+    """Residual (rad) with one imperfection alone, everything else ideal."""
+
+    name: str
+    nutation: float
+    momentum_shift: float
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Methods side by side, what must be conserved, and the budget.
+
+    ``momentum_drift`` and ``energy_drift`` are the largest relative changes of |H| and of the energy on a coast.
+    """
+
+    methods: tuple[Method, ...]
+    momentum_drift: float
+    energy_drift: float
+    budget: tuple[Imperfection, ...]
+
+    @property
+    def agree(self) -> bool:
+        """Whether the integration from outside confirms the flown motion."""
+        checked = [method for method in self.methods[2:] if method.axis is not None]
+        return all(max(one.axis or 0.0, one.momentum or 0.0, one.rate or 0.0) <= AGREE for one in checked[:1])
+
+
+def verify(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None) -> Verification:
+    """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
+
+    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one.
+    """
+    end = schedule.end + spacecraft.inertial_period
+    judge = flight.flown(spacecraft, schedule, end)
+    times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.end for pulse in schedule]]))
+    reference = _motion(judge, times)
+    methods = (
+        _closed_form(spacecraft, schedule, end, times, reference),
+        Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
+        _compared(
+            "DOP853, full tensor", spacecraft, schedule, times, integrate(spacecraft, schedule, times), reference
+        ),
+        _by_basilisk(spacecraft, schedule, end),
+    )
+    momentum_drift, energy_drift = _conserved(judge)
+    return Verification(methods, momentum_drift, energy_drift, _budget(spacecraft, schedule, unrounded))
+
+
+def _motion(flown: Flight, times: Vector) -> tuple[Vector, Vector]:
+    """Rates (n, 3) and quaternions (n, 4) of a flight at ``times``, after a jump where there is one."""
+    owner = np.searchsorted([leg.start for leg in flown.legs], times, side="right") - 1
+    body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+    for index in np.unique(owner):
+        rows = owner == index
+        body[rows], quaternion[rows] = flown.legs[index].path.motion(times[rows])
+    return body, quaternion
+
+
+def _closed_form(
+    spacecraft: Spacecraft, schedule: Schedule, end: float, times: Vector, reference: tuple[Vector, Vector]
+) -> Method:
+    """Attitude by exact arcs between effective impulses, rates by the impulse sum (17) written out."""
+    arcs = flight.by_impulses(spacecraft, schedule, end)
+    body, quaternion = _motion(arcs, times)
+    if not spacecraft.disturbances:
+        inertia = spacecraft.inertia
+        omega, spin = rates.impulse_sum(
+            times,
+            complex(spacecraft.omega0[0], spacecraft.omega0[1]),
+            spacecraft.spin,
+            inertia.A,
+            inertia.C,
+            np.array([pulse.t for pulse in schedule]),
+            flight.effective_impulses(spacecraft, schedule),
+            np.array([pulse.impulse[2] for pulse in schedule]),
+            spacecraft.growth,
+        )
+        body = np.column_stack([omega.real, omega.imag, spin])
+    outside = np.all([(times <= pulse.start) | (times >= pulse.end) for pulse in schedule], axis=0)
+    between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
+    return _method("impulse sum (17), arcs", spacecraft, arcs.residual, (body, quaternion), reference, between)
+
+
+def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
+    """Euler's equations with the full tensor in the axes of the file, and the attitude, by scipy's DOP853.
+
+    Written apart from everything else here, so that it can judge it: cross products, a matrix for the tensor, restarts
+    at every edge. ``times`` (n,) s ascending; returns rates (n, 3) and quaternions (n, 4) in principal axes.
+    """
+    from scipy.integrate import solve_ivp
+
+    axes = spacecraft.inertia.axes
+    tensor = axes @ np.diag(spacecraft.inertia.moments) @ axes.T
+    inverse = np.linalg.inv(tensor)
+    initial = spacecraft.initial
+    state = np.concatenate([axes @ initial.rates, attitude.multiply(initial.quaternion, _turn(axes.T))])
+    edges = {0.0, float(times[-1]), *times.tolist()}
+    edges |= {edge for pulse in schedule for edge in (pulse.start, pulse.end)}
+    knots = sorted(edge for edge in edges if edge <= times[-1])
+    rows = {}
+    for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
+        for pulse in schedule:
+            if pulse.on_time == 0.0 and pulse.t == now:
+                state[:3] += inverse @ (axes @ pulse.impulse)
+        rows[now] = state.copy()
+        if end > now:
+            torque = _body_torque(spacecraft, schedule, now, end)
+
+            def derivative(t: float, y: Vector, torque: _Torque = torque) -> Vector:
+                body, q = y[:3], y[3:]
+                momentum = tensor @ body
+                drive = axes @ _sink(spacecraft, axes.T @ momentum)
+                spin = inverse @ (torque(t) + drive - np.cross(body, momentum))
+                slip = np.cross(drive, momentum) / (momentum @ momentum)
+                turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
+                return np.concatenate([spin, turning])
+
+            solved = solve_ivp(derivative, (now, end), state, method="DOP853", rtol=1e-13, atol=1e-15)
+            state = solved.y[:, -1]
+    table = np.array([rows[time] for time in times.tolist()])
+    quaternion = table[:, 3:] / np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
+    return table[:, :3] @ axes, attitude.multiply(quaternion, _turn(axes))
+
+
+def _turn(rotation: Vector) -> Vector:
+    return attitude.from_matrix(rotation)
+
+
+class _Torque:
+    """Torque in the axes of the file over one stretch, a function of time."""
+
+    def __init__(self, spacecraft: Spacecraft, firing: list[Vector]) -> None:
+        self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
+        self.constant = np.asarray(sum(firing, np.zeros(3)))
+
+    def __call__(self, t: float) -> Vector:
+        total = self.constant.copy()
+        for one in self.spacecraft.disturbances:
+            turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
+            total += (turned.real, turned.imag, one.axial)
+        return np.asarray(self.axes @ total)
+
+
+def _sink(spacecraft: Spacecraft, momentum: Vector) -> Vector:
+    """What energy dissipation adds to dH/dt in principal body axes: H1 and H2 grow, H3 gives way, |H| stays.
+
+    Nothing inside a body can turn H in space, so the body must slip against it at the rate that undoes this turn.
+    """
+    growth = spacecraft.growth
+    if growth == 0.0:
+        return np.zeros(3)
+    first, second, third = momentum
+    return growth * np.array([first, second, -(first**2 + second**2) / third])
+
+
+def _body_torque(spacecraft: Spacecraft, schedule: Schedule, start: float, end: float) -> _Torque:
+    firing = [
+        pulse.torque for pulse in schedule if pulse.torque is not None and pulse.start <= start and end <= pulse.end
+    ]
+    return _Torque(spacecraft, firing)
+
+
+def _by_basilisk(spacecraft: Spacecraft, schedule: Schedule, end: float) -> Method:
+    name = "Basilisk"
+    try:
+        flown = basilisk.fly(spacecraft, schedule, end)
+    except (MissingExtra, Infeasible) as reason:
+        return Method(name, missing=str(reason))
+    reference = _motion(flight.flown(spacecraft, schedule, end), flown.t)
+    return _compared(name, spacecraft, schedule, flown.t, (flown.rates, flown.quaternion), reference)
+
+
+def _compared(
+    name: str,
+    spacecraft: Spacecraft,
+    schedule: Schedule,
+    times: Vector,
+    motion: tuple[Vector, Vector],
+    reference: tuple[Vector, Vector],
+) -> Method:
+    """A method that gives motion only: its residual is read at the first time after the last pulse."""
+    last = int(np.searchsorted(times, schedule.end - 1e-9))
+    moments = np.asarray(spacecraft.inertia.moments)
+    start = spacecraft.initial
+    before = attitude.rotate(start.quaternion, start.rates * moments)
+    after = attitude.rotate(motion[1][last], motion[0][last] * moments)
+    shift = float(attitude.angle_between(before, after))
+    nutation = flight.largest_nutation(
+        spacecraft.inertia.moments, motion[0][last] * moments, math.copysign(1.0, spacecraft.spin)
+    )
+    residual = Residual(nutation, math.nan, math.nan, shift, shift)
+    return _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
+
+
+def _method(
+    name: str,
+    spacecraft: Spacecraft,
+    residual: Residual,
+    motion: tuple[Vector, Vector],
+    reference: tuple[Vector, Vector],
+    rows: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+) -> Method:
+    """Largest differences between two motions over the ``rows`` compared."""
+    moments = np.asarray(spacecraft.inertia.moments)
+    spin_axis = np.array([0.0, 0.0, 1.0])
+    (body, turn), (other_body, other_turn) = motion, reference
+    differences = (
+        attitude.angle_between(attitude.rotate(turn, spin_axis), attitude.rotate(other_turn, spin_axis)),
+        attitude.angle_between(
+            attitude.rotate(turn, body * moments), attitude.rotate(other_turn, other_body * moments)
+        ),
+        np.linalg.norm(body - other_body, axis=1) / np.linalg.norm(other_body, axis=1),
+    )
+    axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
+    return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)
+
+
+def _conserved(flown: Flight) -> tuple[float, float]:
+    """Largest relative change of |H| and of the energy along one coast."""
+    moments = np.asarray(flown.moments)
+    firing = [(pulse.start, pulse.end) for pulse in flown.schedule]
+    worst = [0.0, 0.0]
+    for leg in flown.legs:
+        if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
+            continue
+        body, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
+        for index, value in enumerate((np.linalg.norm(body * moments, axis=1), body**2 @ moments)):
+            worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
+    return worst[0], worst[1]
+
+
+def _budget(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None) -> tuple[Imperfection, ...]:
+    """Residual of the ideal flight, with each imperfection alone, and with all of them."""
+    exact = schedule if unrounded is None else unrounded
+    inertia = spacecraft.inertia
+    ideal = replace(
+        spacecraft,
+        inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)),
+        disturbances=(),
+        dissipation=None,
+    )
+    sharp = _sharp(ideal, exact, axial=False)
+    rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, _transverse(exact))]
+    if any(pulse.impulse[2] != 0.0 for pulse in exact):
+        rows.append(("axial torque", ideal, _sharp(ideal, exact, axial=True)))
+    if not inertia.symmetric:
+        rows.append(("I1 ≠ I2", replace(ideal, inertia=inertia), sharp))
+    if spacecraft.limits.tick is not None:
+        rounded = Schedule(tuple(trim.commandable(spacecraft, pulse) for pulse in exact))
+        rows.append(("command resolution", ideal, _sharp(ideal, rounded, axial=False)))
+    if spacecraft.growth != 0.0:
+        rows.append(("energy dissipation", replace(ideal, dissipation=spacecraft.dissipation), sharp))
+    if spacecraft.disturbances:
+        rows.append(("disturbances", replace(ideal, disturbances=spacecraft.disturbances), sharp))
+    rows.append(("all: as flown", spacecraft, schedule))
+    return tuple(
+        Imperfection(name, left.nutation, left.momentum_shift)
+        for name, body, pulses in rows
+        for left in (flight.flown(body, pulses).residual,)
+    )
+
+
+def _sharp(spacecraft: Spacecraft, schedule: Schedule, *, axial: bool) -> Schedule:
+    """Every pulse as an ideal impulse at its centre, as strong as it acts on ω."""
+    flat = schedule if axial else _transverse(schedule)
+    effective = flight.effective_impulses(spacecraft, flat)
+    return Schedule(
+        tuple(
+            Pulse(pulse.t, 0.0, pulse.channel, np.array([impulse.real, impulse.imag, pulse.impulse[2]]))
+            for pulse, impulse in zip(flat, effective, strict=True)
+        )
+    )
+
+
+def _transverse(schedule: Schedule) -> Schedule:
+    """The schedule without the axial parts of its torques."""
+    flat = np.array([1.0, 1.0, 0.0])
+    return Schedule(
+        tuple(
+            replace(pulse, impulse=pulse.impulse * flat, torque=None if pulse.torque is None else pulse.torque * flat)
+            for pulse in schedule
+        )
+    )

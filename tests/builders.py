@@ -1,0 +1,123 @@
+"""Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless loops."""
+
+from __future__ import annotations
+
+import math
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+import numpy as np
+import reference
+
+from nutdamp.schedule import Pulse, Schedule
+from nutdamp.spacecraft import Attitude, Channel, Inertia, Limits, Requirement, Spacecraft, Steerable, Thruster, Vector
+
+
+def spinner(
+    A: float = 120.0,
+    C: float = 80.0,
+    spin: float = 3.0,
+    degrees: float = 5.0,
+    phase: float = 0.7,
+    *,
+    moments: tuple[float, float, float] | None = None,
+    channels: tuple[Channel, ...] = (),
+    steerable: Steerable | None = None,
+    limits: Limits | None = None,
+    requirement: Requirement | None = None,
+    mass: float | None = None,
+    attitude: Attitude | None = None,
+) -> Spacecraft:
+    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; the example of the physics sheet by default."""
+    moments = moments or (A, A, C)
+    mean = 0.5 * (moments[0] + moments[1])
+    omega = moments[2] * abs(spin) * math.tan(math.radians(degrees)) / mean
+    rates = np.array([omega * math.cos(phase), omega * math.sin(phase), spin])
+    return Spacecraft(
+        "test", Inertia(moments), rates, mass, attitude, channels, steerable, requirement, limits or Limits()
+    )
+
+
+def channel(
+    name: str,
+    *torque: float,
+    min_on_time: float = 0.0,
+    max_on_time: float = math.inf,
+    isp: float | None = None,
+    thrust: float | None = None,
+    force: tuple[float, float, float] | None = None,
+) -> Channel:
+    """One thruster that is a channel of its own."""
+    push = None if force is None else np.array(force, dtype=float)
+    turn = np.array(torque, dtype=float)
+    return Channel(name, (Thruster(name, turn, push, thrust, isp, min_on_time, max_on_time),))
+
+
+def cross(torque: float, *, min_on_time: float = 0.0, max_on_time: float = math.inf) -> tuple[Channel, ...]:
+    """The thrusters of Magnus 1970: +1, -1, +2, -2."""
+    directions = {
+        "+1": (torque, 0.0, 0.0),
+        "-1": (-torque, 0.0, 0.0),
+        "+2": (0.0, torque, 0.0),
+        "-2": (0.0, -torque, 0.0),
+    }
+    return tuple(
+        channel(name, *direction, min_on_time=min_on_time, max_on_time=max_on_time)
+        for name, direction in directions.items()
+    )
+
+
+def fan(count: int, torque: float, first: float = 0.3) -> tuple[Channel, ...]:
+    """``count`` channels with evenly spread transverse directions."""
+    angles = [first + 2 * math.pi * index / count for index in range(count)]
+    return tuple(
+        channel(f"T{index}", torque * math.cos(angle), torque * math.sin(angle), 0.0)
+        for index, angle in enumerate(angles)
+    )
+
+
+def events(made: Schedule | tuple[Pulse, ...]) -> list[reference.Push | reference.Kick]:
+    """What the reference integrator flies for a schedule."""
+    return [
+        reference.Kick(pulse.t, pulse.impulse)
+        if pulse.torque is None or pulse.on_time == 0.0
+        else reference.Push(pulse.start, pulse.end, pulse.torque)
+        for pulse in made
+    ]
+
+
+class Outcome:
+    """How a schedule ends by the reference integrator: angles in rad."""
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        moments = spacecraft.inertia.moments
+        sense = math.copysign(1.0, spacecraft.spin)
+        rotation = reference.frame_n(moments, spacecraft.omega0)
+        self.motion = reference.fly(moments, spacecraft.omega0, events(made), made.end, rotation)
+        self.nutation = reference.nutation(moments, self.motion.rates, sense)
+        before = reference.momentum(moments, reference.Motion(spacecraft.omega0, rotation))
+        self.shift = reference.angle(before, reference.momentum(moments, self.motion))
+        self.spin: float = float(self.motion.rates[2])
+
+
+def transverse(vector: Vector) -> complex:
+    """v1 + i v2."""
+    return complex(vector[0], vector[1])
+
+
+@contextmanager
+def within(seconds: float) -> Iterator[None]:
+    """Fails, rather than hangs, where the body takes longer; the margin over what it should take is large."""
+
+    def overdue(number: int, frame: FrameType | None) -> None:
+        raise AssertionError(f"not done within {seconds:g} s")
+
+    previous = signal.signal(signal.SIGALRM, overdue)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)
