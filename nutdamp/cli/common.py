@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from nutdamp.schemes import CLASSIC
+
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from nutdamp.planning import Plan
+    from nutdamp.schemes import Options
     from nutdamp.spacecraft import Spacecraft
 
 DEFAULT_FILE = "spacecraft.yaml"
@@ -67,6 +71,33 @@ def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
         return load_spacecraft(path)
     remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
     return read_spacecraft(built_in_example_text(), "example.yaml")
+
+
+def plan_or_read(
+    body: Spacecraft, scheme: str | None, schedule: str | None, options: Options, remark: Callable[[str], None]
+) -> Plan:
+    """The plan of ``scheme`` (the recommended one where it is None), or the pulses of a ``schedule`` file as a plan.
+
+    Raises Infeasible where there is no such plan.
+    """
+    from nutdamp import planning
+    from nutdamp.errors import Infeasible
+
+    if schedule is not None:
+        from nutdamp.files.pulses_csv import read_pulses
+
+        pulses, warnings = read_pulses(schedule, body)
+        for warning in (*warnings, *planning.broken_limits(body, pulses)):
+            remark(f"warning: {warning}")
+        return planning.Plan(body, schedule, pulses)
+    plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
+    if plan is None:
+        raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
+    if plan.why is not None:
+        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
+    for text in plan.remarks:
+        remark(text)
+    return plan
 
 
 def remarks(quiet: bool) -> Callable[[str], None]:

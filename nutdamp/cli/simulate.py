@@ -8,6 +8,7 @@ from nutdamp.cli.common import (
     Quantity,
     load,
     one_stdout,
+    plan_or_read,
     quiet_option,
     remarks,
     scheme_options,
@@ -61,28 +62,16 @@ def command(
     remark = remarks(quiet)
     body = load(spacecraft, remark)
 
-    from nutdamp import flight, planning
-    from nutdamp.errors import Infeasible
+    from nutdamp import flight
 
-    if schedule is not None:
-        from nutdamp.files.pulses_csv import read_pulses
-
-        pulses, warnings = read_pulses(schedule, body)
-        for warning in (*warnings, *planning.broken_limits(body, pulses)):
-            remark(f"warning: {warning}")
-    else:
-        plan = planning.plan(body, scheme or "none", Options(on_time, coarse, literal, with_disturbances))
-        if plan.why is not None:
-            raise Infeasible(f"{scheme} is infeasible: {plan.why}")
-        pulses = plan.pulses
-        for note in plan.remarks:
-            remark(note)
+    options = Options(on_time, coarse, literal, with_disturbances)
+    plan = plan_or_read(body, scheme, schedule, options, remark)
+    pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
     residual, flown = (one.residual for one in flights)
     chosen = flights[real]
     track = chosen.track(samples, end)
-    name = scheme or schedule or ""
     outputs: list[tuple[str, str | bytes]] = []
     if csv is not None:
         from nutdamp.files.track_csv import track_csv
@@ -92,7 +81,7 @@ def command(
         from nutdamp.files.output import json_text
         from nutdamp.files.simulation_json import simulation_json
 
-        outputs.append((json, json_text(simulation_json(chosen, track, residual, flown, scheme=name))))
+        outputs.append((json, json_text(simulation_json(chosen, track, residual, flown, scheme=plan.scheme))))
     if plot is not None:
         from nutdamp.report.figures import motion_picture
 
@@ -102,4 +91,4 @@ def command(
         from nutdamp.report.simulate_tables import simulation_screen
 
         how = "real pulse widths" if real else "impulse sum (17)"
-        show(simulation_screen(chosen, track, residual, flown, how=f"{name}, propagated by the {how}"))
+        show(simulation_screen(chosen, track, residual, flown, how=f"{plan.scheme}, propagated by the {how}"))

@@ -10,6 +10,7 @@ from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
     load,
     one_stdout,
+    plan_or_read,
     quiet_option,
     remarks,
     scheme_options,
@@ -17,7 +18,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
-from nutdamp.schemes import CLASSIC, NAMES, Options
+from nutdamp.schemes import NAMES, Options
 
 
 @click.command("verify")
@@ -47,34 +48,20 @@ def command(
     silent = one_stdout(json=json)
     body = load(spacecraft, remarks(quiet))
 
-    from nutdamp import planning
-    from nutdamp.errors import Infeasible
+    from nutdamp.planning import unrounded
     from nutdamp.verification import verify
 
-    options = Options(on_time, coarse, literal, with_disturbances)
-    if schedule is not None:
-        from nutdamp.files.pulses_csv import read_pulses
-
-        pulses, warnings = read_pulses(schedule, body)
-        for warning in warnings:
-            remarks(quiet)(f"warning: {warning}")
-        name, unrounded = schedule, None
-    else:
-        plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
-        if plan is None or plan.why is not None:
-            raise Infeasible(f"{scheme} is infeasible: {plan.why}" if plan else "no scheme is feasible")
-        pulses, name = plan.pulses, plan.scheme
-        unrounded = planning.unrounded(plan)
-    found = verify(body, pulses, unrounded)
+    plan = plan_or_read(body, scheme, schedule, Options(on_time, coarse, literal, with_disturbances), remarks(quiet))
+    found = verify(body, plan.pulses, None if schedule else unrounded(plan))
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.verification_json import verification_json
 
-        write_all([(json, json_text(verification_json(body, name, found)))])
+        write_all([(json, json_text(verification_json(body, plan.scheme, found)))])
     if not silent:
         from nutdamp.report.verify_tables import verification_screen
 
-        show(verification_screen(body, name, found))
+        show(verification_screen(body, plan.scheme, found))
     if not found.agree:
         click.echo("nutdamp: the flown motion and DOP853 do not agree; please report this", err=True)
         sys.exit(UNREADABLE)
