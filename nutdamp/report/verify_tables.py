@@ -52,9 +52,15 @@ def _methods(found: Verification) -> Table:
                 method.name,
                 degrees(method.nutation).removesuffix(" deg"),
                 degrees(method.momentum_shift).removesuffix(" deg"),
-                *(MISSING if value is None else f"{value:.1e}" for value in differences),
+                *map(_difference, differences),
             )
     return table
+
+
+def _difference(value: float | None) -> str:
+    if value is None:
+        return MISSING
+    return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
 def _budget(found: Verification) -> Table:
