@@ -6,7 +6,7 @@ number of steps: the rates go in as κω, the torque as κ²M, which leaves Eule
 begin and end exactly when they should; nothing is rounded to nanoseconds, neither their times nor their impulses.
 
 The hub is integrated by Runge-Kutta-Fehlberg 7(8) at a fixed step, attitude in modified Rodrigues parameters (MRPs).
-At the default step the flight agrees with `nutdamp.flight.flown` to about 1e-12 rad over some hundred radians.
+At the default step the flight agrees with `nutdamp.flight.flown` to some 1e-12 rad over hundreds of radians.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 
 TURN = 0.1
-"""rad; the body turns by no more within one default step, which leaves an error of some 1e-14 rad a step."""
+"""rad; the body turns by no more within one default step, which leaves no more error than rounding does."""
 
 TURN_TURNING = 0.05
 """rad; the same where a torque turns in the body: held constant for half of each pair of steps, to fourth order."""
@@ -132,7 +132,7 @@ def _stretches(
         )
         mean, slope = 0.5 * (early + late), 2.0 * GAUSS * (early - late)
         for turned in (mean + slope, mean - slope):
-            yield 0.5 * interval, constant + (turned.real, turned.imag, 0.0)
+            yield 0.5 * interval, constant + np.array([turned.real, turned.imag, 0.0])
 
 
 class _Hub:
@@ -153,7 +153,7 @@ class _Hub:
         self._torque = basilisk.extForceTorque.ExtForceTorque()
         self._torque.ModelTag = "torque"
         self._body.addDynamicEffector(self._torque)
-        # Basilisk does not keep its integrator, nor any model, alive by itself.
+        # Kept here, as all its objects are: Basilisk's own hold on them is a plain pointer.
         self._integrator = basilisk.svIntegrators.svIntegratorRKF78(self._body)
         self._integrator.relTol = self._integrator.absTol = ACCEPT_ALL
         self._body.setIntegrator(self._integrator)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,16 +61,24 @@ def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
     )
 
 
-def steerable_pulse(steerable: Steerable, t: float, angle: float, *, impulse: float) -> Pulse:
-    """One firing of a steerable torquer: ``impulse`` N m s about the transverse axis at ``angle`` rad.
+def steerable_pulse(
+    steerable: Steerable, t: float, angle: float, *, impulse: float | None = None, on_time: float = 0.0
+) -> Pulse:
+    """One firing of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
 
-    Its on-time follows from the torque; without one it is an ideal impulse.
+    Either ``impulse`` N m s is given, or ``on_time`` s where the torquer has a torque; else it gives ideal impulses.
     """
     direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+    if steerable.torque is None:
+        on_time = 0.0
+    elif impulse is not None:
+        on_time = impulse / steerable.torque
+    if impulse is None:
+        impulse = 0.0 if steerable.torque is None else steerable.torque * on_time
     rate = steerable.propellant_per_impulse
     return Pulse(
         t=t,
-        on_time=0.0 if steerable.torque is None else impulse / steerable.torque,
+        on_time=on_time,
         channel=STEERABLE,
         impulse=impulse * direction,
         torque=None if steerable.torque is None else steerable.torque * direction,
@@ -77,12 +86,24 @@ def steerable_pulse(steerable: Steerable, t: float, angle: float, *, impulse: fl
     )
 
 
+class Bounds(NamedTuple):
+    """Costs that other schedules of the same channels and limits cannot go below, in ``unit`` (kg or N m s).
+
+    ``first_order`` is the optimum of the small-angle program; ``rigorous`` holds at any angle for a symmetric body.
+    """
+
+    first_order: float
+    rigorous: float
+    unit: str
+
+
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Pulses in the order of their centres, and remarks of the scheme that chose them."""
+    """Pulses in the order of their centres, remarks of the scheme that chose them, and what others must cost."""
 
     pulses: tuple[Pulse, ...] = ()
     notes: tuple[str, ...] = ()
+    bounds: Bounds | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pulses", tuple(sorted(self.pulses, key=lambda pulse: pulse.t)))

@@ -12,7 +12,10 @@ if TYPE_CHECKING:  # so that the command line can know the names without loading
 CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 """The schemes of Magnus 1970, planned when none is named."""
 
-NAMES = (*CLASSIC, "none")
+PLANNED = (*CLASSIC, "optimal")
+"""The schemes that plan pulses."""
+
+NAMES = (*PLANNED, "none")
 
 
 class Options(NamedTuple):
@@ -20,13 +23,16 @@ class Options(NamedTuple):
 
     ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)). ``coarse``: four-pulse without a
     last, shorter pulse. ``literal``: two-pulse as printed in Magnus 1970. ``with_disturbances``: plan on the motion
-    with the disturbances of the file, which is otherwise only judged with them.
+    with the disturbances of the file, which is otherwise only judged with them. ``least``: what optimal saves,
+    propellant (impulse where that is unknown) or impulse; ``free_axis``: optimal lets H go where it likes.
     """
 
     on_time: float | None = None
     coarse: bool = False
     literal: bool = False
     with_disturbances: bool = False
+    least: str = "propellant"
+    free_axis: bool = False
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
@@ -46,5 +52,6 @@ def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     made = model.translate(cast("Schedule", scheme.schedule(model.body, options)))
     if model.exact or options.coarse or options.literal or not made.pulses:
         return made
-    pair = name == "two-pulse"
-    return trim.refine(spacecraft, made, count=2 if pair else 1, momentum=pair)
+    keeps = name == "two-pulse" or (name == "optimal" and not options.free_axis)
+    chosen = tuple(range(min(len(made), 4))) if keeps else (-1,)
+    return trim.refine(spacecraft, made, chosen=chosen, momentum=keeps)

@@ -11,6 +11,8 @@ from nutdamp.spacecraft import Channel, Spacecraft
 
 def no_channels(spacecraft: Spacecraft) -> str:
     """No body-fixed channel can damp."""
+    if any(channel.damps for channel in spacecraft.channels):
+        return "limits.tick has no multiple between min_on_time and max_on_time of any channel; refine it"
     if spacecraft.channels:
         return "no channel has a torque more transverse than axial, so none can damp a nutation"
     return "the file names no thrusters, and this scheme fires body-fixed ones"
@@ -27,7 +29,7 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
             f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
         )
     walk = Walk(spacecraft, endless=True)
-    pulses = [walk.align(channel, max(channel.min_on_time, 0.0)) for channel in channels]
+    pulses = [walk.align(channel, max(channel.min_on_time, 1e-6 * walk.period)) for channel in channels]
     ends = [pulse.end for pulse in pulses if pulse is not None and walk.helps(pulse)]
     if not ends:
         least = min(walk.left_after(pulse) for pulse in pulses if pulse is not None)

@@ -10,6 +10,7 @@ from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.schemes.advice import no_alignment, no_channels
 from nutdamp.schemes.walk import Walk
+from nutdamp.schemes.windows import usable
 from nutdamp.spacecraft import Channel, Spacecraft
 
 DEFAULT_SHARE = 0.125
@@ -24,7 +25,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
 
     Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
     """
-    channels = [channel for channel in spacecraft.channels if channel.damps]
+    channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     walk = Walk(spacecraft)
@@ -42,7 +43,7 @@ def _on_time(walk: Walk, channel: Channel, asked: float | None) -> float:
     """Length of a full pulse of ``channel``, s."""
     if asked is None:
         return max(min(channel.max_on_time, DEFAULT_SHARE * walk.period), channel.min_on_time)
-    if not channel.min_on_time <= asked <= channel.max_on_time:
+    if not (channel.min_on_time <= asked <= channel.max_on_time and 0.0 < asked < math.inf):
         raise Infeasible(
             f"an on-time of {asked:.4g} s is outside what {channel.name} allows: "
             f"{channel.min_on_time:.4g} s to {channel.max_on_time:.4g} s"

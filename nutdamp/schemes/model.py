@@ -35,7 +35,7 @@ class Model:
         if self.truth.inertia.symmetric:
             return made
         channels = {channel.name: channel for channel in self.truth.channels}
-        return Schedule(tuple(self._pulse(pulse, channels) for pulse in made), made.notes)
+        return Schedule(tuple(self._pulse(pulse, channels) for pulse in made), made.notes, made.bounds)
 
     def _pulse(self, pulse: Pulse, channels: dict[str, Channel]) -> Pulse:
         torquer = self.truth.torquer

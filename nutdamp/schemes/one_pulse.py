@@ -11,6 +11,7 @@ from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import Options
 from nutdamp.schemes.advice import no_alignment, no_channels
 from nutdamp.schemes.walk import Walk
+from nutdamp.schemes.windows import usable
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable
 
 TRAIN_SHARE = 0.25
@@ -32,7 +33,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG
         if walk.pulses:
             return walk.schedule()
         raise Infeasible(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
-    channels = [channel for channel in spacecraft.channels if channel.damps]
+    channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     walks = [walk for walk in (_fixed(spacecraft, channel) for channel in channels) if walk.pulses]
@@ -53,7 +54,7 @@ def _fixed(spacecraft: Spacecraft, channel: Channel) -> Walk:
 
     def fire(walk: Walk, impulse: float) -> Pulse | None:
         on_time = walk.on_time_for(channel, impulse)
-        return walk.align(channel, channel.max_on_time if on_time is None else on_time)
+        return walk.align(channel, min(channel.max_on_time, 0.5 * walk.period) if on_time is None else on_time)
 
     spin_rate = channel.axial / spacecraft.inertia.C
     return _train(spacecraft, abs(channel.transverse), spin_rate, channel.max_on_time, fire)

@@ -7,7 +7,7 @@ takes longer than a whole plan.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,19 +57,22 @@ def _across(axis: Vector, vector: Vector) -> Vector:
     return np.array([first @ vector, np.cross(unit, first) @ vector])
 
 
-def refine(spacecraft: Spacecraft, made: Schedule, *, count: int, momentum: bool) -> Schedule:
-    """``made`` with its last ``count`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
+def refine(spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], momentum: bool) -> Schedule:
+    """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
     brought back, not only the nutation taken out.
     """
-    kept, free = made.pulses[:-count], made.pulses[-count:]
-    knobs = [_Knob(spacecraft, pulse) for pulse in free]
+    chosen = [index % len(made) for index in chosen]
+    kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
+    knobs = [_Knob(spacecraft, made.pulses[index]) for index in chosen]
     ends = np.cumsum([len(knob.start) for knob in knobs])
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends[:-1])
-        return Schedule((*kept, *(knob.turn(part) for knob, part in zip(knobs, parts, strict=True))), made.notes)
+        return Schedule(
+            (*kept, *(knob.turn(part) for knob, part in zip(knobs, parts, strict=True))), made.notes, made.bounds
+        )
 
     def left(made: Schedule) -> Vector:
         return misses(spacecraft, made)[: 4 if momentum else 2]
@@ -78,7 +81,7 @@ def refine(spacecraft: Spacecraft, made: Schedule, *, count: int, momentum: bool
         np.concatenate([getattr(knob, name) for knob in knobs]) for name in ("start", "scale", "lower", "upper")
     )
     x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper)
-    trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes)
+    trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
     better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
     return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made
 
@@ -88,18 +91,21 @@ class _Knob:
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse) -> None:
         pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
+        latest = max(spacecraft.horizon - pulse.on_time, pulse.start)
         self.channel = _channel(spacecraft, pulse)
         self.torquer = spacecraft.torquer
         if self.channel is not None:
             self.start = np.array([pulse.start, pulse.on_time])
             self.scale = np.array([pace, pulse.on_time])
             self.lower = np.array([earliest, self.channel.min_on_time])
-            self.upper = np.array([np.inf, self.channel.max_on_time])
+            # Longer than half a nutation period in the body a pulse works against itself.
+            longest = max(min(self.channel.max_on_time, 0.5 * spacecraft.body_period), pulse.on_time)
+            self.upper = np.array([latest, longest])
         else:
             self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
             self.scale = np.array([pace, pulse.magnitude, 1.0])
             self.lower = np.array([earliest, 0.0, -np.inf])
-            self.upper = np.full(3, np.inf)
+            self.upper = np.array([latest, np.inf, np.inf])
 
     def turn(self, x: Vector) -> Pulse:
         """The pulse with these settings."""

@@ -21,7 +21,7 @@ from nutdamp.schemes import Options, trim
 from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
-from nutdamp.schemes.windows import Windows
+from nutdamp.schemes.windows import Windows, usable
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
 
 DEAREST = 2.0
@@ -32,6 +32,9 @@ CLOSE_IN_COST = 1.02
 
 CLOSE_IN_SHORT = 1.1
 """Where on-times cannot give the whole impulse, candidates that miss nearly as much count as equal."""
+
+MANY = 2000
+"""Closings of H looked at for each pair one by one."""
 
 SHORTLIST = 6
 """Candidates that are flown and trimmed, at most."""
@@ -54,7 +57,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         return _steered(spacecraft, torquer, options)
-    channels = [channel for channel in spacecraft.channels if channel.damps]
+    channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     return _fixed(spacecraft, channels, options)
@@ -70,7 +73,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
     halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
     best: tuple[Pulse, Pulse] | None = None
-    for turns in range(1, max(int(windows.horizon / halves.wait), 1) + 1, 2):
+    for turns in range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2):
         wait = turns * halves.wait
         for start in _starts(windows, spacecraft.limits.earliest, on_times, wait):
             pulses = _pair(spacecraft, torquer, halves, start, wait, on_times)
@@ -85,7 +88,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
         )
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
-    return trim.refine(spacecraft, Schedule(best), count=2, momentum=True)
+    return trim.refine(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
 
 
 def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
@@ -127,8 +130,8 @@ def _pair(
         begin = walk.windows.nearest_tick(centre - 0.5 * on_time)
         centre = begin + 0.5 * on_time
         angle = cmath.phase(-walk.omega_at(centre))
-        impulse = half if torquer.torque is None else torquer.torque * on_time
-        pulses.append(steerable_pulse(torquer, centre, angle, impulse=impulse))
+        asked = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
+        pulses.append(steerable_pulse(torquer, centre, angle, **asked))
         walk.fire(pulses[-1])
     return pulses[0], pulses[1]
 
@@ -184,7 +187,7 @@ def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tup
     )
     made = Schedule(pulses)
     if not literal:
-        made = trim.refine(spacecraft, made, count=2, momentum=True)
+        made = trim.refine(spacecraft, made, chosen=(0, 1), momentum=True)
     left = float(np.linalg.norm(trim.misses(spacecraft, made)))
     return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
 
@@ -217,11 +220,14 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     sense = math.copysign(1.0, rate)
     first_wait = ((math.pi - turn) * sense) % (2 * math.pi) / abs(rate)
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
-    waits = first_wait + 2 * math.pi / abs(rate) * np.arange(count)
+    turns = _turns(count, turn + a * spin * first_wait, 2 * math.pi * a * spin / abs(rate))
+    waits = first_wait + 2 * math.pi / abs(rate) * turns
     halves = damping.half_pulses(A, C, abs(omega0), spin)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
         halves = damping.half_pulses_as_printed(A, C, abs(omega0), spin)
-        waits = halves.wait * np.arange(1, max(int(spacecraft.horizon / halves.wait), 1) + 1, 2)
+        count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
+        odd = 2 * _turns(count, turn + a * spin * halves.wait, 2 * a * spin * halves.wait) + 1
+        waits = halves.wait * odd
     miss = np.angle(np.exp(1j * (turn + a * spin * waits)))
     factor = 1.0 / np.cos(0.5 * miss)
     placed = (
@@ -229,6 +235,19 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
         for index in _promising(factor)
     )
     return [candidate for candidate in placed if candidate is not None]
+
+
+def _turns(count: int, miss: float, step: float) -> Vector:
+    """Whole turns 0 to ``count`` - 1 to look at, ascending, where ψ = ``miss`` + ``step`` · turn (mod 2π).
+
+    All of the first `MANY`; beyond them, near a sphere or with a horizon of years, those next to ψ = 0.
+    """
+    first = np.arange(min(count, MANY), dtype=float)
+    if count <= MANY or step == 0.0:
+        return first
+    crossings = (2 * math.pi * np.arange(MANY) - math.copysign(1.0, step) * miss) / abs(step)
+    near = np.round(crossings)[:, None] + np.array([-1.0, 0.0, 1.0])
+    return np.union1d(first, near[(near >= 0) & (near < count)])
 
 
 def _promising(factor: Vector) -> Vector:
@@ -275,21 +294,24 @@ def _place(
         period = 2 * math.pi / abs(a * spin)
         first = phase / (a * spin)
         first += max(math.ceil((earliest + 0.5 * on_times[0] - first) / period), 0) * period
+    if wait - 0.5 * sum(on_times) < spacecraft.limits.gap:
+        return None
     while first + wait + 0.5 * on_times[1] <= windows.horizon:
-        pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-        if trim.keeps_limits(spacecraft, pulses):
+        starts = (first - 0.5 * on_times[0], first + wait - 0.5 * on_times[1])
+        blocked = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
+        delay = max(
+            (free - start for free, start in zip(blocked, starts, strict=True) if free is not None), default=0.0
+        )
+        if delay == 0.0:
+            pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
             made = Schedule(pulses)
             cost = made.total_impulse if made.propellant is None else made.propellant
-            return Candidate(
-                short if short > 1e-9 else 0.0,
-                cost,
-                made.end,
-                (one, two),
-                ((first, on_times[0]), (first + wait, on_times[1])),
-                miss,
-                factor,
-            )
-        first += period
+            timing = ((first, on_times[0]), (first + wait, on_times[1]))
+            return Candidate(short if short > 1e-9 else 0.0, cost, made.end, (one, two), timing, miss, factor)
+        if a == 0.0:
+            first += delay
+        else:
+            first += max(math.ceil(delay / period), 1) * period
     return None
 
 

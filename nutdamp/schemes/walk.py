@@ -172,4 +172,4 @@ class Walk:
             return None
         centre = start + 0.5 * on_time
         angle = cmath.phase(-self.omega_at(centre))
-        return steerable_pulse(steerable, centre, angle, impulse=steerable.torque * on_time)
+        return steerable_pulse(steerable, centre, angle, on_time=on_time)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft import Channel, Spacecraft
 
 SLACK = 1e-9
 """Seconds by which rounding may overstep a limit; far below any command resolution."""
@@ -58,3 +58,16 @@ class Windows:
         least = max(math.ceil((shortest - SLACK) / tick), 1)
         most = math.inf if math.isinf(longest) else math.floor((longest + SLACK) / tick)
         return float(min(max(round(wanted / tick), least), most)) * tick
+
+
+def usable(spacecraft: Spacecraft) -> list[Channel]:
+    """The channels that schemes fire: more transverse than axial, with an on-time that can be commanded."""
+    tick = spacecraft.limits.tick
+
+    def commandable(channel: Channel) -> bool:
+        if tick is None:
+            return True
+        least = max(math.ceil((channel.min_on_time - SLACK) / tick), 1)
+        return least * tick <= channel.max_on_time + SLACK
+
+    return [channel for channel in spacecraft.channels if channel.damps and commandable(channel)]

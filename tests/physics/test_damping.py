@@ -50,8 +50,8 @@ def test_magnus_21_one_impulse_against_omega_takes_out_all_and_moves_h_by_the_nu
     theta = math.radians(degrees)
     omega = cmath.rect(cones.transverse_rate(A, C, theta, spin), 0.7)
     nutation, shift, _ = after(A, C, spin, omega, [(0.0, -A * omega)])
-    assert nutation < 2 * EPS
-    assert shift == pytest.approx(theta, rel=1e-9, abs=4 * EPS)
+    assert nutation < 2 * EPS * max(1.0, math.tan(theta))  # the rounding of A|ω|, as an angle
+    assert shift == pytest.approx(theta, abs=8 * EPS)
 
 
 @pytest.mark.parametrize("degrees", ANGLES)

@@ -1,0 +1,171 @@
+"""Least propellant over channels and firing times: no nutation left, and H back where it was.
+
+The linear program of `program` finds the burns; what small angles neglect is measured on the flown schedule and given
+back to the program as a target; then moments and on-times are trimmed on the true motion. Two bounds go with the
+plan: the program's own least cost, to first order, and the rigorous one of the first equation alone.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude
+from nutdamp.schedule import Bounds, Schedule, channel_pulse
+from nutdamp.schemes import Options, trim
+from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.program import Burn, Program, Solution
+from nutdamp.schemes.windows import SLACK, Windows, usable
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+REPAIRS = 40
+"""Rounds in which burns that break a limit are moved elsewhere."""
+
+AIMS = 4
+"""Rounds in which the program's target is corrected by the shift of H that was flown."""
+
+UNMET = 1e-7
+"""Share of A|ω0| that slots may fail to supply: the program's own tolerance."""
+
+LEFT = math.radians(1e-6)
+"""rad of nutation and shift of H below which a plan has been found."""
+
+KNOBS = 6
+"""Pulses that are trimmed at most: the longest ones, two numbers each for four equations."""
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """The cheapest schedule found, with its bounds.
+
+    Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
+    """
+    channels = tuple(usable(spacecraft))
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    costs, unit = _costs(channels, options)
+    momentum = not options.free_axis
+    target = np.zeros(2)
+    first: Solution | None = None
+    best: Schedule | None = None
+    for _ in range(AIMS):
+        program = Program(spacecraft, channels, costs, momentum, target)
+        solution = program.solve()
+        if first is None:
+            if solution.unmet > UNMET:
+                raise Infeasible(_unreachable(spacecraft, channels, costs, momentum))
+            first = solution
+        made = _trimmed(spacecraft, _repaired(spacecraft, program, solution), momentum)
+        if best is None or _left(spacecraft, made, momentum) < _left(spacecraft, best, momentum):
+            best = made
+        if not momentum or _left(spacecraft, best, momentum) < LEFT:
+            break
+        target = target - _shift(spacecraft, made)
+    assert best is not None
+    assert first is not None
+    if spacecraft.limits.tick is None and _left(spacecraft, best, momentum) > LEFT:
+        raise Infeasible(
+            "not found: the refinement on the true motion did not converge "
+            f"(it leaves {math.degrees(_left(spacecraft, best, momentum)):.2g}°); a longer horizon may help"
+        )
+    rigorous = Program(spacecraft, channels, costs, momentum=False, ideal=True).solve().cost
+    return Schedule(best.pulses, best.notes, Bounds(first.cost, min(rigorous, first.cost), unit))
+
+
+def _costs(channels: tuple[Channel, ...], options: Options) -> tuple[Vector, str]:
+    """Cost of one N m s of each channel's transverse impulse, and its unit."""
+    flows = [channel.mass_flow for channel in channels]
+    strengths = np.array([abs(channel.transverse) for channel in channels])
+    known = [flow for flow in flows if flow is not None]
+    if options.least == "propellant" and len(known) == len(flows):
+        return np.array(known) / strengths, "kg"
+    return np.array([float(np.linalg.norm(channel.torque)) for channel in channels]) / strengths, "N m s"
+
+
+def _left(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> float:
+    """Largest of what the flown schedule leaves, rad."""
+    residual = flight.flown(spacecraft, made).residual
+    return max(residual.nutation, residual.momentum_shift) if momentum else residual.nutation
+
+
+def _shift(spacecraft: Spacecraft, made: Schedule) -> Vector:
+    """Δh of the flown schedule in the inertial directions e1(0), e2(0), N m s."""
+    start, moments = spacecraft.initial, np.asarray(spacecraft.inertia.moments)
+    end = flight.flown(spacecraft, made).settled
+    before = attitude.rotate(start.quaternion, start.rates * moments)
+    after = attitude.rotate(end.quaternion, end.rates * moments)
+    in_body = attitude.matrix(start.quaternion).T @ (after - before)
+    return np.asarray(in_body[:2])
+
+
+def _repaired(spacecraft: Spacecraft, program: Program, solution: Solution) -> Schedule:
+    """The burns as pulses, once none of them breaks a limit: where one does, its slots are forbidden."""
+    for _ in range(REPAIRS):
+        broken = next(_broken(spacecraft, program, solution.burns), None)
+        if broken is None:
+            break
+        program.forbid(*broken)
+        solution = program.solve()
+        if solution.unmet > UNMET:
+            raise Infeasible("not found: on-times, gap and max_pulses leave no burns that the program can use")
+    windows = Windows(spacecraft)
+    pulses = []
+    for burn in solution.burns:
+        on_time = windows.on_time(burn.on_time, burn.channel.min_on_time, burn.channel.max_on_time)
+        start = windows.nearest_tick(max(burn.t - 0.5 * on_time, spacecraft.limits.earliest))
+        start = min(start, spacecraft.horizon - on_time)
+        pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
+    return Schedule(tuple(pulses))
+
+
+Span = tuple[Channel | None, float, float]
+
+
+def _broken(spacecraft: Spacecraft, program: Program, burns: tuple[Burn, ...]) -> Iterator[Span]:
+    """What to forbid: ends of too long burns, too short ones, the shorter of two too near, the least of too many."""
+    limits, width = spacecraft.limits, program.width
+    for burn in burns:
+        longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
+        if burn.on_time > longest + SLACK:
+            reach = burn.on_time + width
+            yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
+            yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
+        if burn.on_time < 0.5 * shortest:
+            yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
+    for one, two in itertools.pairwise(burns):
+        space = max(limits.gap, 0.0)
+        near = two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + space - SLACK
+        if near and (space > 0.0 or one.channel is two.channel):
+            less = min(one, two, key=lambda burn: burn.on_time)
+            reach = 0.5 * less.on_time + width
+            yield less.channel, less.t - reach, less.t + reach
+    if limits.max_pulses is not None and len(burns) > limits.max_pulses:
+        least = min(burns, key=lambda burn: burn.on_time * abs(burn.channel.transverse))
+        reach = 0.5 * least.on_time + 2.0 * width
+        yield least.channel, least.t - reach, least.t + reach
+
+
+def _trimmed(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> Schedule:
+    """The schedule with its longest pulses trimmed on the flown motion."""
+    order = sorted(range(len(made)), key=lambda index: -made.pulses[index].magnitude)
+    return trim.refine(spacecraft, made, chosen=sorted(order[:KNOBS]), momentum=momentum)
+
+
+def _unreachable(spacecraft: Spacecraft, channels: tuple[Channel, ...], costs: Vector, momentum: bool) -> str:
+    """Which limit to relax where the program has no solution."""
+    left = Program(spacecraft, channels, costs, momentum=False).solve().unmet
+    if momentum and left <= UNMET:
+        return (
+            f"within {spacecraft.horizon:.4g} s the nutation can be taken out, but H not be kept where it is; "
+            "set limits.horizon later, or use --free-axis"
+        )
+    names = ", ".join(channel.name for channel in channels)
+    share = 100.0 * min(left, 1.0)
+    return (
+        f"within {spacecraft.horizon:.4g} s the channels ({names}) cannot take out the nutation, {share:.2g} % of it "
+        "stays; set limits.horizon later, shorten blackout windows, or allow longer pulses"
+    )

@@ -1,0 +1,204 @@
+"""Every scheme under any limits: a feasible plan keeps them all and lowers the nutation, an infeasible one says why."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from builders import channel, cross, fan, spinner, within
+from checker import violations
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from nutdamp import planning
+from nutdamp.schemes import Options
+from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
+
+PATIENCE = 20.0
+"""s for one plan, which takes some hundredths; so that an endless search fails and does not hang."""
+
+ASKED = {
+    "one-pulse": ("one-pulse", Options()),
+    "two-pulse": ("two-pulse", Options()),
+    "two-pulse, literal": ("two-pulse", Options(literal=True)),
+    "four-pulse": ("four-pulse", Options()),
+    "four-pulse, coarse": ("four-pulse", Options(coarse=True)),
+}
+
+exponents = st.floats(-1.5, 0.5)
+
+
+@st.composite
+def channels(draw: st.DrawFn, needed: float, period: float) -> tuple[Channel, ...]:
+    """One to six, of any direction, mostly transverse; on-times from a thousandth to a multiple of what is needed."""
+    made = []
+    for index in range(draw(st.integers(1, 6))):
+        angle = draw(st.sampled_from([0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi]) | st.floats(-math.pi, math.pi))
+        size = needed / (period * 10 ** draw(exponents))
+        axial = size * draw(st.sampled_from([0.0, 0.0, 0.05, -0.2, 1.5]))
+        shortest = period * 10 ** draw(st.floats(-4.0, -1.0)) if draw(st.booleans()) else 0.0
+        longest = shortest + period * 10 ** draw(st.floats(-3.0, 0.0)) if draw(st.booleans()) else math.inf
+        made.append(
+            channel(
+                f"T{index}",
+                size * math.cos(angle),
+                size * math.sin(angle),
+                axial,
+                min_on_time=shortest,
+                max_on_time=longest,
+                isp=draw(st.sampled_from([None, 220.0])),
+                thrust=1.0,
+                force=(0.0, 0.0, 1.0),
+            )
+        )
+    return tuple(made)
+
+
+@st.composite
+def limits(draw: st.DrawFn, period: float, horizon: float) -> Limits:
+    end = horizon if draw(st.booleans()) else period * 10 ** draw(st.floats(-1.0, 2.0))
+    windows = draw(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), max_size=3))
+    return Limits(
+        horizon=None if end == horizon else end,
+        earliest=end * draw(st.sampled_from([0.0, 0.0, 0.1]) | st.floats(0.0, 0.9)),
+        gap=period * draw(st.sampled_from([0.0, 0.0, 0.01, 0.3, 3.0])),
+        tick=draw(st.sampled_from([None, None, 1e-3, 0.01, 0.1]) | st.floats(1e-4, 0.3).map(lambda x: x * period)),
+        max_pulses=draw(st.none() | st.integers(1, 9)),
+        blackout=tuple(
+            (min(pair) * min(end, 10 * period), max(pair) * min(end, 10 * period)) for pair in sorted(windows)
+        ),
+    )
+
+
+@st.composite
+def spacecraft(draw: st.DrawFn) -> Spacecraft:
+    """Prolate, oblate, sphere, nearly one, flat disc; three different moments now and then; thrusters, torquer, both."""
+    A = 10 ** draw(st.floats(-1.0, 4.0))
+    a = draw(st.floats(-0.99, 0.95) | st.sampled_from([0.0, -1.0, 0.25, 0.2, -1 / 3, 1e-3, -1e-3]))
+    C = A * (1 - a)
+    moments = (A, A, C)
+    if draw(st.integers(0, 4)) == 0 and abs(a) > 0.3 and a > -0.9:
+        spread = draw(st.floats(0.01, 0.15))  # still stable, and still a body
+        moments = (A * (1 + spread), A * (1 - spread), C)
+    spin = draw(st.floats(0.1, 10.0)) * draw(st.sampled_from([1.0, -1.0]))
+    degrees = draw(st.floats(0.01, 10.0) | st.floats(1.0, 40.0))
+    phase = draw(st.sampled_from([0.0, 0.5 * math.pi, math.pi]) | st.floats(-math.pi, math.pi))
+    plain = spinner(spin=spin, degrees=degrees, phase=phase, moments=moments)
+    period = min(plain.body_period, plain.inertial_period)
+    needed = plain.least_impulse
+    fixed = draw(channels(needed, period)) if draw(st.integers(0, 4)) else ()
+    weak = st.just(None) | exponents.map(lambda x: needed / (period * 10**x))
+    steerable = Steerable(draw(weak)) if draw(st.integers(0, 2)) == 0 else None
+    return spinner(
+        spin=spin,
+        degrees=degrees,
+        phase=phase,
+        moments=moments,
+        channels=fixed,
+        steerable=steerable,
+        limits=draw(limits(period, plain.horizon)),
+        mass=250.0,
+    )
+
+
+def check(body: Spacecraft, scheme: str, options: Options) -> None:
+    with within(PATIENCE):
+        plan = planning.plan(body, scheme, options)
+        figures = (plan.residual, plan.flown, plan.delta_v, plan.spin_change, plan.meets_requirement)
+    if not plan.feasible:
+        assert plan.why
+        assert len(plan.pulses) == 0
+        assert figures == (None,) * 5
+        return
+    assert plan.why is None
+    assert violations(body, plan.pulses) == []
+    assert len(plan.pulses) > 0
+    assert plan.flown is not None
+    assert plan.residual is not None
+    assert plan.flown.nutation < body.nutation
+    assert plan.spin_change is not None
+    for left in (plan.flown, plan.residual):
+        assert np.isfinite([left.nutation, left.body_cone, left.space_cone, left.momentum_shift]).all()
+    axial = math.fsum(pulse.impulse[2] for pulse in plan.pulses)
+    if body.inertia.symmetric:
+        assert plan.spin_change == pytest.approx(axial / body.inertia.C, abs=1e-9 * abs(body.spin))
+    if scheme == "two-pulse":
+        assert len(plan.pulses) == 2
+
+
+@settings(max_examples=150, phases=[Phase.explicit, Phase.generate], suppress_health_check=[HealthCheck.too_slow])
+@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@given(body=spacecraft())
+def test_whatever_the_limits(body: Spacecraft, asked: tuple[str, Options]) -> None:
+    check(body, *asked)
+
+
+HARD = {
+    "tick as long as the horizon": Limits(tick=10.0, horizon=10.0),
+    "tick longer than the horizon": Limits(tick=1e3, horizon=10.0),
+    "tick of a nanosecond": Limits(tick=1e-9, earliest=1.0 / 3.0, blackout=((1.0, 2.0 / 3.0 + 1.0),)),
+    "horizon too short for anything": Limits(horizon=1e-3),
+    "earliest at the end": Limits(earliest=124.0),
+    "earliest after the default horizon": Limits(earliest=1e9),
+    "gap longer than the horizon": Limits(gap=1e6),
+    "all dark": Limits(blackout=((0.0, 1e9),)),
+    "hundred dark windows": Limits(blackout=tuple((0.7 * n, 0.7 * n + 0.6) for n in range(100))),
+    "dark but for moments": Limits(blackout=tuple((0.7 * n, 0.7 * n + 0.69999) for n in range(1000))),
+    "windows of no length": Limits(blackout=tuple((0.1 * n, 0.1 * n) for n in range(200))),
+    "one pulse": Limits(max_pulses=1),
+    "a year": Limits(horizon=3.2e7, gap=3600.0),
+}
+
+
+@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
+def test_awkward_limits(hard: Limits, asked: tuple[str, Options]) -> None:
+    for actuators in (cross(20.0), cross(0.5, min_on_time=0.02, max_on_time=0.3), fan(16, 3.0)):
+        check(spinner(channels=actuators, limits=hard), *asked)
+    for torque in (None, 50.0, 0.5):
+        if asked[0] != "four-pulse":
+            check(spinner(steerable=Steerable(torque), limits=hard), *asked)
+
+
+@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e9], ids=str)
+def test_units_of_mass_do_not_matter(scale: float, asked: tuple[str, Options]) -> None:
+    """Inertia and torques scaled together: the same pulses."""
+    plain, scaled = (
+        planning.plan(spinner(120.0 * s, 80.0 * s, channels=cross(20.0 * s)), *asked) for s in (1.0, scale)
+    )
+    assert scaled.feasible == plain.feasible
+    assert [one.channel for one in scaled.pulses] == [one.channel for one in plain.pulses]
+    for one, other in zip(plain.pulses, scaled.pulses, strict=True):
+        assert other.t == pytest.approx(one.t, rel=1e-9)
+        assert other.on_time == pytest.approx(one.on_time, rel=1e-9)
+
+
+@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("scale", [1e-6, 1e3], ids=str)
+def test_units_of_time_do_not_matter(scale: float, asked: tuple[str, Options]) -> None:
+    """Spin × s, torques × s²: the same pulses s times as fast."""
+    plain, scaled = (planning.plan(spinner(spin=3.0 * s, channels=cross(20.0 * s * s)), *asked) for s in (1.0, scale))
+    assert [one.channel for one in scaled.pulses] == [one.channel for one in plain.pulses]
+    for one, other in zip(plain.pulses, scaled.pulses, strict=True):
+        assert other.t * scale == pytest.approx(one.t, rel=1e-8)
+        assert other.on_time * scale == pytest.approx(one.on_time, rel=1e-8)
+
+
+@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("degrees", [1e-9, 1e-6, 1e-3, 70.0, 89.0, 89.999])
+def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, asked: tuple[str, Options]) -> None:
+    for C in (40.0, 80.0, 120.0, 200.0, 240.0):
+        for spin in (3.0, -3.0):
+            plain = spinner(120.0, C, spin, degrees)
+            torque = plain.least_impulse * 3.0
+            check(spinner(120.0, C, spin, degrees, channels=cross(torque)), *asked)
+            if asked[0] != "four-pulse":
+                check(spinner(120.0, C, spin, degrees, steerable=Steerable(torque)), *asked)
+
+
+def test_sixty_channels() -> None:
+    body = spinner(channels=fan(60, 4.0))
+    for asked in ASKED.values():
+        check(body, *asked)
