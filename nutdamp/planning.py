@@ -94,7 +94,23 @@ class Plan:
         """What a reader should know: remarks of the scheme, why nutation is left, what I1 ≠ I2 does."""
         if self.flown is None or not len(self.pulses):
             return self.pulses.notes
-        return (*self.pulses.notes, *self._remainder(), *self._asymmetry())
+        return (*self.pulses.notes, *self._proof(), *self._remainder(), *self._asymmetry())
+
+    def _proof(self) -> tuple[str, ...]:
+        """How much cheaper another schedule could be."""
+        bounds = self.pulses.bounds
+        if bounds is None:
+            return ()
+        spent = self.pulses.propellant if bounds.unit == "kg" else self.pulses.total_impulse
+        scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
+        if spent is None:
+            return ()
+        gap = 100.0 * (spent / bounds.first_order - 1.0)
+        return (
+            f"{scale * spent:.4g} {unit}; first-order least within {self.spacecraft.horizon:.4g} s "
+            f"{scale * bounds.first_order:.4g} {unit} (gap {gap:.2g} %); "
+            f"no schedule at all below {scale * bounds.rigorous:.4g} {unit}",
+        )
 
     def _remainder(self) -> tuple[str, ...]:
         """Why nutation is left."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
-from nutdamp.schemes import CLASSIC
+from nutdamp.schemes import CLASSIC, LEAST, Options
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
     from nutdamp.planning import Plan
-    from nutdamp.schemes import Options
     from nutdamp.spacecraft import Spacecraft
 
 DEFAULT_FILE = "spacecraft.yaml"
@@ -47,15 +47,30 @@ class Quantity(click.ParamType["float"]):
 
 
 def scheme_options(command: Command) -> Command:
-    """Options that the schemes read."""
+    """Options that the schemes read, gathered into one parameter ``options`` (`schemes.Options`)."""
+
+    @functools.wraps(command)
+    def gathered(*args: Any, **parameters: Any) -> Any:
+        chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
+        return command(*args, options=chosen, **parameters)
+
+    wrapped: Any = gathered
     for option in (
         click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
+        click.option("--free-axis", is_flag=True, help="optimal: let the angular momentum end where it likes."),
+        click.option(
+            "--least",
+            type=click.Choice(LEAST),
+            default=LEAST[0],
+            show_default=True,
+            help="optimal: what to save; impulse stands in where propellant is unknown.",
+        ),
         click.option("--literal", is_flag=True, help="two-pulse as printed by Magnus: equal halves, small-angle wait."),
         click.option("--coarse", is_flag=True, help="four-pulse with full pulses only, no shorter one at the end."),
         click.option("--on-time", type=Quantity("time"), help="Pulse length of four-pulse, such as 200ms."),
     ):
-        command = option(command)
-    return command
+        wrapped = option(wrapped)
+    return cast(Command, wrapped)
 
 
 def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:

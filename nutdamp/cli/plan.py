@@ -17,12 +17,12 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
-from nutdamp.schemes import CLASSIC, Options
+from nutdamp.schemes import CLASSIC, PLANNED, Options
 
 
 @click.command("plan")
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=click.Choice(CLASSIC), help="Plan this one only; repeatable.")
+@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan this one only; repeatable.")
 @scheme_options
 @click.option("--csv", metavar="FILE", help="Write the pulses of the recommended plan, or the one named.")
 @click.option("--json", metavar="FILE", help="Write all plans with their residuals.")
@@ -30,10 +30,7 @@ from nutdamp.schemes import CLASSIC, Options
 def command(
     spacecraft: str | None,
     names: tuple[str, ...],
-    on_time: float | None,
-    coarse: bool,
-    literal: bool,
-    with_disturbances: bool,
+    options: Options,
     csv: str | None,
     json: str | None,
     quiet: bool,
@@ -43,7 +40,7 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output.
     """
-    if on_time is not None and on_time <= 0.0:
+    if options.on_time is not None and options.on_time <= 0.0:
         raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
     names = tuple(dict.fromkeys(names))
     if csv is not None and len(names) > 1:
@@ -54,7 +51,7 @@ def command(
 
     from nutdamp.planning import compare
 
-    compared = compare(body, names or CLASSIC, Options(on_time, coarse, literal, with_disturbances))
+    compared = compare(body, names or CLASSIC, options)
     chosen = compared.recommended
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:

@@ -37,10 +37,7 @@ def command(
     spacecraft: str | None,
     scheme: str | None,
     schedule: str | None,
-    on_time: float | None,
-    coarse: bool,
-    literal: bool,
-    with_disturbances: bool,
+    options: Options,
     real: bool,
     until: float | None,
     samples: int,
@@ -64,7 +61,6 @@ def command(
 
     from nutdamp import flight
 
-    options = Options(on_time, coarse, literal, with_disturbances)
     plan = plan_or_read(body, scheme, schedule, options, remark)
     pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until

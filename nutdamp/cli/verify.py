@@ -32,10 +32,7 @@ def command(
     spacecraft: str | None,
     scheme: str | None,
     schedule: str | None,
-    on_time: float | None,
-    coarse: bool,
-    literal: bool,
-    with_disturbances: bool,
+    options: Options,
     json: str | None,
     quiet: bool,
 ) -> None:
@@ -51,7 +48,7 @@ def command(
     from nutdamp.planning import unrounded
     from nutdamp.verification import verify
 
-    plan = plan_or_read(body, scheme, schedule, Options(on_time, coarse, literal, with_disturbances), remarks(quiet))
+    plan = plan_or_read(body, scheme, schedule, options, remarks(quiet))
     found = verify(body, plan.pulses, None if schedule else unrounded(plan))
     if json is not None:
         from nutdamp.files.output import json_text

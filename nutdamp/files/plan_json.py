@@ -62,6 +62,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "spin_change_rad_s": plan.spin_change,
         "residual": residual_json(plan.residual),
         "flown": residual_json(plan.flown),
+        "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": list(plan.remarks),
     }
 

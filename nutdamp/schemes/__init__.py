@@ -18,6 +18,10 @@ PLANNED = (*CLASSIC, "optimal")
 NAMES = (*PLANNED, "none")
 
 
+LEAST = ("propellant", "impulse")
+"""What the scheme optimal can save."""
+
+
 class Options(NamedTuple):
     """What a user may ask of the schemes; each reads what concerns it.
 

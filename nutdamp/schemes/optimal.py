@@ -32,11 +32,17 @@ AIMS = 4
 UNMET = 1e-7
 """Share of A|ω0| that slots may fail to supply: the program's own tolerance."""
 
+THRIFT = 0.004
+"""Share of the least cost that is given away for fewer pulses."""
+
+HASTE = 0.002
+"""How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
+
 LEFT = math.radians(1e-6)
 """rad of nutation and shift of H below which a plan has been found."""
 
-KNOBS = 6
-"""Pulses that are trimmed at most: the longest ones, two numbers each for four equations."""
+KNOBS = 8
+"""Pulses that are trimmed at most, two numbers each for four equations."""
 
 
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
@@ -59,6 +65,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
             if solution.unmet > UNMET:
                 raise Infeasible(_unreachable(spacecraft, channels, costs, momentum))
             first = solution
+        solution = _thinned(program, solution)
         made = _trimmed(spacecraft, _repaired(spacecraft, program, solution), momentum)
         if best is None or _left(spacecraft, made, momentum) < _left(spacecraft, best, momentum):
             best = made
@@ -100,6 +107,30 @@ def _shift(spacecraft: Spacecraft, made: Schedule) -> Vector:
     after = attitude.rotate(end.quaternion, end.rates * moments)
     in_body = attitude.matrix(start.quaternion).T @ (after - before)
     return np.asarray(in_body[:2])
+
+
+def _thinned(program: Program, solution: Solution) -> Solution:
+    """As few burns as cost hardly more: the longest are kept and may grow, as many as it takes.
+
+    The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
+    """
+    everywhere, most = program.forbidden, solution.cost * (1.0 + THRIFT)
+    program.haste = HASTE
+    solution = program.solve()
+    allowed, best = everywhere, solution
+    order = sorted(solution.burns, key=lambda burn: -burn.on_time * abs(burn.channel.transverse))
+    low, high = 1, len(order)
+    while low < high:
+        middle = (low + high) // 2
+        program.forbidden = everywhere.copy()
+        program.keep(order[:middle])
+        found = program.solve()
+        if found.unmet <= UNMET and found.cost <= most:
+            allowed, best, high = program.forbidden, found, middle
+        else:
+            low = middle + 1
+    program.forbidden = allowed
+    return best
 
 
 def _repaired(spacecraft: Spacecraft, program: Program, solution: Solution) -> Schedule:
@@ -150,9 +181,16 @@ def _broken(spacecraft: Spacecraft, program: Program, burns: tuple[Burn, ...]) -
 
 
 def _trimmed(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> Schedule:
-    """The schedule with its longest pulses trimmed on the flown motion."""
-    order = sorted(range(len(made)), key=lambda index: -made.pulses[index].magnitude)
-    return trim.refine(spacecraft, made, chosen=sorted(order[:KNOBS]), momentum=momentum)
+    """The schedule with the pulses that have most room trimmed on the flown motion."""
+    most = {channel.name: channel.max_on_time for channel in spacecraft.channels}
+
+    def stiffness(index: int) -> tuple[bool, float]:
+        """Pulses that may still grow first, and of them the longest."""
+        pulse = made.pulses[index]
+        return pulse.on_time > 0.95 * most[pulse.channel], -pulse.magnitude
+
+    chosen = sorted(sorted(range(len(made)), key=stiffness)[:KNOBS])
+    return trim.refine(spacecraft, made, chosen=chosen, momentum=momentum)
 
 
 def _unreachable(spacecraft: Spacecraft, channels: tuple[Channel, ...], costs: Vector, momentum: bool) -> str:

@@ -9,6 +9,7 @@ width loses come out right. Slots enter the program by their price: four equatio
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -71,7 +72,8 @@ class Program:
 
     ``costs`` (channels,) of one N m s each. ``momentum``: H is to shift by ``target`` (2,) N m s along e1(0), e2(0);
     else wherever it likes. ``ideal``: channels give any impulse at any moment, which no real one can do cheaper.
-    ``forbidden`` (channels, slots) marks slots that may not be used.
+    ``haste`` is by how much (relatively) the end of the horizon seems dearer than its beginning: among equals the
+    early moments are taken. ``forbidden`` (channels, slots) marks slots that may not be used.
     """
 
     spacecraft: Spacecraft
@@ -80,6 +82,7 @@ class Program:
     momentum: bool = True
     target: Vector = field(default_factory=lambda: np.zeros(2))
     ideal: bool = False
+    haste: float = 0.0
     width: float = field(init=False)
     centres: Vector = field(init=False)
     forbidden: NDArray[np.bool_] = field(init=False)
@@ -123,7 +126,9 @@ class Program:
             columns = sorted(taken)
             channels = np.array([column.channel for column in columns], dtype=int)
             times, widths = np.array([(column.t, column.width) for column in columns]).reshape(-1, 2).T
-            cost = np.concatenate([self.costs[channels] / dearest, np.full(slack.shape[1], SLACK_COST)])
+            cost = np.concatenate(
+                [self.costs[channels] / dearest * self._dearness(times), np.full(slack.shape[1], SLACK_COST)]
+            )
             most = np.where(widths > 0.0, self._strength[channels] * self.width / self._scale, np.inf)
             bounds = np.column_stack([np.zeros(len(cost)), np.concatenate([most, np.full(slack.shape[1], np.inf)])])
             matrix = np.hstack([self._coefficients(channels, times, widths), slack])
@@ -140,6 +145,9 @@ class Program:
             float(self.costs[channels] @ amounts),
             float(np.asarray(found.x)[len(columns) :].sum()),
         )
+
+    def _dearness(self, times: Vector) -> Vector:
+        return 1.0 + self.haste * times / float(self.centres[-1])
 
     def _coefficients(self, channels: NDArray[np.int_], times: Vector, widths: Vector) -> Vector:
         """What one unit of each column does in the equations, (equations, n)."""
@@ -162,7 +170,8 @@ class Program:
     def _priced(self, duals: Vector, dearest: float) -> list[Column]:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
         weights = duals[0::2] - 1j * duals[1::2]
-        gain = (self._directions[:, None] * (weights @ self._phases)).real - (self.costs / dearest)[:, None]
+        gain = (self._directions[:, None] * (weights @ self._phases)).real
+        gain -= (self.costs / dearest)[:, None] * self._dearness(self.centres)
         gain[self.forbidden] = -np.inf
         best = np.argsort(gain.ravel())[::-1][:BEST]
         weak = [divmod(int(index), gain.shape[1]) for index in best if gain.ravel()[index] > PRICE]
@@ -174,7 +183,8 @@ class Program:
             )
             tops = peaks[gain[channel][peaks] > -PEAK]
             times = self._climb(weights, int(channel), self.centres[tops])
-            worth = self._worth(weights, int(channel), times)[0] - self.costs[channel] / dearest
+            worth = self._worth(weights, int(channel), times)[0]
+            worth = worth - self.costs[channel] / dearest * self._dearness(times)
             order = np.argsort(worth)[::-1][:BEST]
             found += [Column(int(channel), float(times[i]), 0.0) for i in order if worth[i] > PRICE]
         return found
@@ -217,3 +227,11 @@ class Program:
         inside = (self.centres > start) & (self.centres < end)
         rows = slice(None) if channel is None else self.channels.index(channel)
         self.forbidden[rows, inside] = True
+
+    def keep(self, burns: Sequence[Burn]) -> None:
+        """Forbid all slots but those about ``burns``, which may grow by an eighth of the faster turn on each side."""
+        kept = np.zeros_like(self.forbidden)
+        for burn in burns:
+            reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
+            kept[self.channels.index(burn.channel)] |= np.abs(self.centres - burn.t) < reach
+        self.forbidden |= ~kept

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nutdamp import planning
+from nutdamp import flight
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import forced
 from nutdamp.planning import Plan, plan
@@ -62,7 +62,7 @@ def test_a_plan_says_how_much_is_due_to_unequal_moments() -> None:
     made = plan(body((123.0, 117.0, 80.0)), "four-pulse")
     (said,) = [remark for remark in made.remarks if "I1 ≠ I2 by 5 %" in remark]
     symmetric = replace(made.spacecraft, inertia=Inertia((120.0, 120.0, 80.0)))
-    without = planning.flight.flown(symmetric, made.pulses).residual.nutation
+    without = flight.flown(symmetric, made.pulses).residual.nutation
     assert f"{math.degrees(abs(left(made) - without)):.3g}°" in said
 
 
