@@ -26,8 +26,11 @@ from nutdamp.spacecraft import Channel, Spacecraft, Vector
 REPAIRS = 40
 """Rounds in which burns that break a limit are moved elsewhere."""
 
-AIMS = 4
+AIMS = 5
 """Rounds in which the program's target is corrected by the shift of H that was flown."""
+
+DEAR = 0.01
+"""Share above the program's least cost from which another round may find a cheaper schedule."""
 
 UNMET = 1e-7
 """Share of A|ω0| that slots may fail to supply: the program's own tolerance."""
@@ -57,7 +60,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     momentum = not options.free_axis
     target = np.zeros(2)
     first: Solution | None = None
-    best: Schedule | None = None
+    found: list[tuple[bool, float, Schedule]] = []
     for _ in range(AIMS):
         program = Program(spacecraft, channels, costs, momentum, target)
         solution = program.solve()
@@ -65,20 +68,21 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
             if solution.unmet > UNMET:
                 raise Infeasible(_unreachable(spacecraft, channels, costs, momentum))
             first = solution
-        solution = _thinned(program, solution)
-        made = _trimmed(spacecraft, _repaired(spacecraft, program, solution), momentum)
-        if best is None or _left(spacecraft, made, momentum) < _left(spacecraft, best, momentum):
-            best = made
-        if not momentum or _left(spacecraft, best, momentum) < LEFT:
+        aimed = _repaired(spacecraft, program, _thinned(program, solution))
+        made = _trimmed(spacecraft, aimed, momentum)
+        left = _left(spacecraft, made, momentum)
+        price = _price(made, channels, costs)
+        found.append((left > LEFT, price if left <= LEFT else left, made))
+        if not momentum or (left <= LEFT and price <= first.cost * (1.0 + DEAR)):
             break
-        target = target - _shift(spacecraft, made)
-    assert best is not None
-    assert first is not None
-    if spacecraft.limits.tick is None and _left(spacecraft, best, momentum) > LEFT:
+        target = target - _shift(spacecraft, aimed)
+    missed, left, best = min(found, key=lambda entry: entry[:2])
+    if spacecraft.limits.tick is None and missed:
         raise Infeasible(
             "not found: the refinement on the true motion did not converge "
-            f"(it leaves {math.degrees(_left(spacecraft, best, momentum)):.2g}°); a longer horizon may help"
+            f"(it leaves {math.degrees(left):.2g}°); a longer horizon may help"
         )
+    assert first is not None
     rigorous = Program(spacecraft, channels, costs, momentum=False, ideal=True).solve().cost
     return Schedule(best.pulses, best.notes, Bounds(first.cost, min(rigorous, first.cost), unit))
 
@@ -91,6 +95,12 @@ def _costs(channels: tuple[Channel, ...], options: Options) -> tuple[Vector, str
     if options.least == "propellant" and len(known) == len(flows):
         return np.array(known) / strengths, "kg"
     return np.array([float(np.linalg.norm(channel.torque)) for channel in channels]) / strengths, "N m s"
+
+
+def _price(made: Schedule, channels: tuple[Channel, ...], costs: Vector) -> float:
+    """What a schedule costs by the program's own prices."""
+    price = {channel.name: cost for channel, cost in zip(channels, costs, strict=True)}
+    return math.fsum(price[pulse.channel] * math.hypot(*pulse.impulse[:2]) for pulse in made)
 
 
 def _left(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> float:
