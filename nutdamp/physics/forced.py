@@ -6,6 +6,7 @@ breaks where the spin passes zero) or by a (a sphere is no exception). M = M1 + 
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -18,13 +19,18 @@ ComplexArray = NDArray[np.complex128]
 PANEL = 2.0
 """Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
-
 FRESNEL_FROM = 60.0
 """Phase in rad from which Fresnel functions are cheaper than panels."""
 
 FRESNEL_REACH = 100.0
 """Largest slope/sqrt(bend) for Fresnel functions: beyond it they differ from 1/2 by too few digits."""
+
+
+@functools.cache
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights of ten-point Gauss-Legendre quadrature, made when first used: numpy.polynomial loads slowly."""
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    return nodes, weights
 
 
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
@@ -65,9 +71,10 @@ def _by_panels(slope: Array, bend: Array, length: Array, variation: Array) -> Co
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     number = np.arange(len(owner)) - firsts[owner]
     width = length[owner] / counts[owner]
-    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * NODES
+    nodes, weights = _gauss()
+    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
     phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
-    panels = 0.5 * width * (np.exp(1j * phase) @ WEIGHTS)
+    panels = 0.5 * width * (np.exp(1j * phase) @ weights)
     return np.asarray(np.add.reduceat(panels, firsts))
 
 
@@ -119,7 +126,8 @@ def sampled_torque(
     owner = np.repeat(np.arange(len(counts)), counts)
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     width = (lengths / counts)[owner]
-    s = (np.arange(len(owner)) - firsts[owner] + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * NODES
+    nodes, weights = _gauss()
+    s = (np.arange(len(owner)) - firsts[owner] + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
     share = s / lengths[owner][:, None]
     growth = (last - first)[owner][:, None]
     alpha = alphas[owner][:, None] + s * (
@@ -127,7 +135,7 @@ def sampled_torque(
     )
     transverse = torques[:, 0] + 1j * torques[:, 1]
     torque = transverse[owner][:, None] * (1.0 - share) + transverse[owner + 1][:, None] * share
-    panels = 0.5 * width * ((torque * np.exp(1j * a * alpha)) @ WEIGHTS) / A
+    panels = 0.5 * width * ((torque * np.exp(1j * a * alpha)) @ weights) / A
     sums = omega0 + np.concatenate([[0.0], np.cumsum(np.add.reduceat(panels, firsts))])
     return sums * np.exp(-1j * a * alphas), spins
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nutdamp.physics import forced, triaxial
+from nutdamp.physics import forced
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Channel, Disturbance, Inertia, Spacecraft, Steerable, Thruster, Vector
 
@@ -51,6 +51,8 @@ def model_of(spacecraft: Spacecraft) -> Model:
     inertia = spacecraft.inertia
     if inertia.symmetric:
         return Model(spacecraft, undisturbed, np.ones(2))
+    from nutdamp.physics import triaxial  # a body of three moments needs it, and few plans are of one
+
     first, second, C = inertia.moments
     # a ω3 is the true nutation rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
     A = C / (1.0 - triaxial.body_nutation_rate(inertia.moments, 1.0))
