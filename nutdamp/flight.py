@@ -82,13 +82,17 @@ class Integrated:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A stretch of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped as it began."""
+    """A stretch of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped as it began.
+
+    ``completed`` pulses are over along it, ``completed_at_end`` at its very end (one more where a width ends).
+    """
 
     start: float
     end: float
     path: Path
     completed: int
     jump: bool
+    completed_at_end: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +141,9 @@ class Flight:
             if end > leg.start:
                 times = np.append(times, end)
             body, quaternion = leg.path.motion(times)
-            rows.append((times, body, quaternion, np.full(len(times), leg.completed)))
+            completed = np.full(len(times), leg.completed)
+            completed[times == leg.end] = leg.completed_at_end
+            rows.append((times, body, quaternion, completed))
         t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*rows, strict=True))
         return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
 
@@ -228,12 +234,12 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     now = 0.0
     for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
         path, state = setting.path(state, now, pulse.t)
-        legs.append(Leg(now, pulse.t, path, index, jump=True))
+        legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
         state = setting.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
         now = pulse.t
     last = max(until, schedule.end)
     path, _ = setting.path(state, now, last)
-    legs.append(Leg(now, last, path, len(schedule), jump=True))
+    legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
     return Flight(spacecraft, schedule, tuple(legs), state, setting.moments, tuple((one.t, one.t) for one in schedule))
 
 
@@ -270,9 +276,10 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     legs: list[Leg] = []
     settled = state
     for now, end in zip(edges, [*edges[1:], last], strict=True):
-        kicks = [pulse.impulse for pulse in pulses if pulse.on_time == 0.0 and pulse.t == now]
+        # So late, start and end of a very short pulse may be the same number: then it too acts at once.
+        kicks = [pulse.impulse for pulse in pulses if pulse.start == pulse.end == now]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(Leg(now, now, setting.path(state, now, now)[0], 0, jump=True))
+            legs.append(Leg(now, now, setting.path(state, now, now)[0], 0, jump=True, completed_at_end=0))
         for kick in kicks:
             state = setting.kicked(state, kick)
         if now == schedule.end:
@@ -281,26 +288,22 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
             pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start <= now and end <= pulse.end
         ]
         path, following = setting.path(state, now, end, torques)
-        completed = sum(pulse.end <= now for pulse in pulses)
-        legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0))
+        completed, at_end = (
+            sum(pulse.end < time or (pulse.end == time and (pulse.start < time or time == now)) for pulse in pulses)
+            for time in (now, end)
+        )
+        legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
 
 
 def largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:
-    """Largest angle in rad between H and the spin axis on the torque-free motion through ``momentum`` (body axes).
+    """Largest angle in rad between H and the spin axis on the torque-free motion through ``momentum`` (body axes)."""
+    if moments[0] == moments[1]:
+        return math.atan2(math.hypot(momentum[0], momentum[1]), sense * float(momentum[2]))
+    from nutdamp.physics import triaxial  # a body of three moments needs it, and few flights are of one
 
-    On the polhode 2T - H²/I3 = Σ H_j² (1/I_j - 1/I3), j = 1, 2, is constant; H is farthest from axis 3 where it
-    passes over axis 1 or 2. For I1 = I2 this is the constant nutation angle. If axis 3 is the middle axis, or
-    has the same moment as another, the bound is where the motion is now.
-    """
-    now = math.hypot(momentum[0], momentum[1])
-    first, second = (1.0 / moments[j] - 1.0 / moments[2] for j in (0, 1))
-    if first * second <= 0.0 or moments[0] == moments[1]:
-        return math.atan2(now, sense * float(momentum[2]))
-    level = float(momentum[0]) ** 2 * first + float(momentum[1]) ** 2 * second
-    transverse = math.sqrt(max(level / first, level / second))
-    total = float(np.linalg.norm(momentum))
-    axial = math.sqrt(max(total * total - transverse * transverse, 0.0))
-    return math.atan2(transverse, math.copysign(axial, sense * float(momentum[2])))
+    least, largest = triaxial.polhode_extremes(moments, momentum / np.asarray(moments))
+    # The extremes count from the end of the axis about which the body spins now, which may have been reversed.
+    return largest if sense * momentum[2] >= 0.0 else math.pi - least

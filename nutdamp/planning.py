@@ -155,7 +155,8 @@ def _momentum_gained(flown: Flight) -> Vector:
         force = np.asarray(sum(firing, np.zeros(3)))
         if leg.end == leg.start or not force.any():
             continue
-        turned = float(np.linalg.norm(leg.path.motion(np.array([leg.start]))[0])) * (leg.end - leg.start)
+        ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
+        turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
         edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
         middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
         for node, weight in (*LEGENDRE, *((-node, weight) for node, weight in LEGENDRE)):

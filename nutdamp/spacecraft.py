@@ -283,7 +283,9 @@ class Spacecraft:
         """The motion at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
         omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
         if self.attitude is None:
-            quaternion = attitude.frame_n(self.inertia.A, self.inertia.C, omega, spin)
+            first, second, third = self.inertia.moments
+            # With moments of one, rates are momenta: N goes by the true H.
+            quaternion = attitude.frame_n(1.0, 1.0, complex(first * omega.real, second * omega.imag), third * spin)
         else:
             quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
         return SpinState(omega, spin, quaternion)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ ComplexArray = NDArray[np.complex128]
 
 SERIES_REACH = 2.0
 """Largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel."""
+
+MOST_PANELS = 20_000
+"""A pulse over more phase than these span keeps less than 1e-4 of its impulse; it counts as keeping none."""
 
 
 def impulse_sum(
@@ -68,6 +72,8 @@ def width_factor(
     offset = 0.5 * a * spin_rate * half * half
     slope, bend = a * (spin + (spin_rate + drift) * half) + 1j * growth, 0.5 * a * (spin_rate + drift)
     panels = math.ceil((abs(slope) + abs(bend) * half) * half / SERIES_REACH) or 1
+    if panels > MOST_PANELS:
+        return 0.0 + 0.0j
     width = half / panels
     total = 0.0 + 0.0j
     for panel in range(panels):
@@ -107,19 +113,27 @@ def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate:
     def excess(on_time: float) -> float:
         return torque * on_time * abs(width_factor(a, spin, spin_rate, on_time)) - impulse
 
-    low, high = 0.0, min(longest, math.pi / rate if rate > 0 else math.inf)
-    if math.isinf(high):
-        high = 2.0 * plain
-    if excess(high) < 0.0:
-        return None
-    on_time = min(plain, high)
+    # From the pulse without axial torque outwards: the first on-time that does enough lies in the last step.
+    low, high = 0.0, min(plain, longest)
+    while excess(high) < 0.0:
+        if high >= longest or abs(a) * (abs(spin) + 0.5 * abs(spin_rate) * high) * high > 2.0 * math.pi:
+            return None
+        low, high = high, min(1.1 * high, longest)
+    return _crossing(excess, low, high)
+
+
+def _crossing(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Where ``excess`` rises through zero between ``low`` and ``high``: false position that halves a stale end."""
+    below, above = excess(low), excess(high)
     for _ in range(100):
-        miss = excess(on_time)
-        low, high = (on_time, high) if miss < 0.0 else (low, on_time)
-        # The slope of the pulse without axial torque serves: it is off by a few per cent at most.
-        step = on_time - miss / (torque * max(math.cos(0.5 * rate * on_time), 0.05))
-        following = step if low < step < high else 0.5 * (low + high)
-        if abs(following - on_time) <= 2e-16 * on_time:
+        if above == 0.0 or high - low <= 2e-16 * high:
             break
-        on_time = following
-    return on_time
+        middle = high - above * (high - low) / (above - below)
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+        value = excess(middle)
+        if value < 0.0:
+            low, below, above = middle, value, 0.5 * above
+        else:
+            high, above, below = middle, value, 0.5 * below
+    return high

@@ -12,7 +12,10 @@ from nutdamp.spacecraft import Channel, Spacecraft
 def no_channels(spacecraft: Spacecraft) -> str:
     """No body-fixed channel can damp."""
     if any(channel.damps for channel in spacecraft.channels):
-        return "limits.tick has no multiple between min_on_time and max_on_time of any channel; refine it"
+        return (
+            "no channel has an on-time that can be commanded: between min_on_time and max_on_time, a multiple of "
+            f"limits.tick, and within the {spacecraft.horizon - spacecraft.limits.earliest:.4g} s there are"
+        )
     if spacecraft.channels:
         return "no channel has a torque more transverse than axial, so none can damp a nutation"
     return "the file names no thrusters, and this scheme fires body-fixed ones"

@@ -62,12 +62,10 @@ class Windows:
 
 def usable(spacecraft: Spacecraft) -> list[Channel]:
     """The channels that schemes fire: more transverse than axial, with an on-time that can be commanded."""
-    tick = spacecraft.limits.tick
+    tick, time = spacecraft.limits.tick, spacecraft.horizon - spacecraft.limits.earliest
 
     def commandable(channel: Channel) -> bool:
-        if tick is None:
-            return True
-        least = max(math.ceil((channel.min_on_time - SLACK) / tick), 1)
-        return least * tick <= channel.max_on_time + SLACK
+        least = channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - SLACK) / tick), 1) * tick
+        return least <= min(channel.max_on_time, time) + SLACK
 
     return [channel for channel in spacecraft.channels if channel.damps and commandable(channel)]
