@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from dataclasses import replace
 
@@ -18,7 +19,6 @@ from nutdamp import flight
 from nutdamp.physics import attitude, cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Inertia, Spacecraft, Vector
-from nutdamp.track import Track
 
 EPS = float(np.finfo(float).eps)
 UNTIL = 12.0
@@ -60,10 +60,6 @@ def schedules(draw: st.DrawFn, *, ideal: bool = False, axial: bool = True) -> Sc
         impulse = [draw(st.floats(-40.0, 40.0)) for _ in range(2)] + [draw(st.floats(-60.0, 60.0)) if axial else 0.0]
         pulses.append(pulse(t, on_time, np.array(impulse), f"T{index}"))
     return Schedule(tuple(pulses))
-
-
-def momenta(track: Track) -> Vector:
-    return np.linalg.norm(track.momentum, axis=1)
 
 
 def state_at(flown: flight.Flight, time: float) -> tuple[Vector, Vector]:
@@ -194,7 +190,7 @@ def test_a_pulse_of_no_impulse_changes_nothing(
 
 def mirrored(vector: Vector) -> Vector:
     """An axial vector (rate, torque, H) in the mirror of the 2-3 plane: components in the plane change sign."""
-    return vector * np.array([1.0, -1.0, -1.0])
+    return np.asarray(vector * np.array([1.0, -1.0, -1.0]))
 
 
 def in_the_mirror(spacecraft: Spacecraft, made: Schedule) -> tuple[Spacecraft, Schedule]:
@@ -251,7 +247,7 @@ def test_for_ideal_impulses_both_models_are_one(spacecraft: Spacecraft, made: Sc
 def test_the_impulse_sum_gives_the_rates_after_real_widths_exactly(spacecraft: Spacecraft, made: Schedule) -> None:
     """With effective impulses; axial torques included as long as pulses with them do not overlap others."""
     ends = sorted((one.start, one.end, one.impulse[2]) for one in made)
-    overlap = any(later[0] < earlier[1] for earlier, later in zip(ends, ends[1:], strict=False))
+    overlap = any(later[0] < earlier[1] for earlier, later in itertools.pairwise(ends))
     axial = any(part[2] for part in ends)
     if overlap and axial:
         made = Schedule(tuple(replace(one, impulse=one.impulse * (1, 1, 0), torque=None) for one in made))

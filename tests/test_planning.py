@@ -1,7 +1,8 @@
-"""Plans judged: limits, requirement, figures of a plan against the reference integrator, and which one is recommended."""
+"""Plans judged: limits, requirement, figures against the reference integrator, and which one is recommended."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -298,17 +299,19 @@ def test_delta_v_of_couples_is_nothing_and_of_overlapping_pulses_their_sum() -> 
     rotation = reference.frame_n(body.inertia.moments, body.omega0)
     gained = np.zeros(3)
     edges = [one.start, two.start, one.end, two.end]
-    for begin, end in zip(edges, edges[1:], strict=False):
+    for begin, end in itertools.pairwise(edges):
         start = reference.fly(body.inertia.moments, body.omega0, events((one, two)), begin, rotation)
         pushing = [pulse for pulse in (one, two) if pulse.start <= begin and end <= pulse.end]
-        torque = np.sum([pulse.torque for pulse in pushing], axis=0)
-        force = np.sum([pulse.force for pulse in pushing], axis=0)
+        torque = np.sum([pulse.torque for pulse in pushing if pulse.torque is not None], axis=0)
+        force = np.sum([pulse.force for pulse in pushing if pulse.force is not None], axis=0)
         times = np.linspace(0.0, end - begin, 4001)
         motions = [start, *reference.coast(body.inertia.moments, start, torque, times[1:])]
         gained += simpson(np.array([motion.rotation @ force for motion in motions]), x=times, axis=0)
     assert together == pytest.approx(gained / 250.0, abs=1e-12)
     couple = channel("couple", 0.0, 20.0, 0.0, force=(0.0, 0.0, 0.0), thrust=20.0)
-    assert np.array_equal(Plan(body, "by hand", Schedule((channel_pulse(couple, 2.0, 1.0),))).delta_v, np.zeros(3))
+    balanced = Plan(body, "by hand", Schedule((channel_pulse(couple, 2.0, 1.0),))).delta_v
+    assert balanced is not None
+    assert not balanced.any()
 
 
 def test_delta_v_needs_mass_and_every_force() -> None:

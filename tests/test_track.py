@@ -41,7 +41,7 @@ def pointing(axes: list[tuple[float, float]]) -> track.Track:
 
 
 def degrees(pair: tuple[float, float]) -> list[float]:
-    return np.degrees(pair).tolist()
+    return [math.degrees(angle) for angle in pair]
 
 
 def test_ranges_of_right_ascension_and_declination() -> None:
@@ -70,8 +70,8 @@ def test_angles_from_the_planes_of_the_frame() -> None:
 
 def test_farthest_and_nearest_to_h_at_the_start_with_their_times() -> None:
     found = track.extremes(pointing([(0, 80), (90, 70), (180, 60), (270, 85)]))
-    assert found.farthest == (pytest.approx(math.radians(30), rel=1e-14), 2.0)
-    assert found.nearest == (pytest.approx(math.radians(5), rel=1e-14), 3.0)
+    assert found.farthest == pytest.approx((math.radians(30), 2.0), rel=1e-14)
+    assert found.nearest == pytest.approx((math.radians(5), 3.0), rel=1e-14)
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])

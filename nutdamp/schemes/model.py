@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nutdamp.physics import forced
-from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.windows import Windows
 from nutdamp.spacecraft import Channel, Disturbance, Inertia, Spacecraft, Steerable, Thruster, Vector
 
 
@@ -35,14 +36,28 @@ class Model:
         if self.truth.inertia.symmetric:
             return made
         channels = {channel.name: channel for channel in self.truth.channels}
-        return Schedule(tuple(self._pulse(pulse, channels) for pulse in made), made.notes, made.bounds)
+        windows, ready, pulses = Windows(self.truth), self.truth.limits.earliest, []
+        for pulse in made:
+            channel = channels.get(pulse.channel)
+            if channel is None:
+                pulses.append(self._steered(pulse, windows, ready))
+            else:
+                pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
+            ready = pulses[-1].end + self.truth.limits.gap
+        return Schedule(tuple(pulses), made.notes, made.bounds)
 
-    def _pulse(self, pulse: Pulse, channels: dict[str, Channel]) -> Pulse:
+    def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
+        """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits ask for it."""
         torquer = self.truth.torquer
-        if pulse.channel != STEERABLE or torquer is None:
-            return channel_pulse(channels[pulse.channel], pulse.t, pulse.on_time)
+        assert torquer is not None
         first, second = pulse.impulse[:2] / self.stretch
-        return steerable_pulse(torquer, pulse.t, math.atan2(second, first), impulse=math.hypot(first, second))
+        impulse, angle = math.hypot(first, second), math.atan2(second, first)
+        if torquer.torque is None:
+            return steerable_pulse(torquer, pulse.t, angle, impulse=impulse)
+        on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
+        start = windows.earliest_start(on_time, max(pulse.start, ready))
+        t = pulse.t if start is None else start + 0.5 * on_time
+        return steerable_pulse(torquer, t, angle, on_time=on_time)
 
 
 def model_of(spacecraft: Spacecraft) -> Model:

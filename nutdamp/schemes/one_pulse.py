@@ -83,11 +83,13 @@ def _train(
 
     longest = min(max_on_time, 0.5 * start.period)
     count = 1
-    if start.left > capacity(longest):
-        count = math.ceil(start.left / capacity(min(max_on_time, TRAIN_SHARE * start.period)))
+    single = math.isinf(torque) or rates.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
+    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
+    if not single and share > 0.0:
+        count = math.ceil(start.left / share)
         most = spacecraft.limits.max_pulses
         if most is not None and count > most:  # rather longer pulses than too many
-            count = min(most, math.ceil(start.left / capacity(longest)))
+            count = min(most, max(math.ceil(start.left / max(capacity(longest), share)), 1))
     walk = _fire_train(spacecraft, count, capacity(longest), fire)
     if spacecraft.growth > 0.0 and walk.pulses and walk.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.

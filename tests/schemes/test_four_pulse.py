@@ -1,4 +1,4 @@
-"""Body-fixed pulses at every alignment, Magnus 1970 section 4: spacing, sign rule, what coarse and fine damping leave."""
+"""Body-fixed pulses at every alignment, Magnus 1970 section 4: spacing, sign rule, what is left coarse and fine."""
 
 from __future__ import annotations
 
