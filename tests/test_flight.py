@@ -111,7 +111,7 @@ def test_start_is_the_attitude_of_the_file_or_else_frame_n() -> None:
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_frame_n_has_z_along_h_for_three_different_moments_too(spin: float) -> None:
-    """Fails at present (0.45° off): the frame is laid by the H of the equivalent symmetric body."""
+    """The frame is laid by the true H, not by that of the equivalent symmetric body (0.45° off)."""
     spacecraft = spinner(moments=(120.0, 100.0, 80.0), spin=spin, degrees=5.0)
     start = flight.flown(spacecraft, Schedule(), 1.0).track(2, 1.0)
     h = start.momentum[0] / np.linalg.norm(start.momentum[0])
@@ -352,7 +352,7 @@ def test_nutation_of_three_different_moments_is_the_largest_of_the_motion(
 def test_nutation_beyond_the_separatrix_is_the_largest_of_the_motion(
     moments: tuple[float, float, float], spin: float
 ) -> None:
-    """Fails at present (90°): H circles another axis and comes as near to the far end of axis 3 as to this one."""
+    """H circles another axis and comes as near to the far end of axis 3 as to this one."""
     spacecraft = spinner(moments=moments, spin=spin, degrees=80.0, phase=0.0 if moments[2] < 100 else 0.5 * math.pi)
     times = np.linspace(0.01, 60.0, 8001)
     start = reference.Motion(spacecraft.omega0, np.eye(3))
@@ -409,7 +409,7 @@ def test_flown_track_has_a_row_as_each_pulse_begins_and_ends() -> None:
 
 
 def test_pulses_completed_by_the_end_of_the_last_one_are_all() -> None:
-    """Fails at present (one too few): the row at the end of a pulse counts as if it were still on."""
+    """The row at the end of a pulse counts it as completed."""
     made = Schedule(WIDE.pulses[:2])
     track = flight.flown(spinner(), made, made.end).track(3, made.end)
     for number, one in enumerate(made, start=1):
@@ -460,7 +460,7 @@ def test_cone_angles_of_the_track_are_those_of_its_rates() -> None:
 
 
 def test_a_pulse_narrower_than_the_clock_can_tell_still_gives_its_impulse() -> None:
-    """Fails at present: at t = 10⁵ s start and end of a pulse of 1 ps are the same number, and it is not flown."""
+    """At t = 10⁵ s start and end of a pulse of 1 ps are the same number, and it is flown as an impulse."""
     made = Schedule((pulse(1e5, 1e-12, np.array([6.0, 0.0, 0.0])),))
     spacecraft = spinner(120.0, 120.0)  # a sphere, so that only the pulse changes ω
     settled = flight.flown(spacecraft, made).settled

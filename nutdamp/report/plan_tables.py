@@ -42,7 +42,7 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
     if not inertia.symmetric:
         first, second, _ = inertia.moments
-        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²: planned with A = (I1 + I2)/2, flown as they are")
+        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on a symmetric body alike")
     table.add_row("spin", f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})")
     table.add_row(
         "nutation", f"{degrees(spacecraft.nutation)} = body cone {degrees(body)} + space cone {degrees(space)}"

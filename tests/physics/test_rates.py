@@ -224,7 +224,7 @@ def test_on_time_with_axial_torque_gives_the_impulse_asked_for(
 
 
 def test_on_time_is_exact_where_the_axial_torque_reverses_the_spin() -> None:
-    """Fails at present (1.4e-7 instead of rounding): 100 steps of the secant with a slope that is far off."""
+    """A spin that passes zero within the pulse bends the curve; false position still finds the crossing to rounding."""
     a, spin, spin_rate, impulse = 0.847171258807392, -0.8766341758481142, 0.47537038364894224, 2.665260255191444
     on_time = rates.on_time_for(impulse, 1.0, a, spin, spin_rate, math.inf)
     assert on_time is not None
@@ -232,7 +232,7 @@ def test_on_time_is_exact_where_the_axial_torque_reverses_the_spin() -> None:
 
 
 def test_on_time_is_found_where_the_pulse_does_most_before_half_a_period_is_over() -> None:
-    """Fails at present (None): at the end of half a period less is reached than in between (30.6 N m s of 1/3)."""
+    """At the end of half a period less is reached than in between (30.6 N m s of 1/3): the first crossing counts."""
     a, spin, spin_rate, torque = 0.21068867019307735, -0.5783760751564644, 0.208649381851118, 2.947761893524505
     on_time = rates.on_time_for(21.796764904268404, torque, a, spin, spin_rate, math.inf)
     assert on_time is not None
@@ -240,7 +240,7 @@ def test_on_time_is_found_where_the_pulse_does_most_before_half_a_period_is_over
 
 
 def test_on_time_of_a_near_sphere_with_axial_torque_takes_no_time_to_find() -> None:
-    """Fails at present: the search begins with a pulse of half a nutation period, 10⁹ turns of the body long."""
+    """The search begins with the pulse without axial torque, not with one of 10⁹ turns of the body."""
     with within(2.0):
         on_time = rates.on_time_for(10.0, 5.0, 1e-9, 3.0, 0.01, math.inf)
     assert on_time == pytest.approx(2.0, rel=1e-12)

@@ -132,7 +132,7 @@ def test_on_time_outside_what_a_channel_allows_is_refused() -> None:
 @pytest.mark.parametrize("C", [80.0, 120.0])
 @pytest.mark.parametrize("on_time", [0.0, math.inf])
 def test_on_time_of_nothing_or_for_ever_is_refused(on_time: float, C: float) -> None:
-    """Fails at present: on a sphere 0 divides by zero, and infinity ends in not a number."""
+    """On a sphere too, where neither 0 nor infinity may be divided by."""
     plan = planning.plan(spinner(C=C, channels=cross(5.0)), "four-pulse", Options(on_time=on_time))
     assert not plan.feasible
     assert plan.why is not None
@@ -203,14 +203,14 @@ def test_a_tick_longer_than_a_channel_may_fire_leaves_that_channel_out() -> None
 
 
 def test_no_multiple_of_the_tick_within_the_bounds_leaves_the_channel_out() -> None:
-    """Fails at present: the multiple below the shortest is fired, and the plan is thrown away for it."""
+    """The multiple below the shortest must not be fired, nor the plan be thrown away for it."""
     channels = (*cross(3.0), channel("narrow", 2.0, 2.0, 0.0, min_on_time=0.12, max_on_time=0.19))
     plan = feasible(spinner(channels=channels, limits=Limits(tick=0.1)))
     assert all(pulse.channel != "narrow" for pulse in plan.pulses)
 
 
 def test_horizon_before_the_first_alignment_names_the_horizon_that_would_do() -> None:
-    """Fails at present where any on-time is allowed: "every channel's shortest pulse is too strong"."""
+    """Also where any on-time is allowed, and a shortest pulse has no length."""
     for shortest in (0.02, 0.0):
         body = spinner(channels=cross(20.0, min_on_time=shortest)[:1], limits=Limits(horizon=0.5))
         why = planning.plan(body, "four-pulse").why

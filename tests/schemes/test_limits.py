@@ -221,7 +221,7 @@ def test_many_channels() -> None:
 def test_torquer_on_a_body_of_three_different_moments_keeps_the_limits(
     limit: Limits, moments: tuple[float, float, float], torque: float, asked: tuple[str, Options]
 ) -> None:
-    """Fails at present: going from the symmetric model to the body changes on-times and moves starts."""
+    """Going from the symmetric model to the body changes on-times, and must not move starts out of the limits."""
     body = spinner(moments=moments, steerable=Steerable(torque), limits=limit)
     made = planning.plan(body, *asked)
     assert made.feasible, made.why

@@ -189,7 +189,7 @@ def test_without_transverse_channels_there_is_a_reason() -> None:
 
 
 def test_horizon_before_the_first_alignment_names_the_horizon_that_would_do() -> None:
-    """Also where any on-time is allowed. Fails at present: "every channel's shortest pulse is too strong"."""
+    """Also where any on-time is allowed, and a shortest pulse has no length."""
     for shortest in (0.02, 0.0):
         body = spinner(channels=cross(20.0, min_on_time=shortest)[:1], limits=Limits(horizon=0.5))
         why = infeasible(body)
@@ -207,7 +207,7 @@ def test_a_shortest_pulse_too_strong_says_so() -> None:
 def test_one_pulse_allowed_where_more_are_needed_does_what_one_can(phase: float, axial: float) -> None:
     """The longest useful pulse, half a body period, and no error.
 
-    Fails at present with some torques: on-time infinite, for rounding has put the most a pulse can do beyond itself.
+    With some torques rounding puts the most a pulse can do beyond itself; the on-time stays finite.
     """
     for torque in (31.45693363119974, 7.351789651391229, 4.901146515066305, 0.8803215669495988, 22.257278416867518):
         for ratio in (0.8, 2.0, 1.25, 1 / 3):
