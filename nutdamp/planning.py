@@ -218,7 +218,11 @@ def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
         channel = channels.get(pulse.channel)
         if channel is not None and not (channel.min_on_time - SLACK <= pulse.on_time <= channel.max_on_time + SLACK):
             broken.append(f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows")
-        previous_end = pulse.end
+        if limits.tick is not None:
+            for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
+                if abs(value - round(value / limits.tick) * limits.tick) > SLACK + 1e-6 * limits.tick:
+                    broken.append(f"{name} {what} off the ticks of {limits.tick:.6g} s")
+        previous_end = max(previous_end, pulse.end)
     if limits.max_pulses is not None and len(made) > limits.max_pulses:
         broken.append(f"{len(made)} pulses are more than {limits.max_pulses}")
     return broken

@@ -35,7 +35,7 @@ def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
 def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> HalfPulses:
     """The two equal halves of Magnus 1970 (21), (22), with Δt from the motion before the first pulse.
 
-    A small-angle scheme: it leaves H displaced by 0.0016° at θ = 2°, 0.19° at 10°, 5.1° at 30° (A/C = 1.5).
+    A small-angle scheme: it leaves H displaced by 0.0016° at θ = 2°, 0.19° at 10°, 5.1° at 30°, whatever A/C.
     """
     half = 0.5 * A * omega
     return HalfPulses(half, half, cones.half_turn(A, C, omega, spin))

@@ -153,6 +153,8 @@ def _repaired(spacecraft: Spacecraft, program: Program, solution: Solution) -> S
         solution = program.solve()
         if solution.unmet > UNMET:
             raise Infeasible("not found: on-times, gap and max_pulses leave no burns that the program can use")
+    else:
+        raise Infeasible("not found: no burns were found that keep on-times, gap and max_pulses all at once")
     windows = Windows(spacecraft)
     pulses = []
     for burn in solution.burns:
@@ -178,9 +180,8 @@ def _broken(spacecraft: Spacecraft, program: Program, burns: tuple[Burn, ...]) -
         if burn.on_time < 0.5 * shortest:
             yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
     for one, two in itertools.pairwise(burns):
-        space = max(limits.gap, 0.0)
-        near = two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + space - SLACK
-        if near and (space > 0.0 or one.channel is two.channel):
+        near = two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - SLACK
+        if near:
             less = min(one, two, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
             yield less.channel, less.t - reach, less.t + reach
