@@ -78,13 +78,15 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
 class Consequence:
     """What one disturbance does in the long run.
 
-    ``tilt`` (rad) is the steady angle between H and the spin axis that it forces, Magnus 1970 (13)/(14), K(14), K(15).
-    From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), both
-    angles are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
+    ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
+    ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14).
+    From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these
+    are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
     part changes the spin at ``spin_rate`` rad/s².
     """
 
     disturbance: Disturbance
+    precession: float | None
     tilt: float | None
     beat: float | None
     beat_period: float
@@ -110,7 +112,7 @@ def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
     A, C = inertia.A, inertia.C
     spin_rate = one.axial / C
     if one.transverse == 0.0:
-        return Consequence(one, 0.0, 0.0, math.inf, (), spin_rate)
+        return Consequence(one, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
     largest, period = forced.beat(A, C, spin, one.transverse, one.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
     if period > RESONANT * spacecraft.horizon:
@@ -120,10 +122,10 @@ def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
             for mark in MARKS
             if mark > spacecraft.nutation
         )
-        return Consequence(one, None, None, period, times, spin_rate)
+        return Consequence(one, None, None, None, period, times, spin_rate)
     steady = abs(forced.steady_response(A, C, spin, one.transverse, one.rate))
     tilt, swell = (cones.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
-    return Consequence(one, float(tilt), float(swell), period, (), spin_rate)
+    return Consequence(one, steady, float(tilt), float(swell), period, (), spin_rate)
 
 
 @dataclass(frozen=True, slots=True)

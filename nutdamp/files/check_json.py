@@ -53,6 +53,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
         "disturbances": [
             {
                 "name": found.disturbance.name or None,
+                "precession_rad_s": found.precession,
                 "forced_tilt_deg": None if found.tilt is None else math.degrees(found.tilt),
                 "beat_deg": None if found.beat is None else math.degrees(found.beat),
                 "beat_period_s": found.beat_period,

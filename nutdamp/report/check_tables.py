@@ -12,7 +12,7 @@ from rich.text import Text
 from nutdamp import survey
 from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header
-from nutdamp.report.text import degrees, duration, vector
+from nutdamp.report.text import degrees, duration, quantity, vector
 from nutdamp.spacecraft import Channel, Spacecraft
 
 
@@ -59,7 +59,8 @@ def _consequences(found: survey.Consequence) -> list[str]:
         texts.append(f"resonant with the nutation: drives it to {reached}")
     elif found.disturbance.transverse != 0.0:
         texts.append(
-            f"forces a tilt of {degrees(found.tilt)}; from rest the nutation beats up to {degrees(found.beat)} "
+            f"forces a tilt of {degrees(found.tilt)}, precession at {quantity(found.precession, 'rad/s')}; "
+            f"from rest the nutation beats up to {degrees(found.beat)} "
             f"every {duration(found.beat_period)}"
         )
     if found.spin_rate != 0.0:

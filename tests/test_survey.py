@@ -1,0 +1,87 @@
+"""``check``: what actuators can do, and what disturbances do in the long run, against flights."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from process import Run
+
+from nutdamp import flight, survey
+from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.physics import forced, stability
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft import Disturbance
+
+EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
+CALM = replace(EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]))
+
+
+def test_the_smallest_step_is_what_one_shortest_pulse_does_to_a_pure_spin() -> None:
+    for steps in survey.channel_steps(CALM):
+        shortest = channel_pulse(steps.channel, 1.0, steps.channel.min_on_time)
+        flown = flight.flown(CALM, Schedule((shortest,))).residual
+        assert steps.smallest == pytest.approx(flown.nutation, rel=1e-12)
+
+
+def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
+    """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it swells to the beat."""
+    for disturbance in (Disturbance(0.4 - 0.3j), Disturbance(0.2 + 0.1j, rate=-3.0), Disturbance(0.3j, rate=0.7)):
+        body = replace(CALM, disturbances=(disturbance,))
+        (found,) = survey.consequences(body)
+        assert found.tilt is not None
+        assert found.beat is not None
+        swollen = flight.flown(body, Schedule(), found.beat_period).track(401, found.beat_period).nutation
+        assert swollen.max() == pytest.approx(found.beat, rel=1e-4)
+        assert swollen[-1] < 1e-12
+        inertia = body.inertia
+        steady = forced.steady_response(inertia.A, inertia.C, 3.0, disturbance.transverse, disturbance.rate)
+        assert found.precession == pytest.approx(abs(steady), rel=1e-12)
+        kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
+        angles = flight.flown(kept, Schedule(), 10.0).track(50, 10.0).nutation
+        assert np.abs(angles - found.tilt).max() < 1e-12
+
+
+def test_precession_is_that_of_k14_and_k15() -> None:
+    inertia = CALM.inertia
+    fixed, space = Disturbance(0.4 + 0j), Disturbance(0.4 + 0j, rate=-3.0)
+    first, second = survey.consequences(replace(CALM, disturbances=(fixed, space)))
+    assert first.precession == pytest.approx(abs(stability.precession_body(inertia.A, inertia.C, 3.0, 0.4)), rel=1e-12)
+    assert second.precession == pytest.approx(abs(stability.precession_despun(inertia.C, 3.0, 0.4)), rel=1e-12)
+
+
+def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_told() -> None:
+    rate = -EXAMPLE.inertia.a * EXAMPLE.spin
+    body = replace(EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=rate),))
+    (found,) = survey.consequences(body)
+    assert found.tilt is None
+    mark, time = found.resonant[0]
+    assert mark == pytest.approx(math.radians(10.0))
+    assert flight.flown(body, Schedule(), time).track(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
+
+
+def test_the_nearest_pair_is_the_least_off_the_turn_between_halves() -> None:
+    pair = survey.nearest_pair(EXAMPLE)
+    assert pair is not None
+    assert (pair.first.name, pair.second.name) == ("+M1", "-M2")
+    assert abs(math.degrees(pair.miss)) == pytest.approx(0.086, abs=1e-3)  # 90° · (1 - cos 2.5°)
+    assert math.degrees(survey.mounting_angle(EXAMPLE)) == pytest.approx(90.0, abs=0.1)
+
+
+def test_check_shows_disturbances(run: Run, tmp_path: Path) -> None:
+    text = (
+        "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+        "disturbances: [{name: leak, torque: [20 mN m, 0, 0]}, {kind: axial, torque: 1 mN m},"
+        " {name: tune, kind: rotating, torque: [1 mN m, 0, 0], rate: -1}]\n"
+    )
+    (tmp_path / "d.yaml").write_text(text)
+    done = run("check", "d.yaml", "--json", "d.json")
+    for said in ("leak", "forces a tilt", "precession", "tune", "resonant", "changes the spin"):
+        assert said in done.stdout
+    found = json.loads((tmp_path / "d.json").read_text())["files"][0]["disturbances"]
+    assert found[0]["precession_rad_s"] > 0.0
+    assert found[2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
