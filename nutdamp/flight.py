@@ -115,6 +115,7 @@ class Flight:
         """Cone angles after the last pulse, and where H went."""
         start, moments = self.spacecraft.initial, np.asarray(self.moments)
         before = attitude.rotate(start.quaternion, start.rates * moments)
+        target = self.spacecraft.goal.axis
         body = self.settled.rates * moments
         after = attitude.rotate(self.settled.quaternion, body)
         shift = float(attitude.angle_between(before, after))
@@ -122,7 +123,8 @@ class Flight:
         nutation = largest_nutation(self.moments, body, self._sense)
         body_cone = math.atan2(omega, spin)
         tilt = math.atan2(math.hypot(body[0], body[1]), self._sense * body[2])
-        return Residual(nutation, body_cone, tilt - body_cone, shift, shift)
+        error = shift if target is None else float(attitude.angle_between(target, after))
+        return Residual(nutation, body_cone, tilt - body_cone, shift, error)
 
     def track(self, samples: int, until: float) -> Track:
         """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.

@@ -68,12 +68,15 @@ class Plan:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether the flown residual keeps the requirement of the file; None without one or without a schedule."""
+        """Whether the flown residual keeps the requirement of the file; None without one or without a schedule.
+
+        With a target axis the shift of H counts from there.
+        """
         asked, left = self.spacecraft.requirement, self.flown
         if asked is None or left is None or (asked.nutation is None and asked.momentum_shift is None):
             return None
         return (asked.nutation is None or left.nutation <= asked.nutation) and (
-            asked.momentum_shift is None or left.momentum_shift <= asked.momentum_shift
+            asked.momentum_shift is None or left.axis_error <= asked.momentum_shift
         )
 
     @property
@@ -170,7 +173,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
-    if spacecraft.nutation < NO_NUTATION:
+    if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spacecraft.goal.spin is None:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
     options = options or schemes.Options()
     known = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
@@ -183,10 +186,20 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
     broken = broken_limits(spacecraft, made)
     if broken:
         return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
-    if scheme != "none" and left is not None and left.nutation >= spacecraft.nutation:
+    if scheme != "none" and left is not None and not _helps(judged, left):
         angle = math.degrees(left.nutation)
         return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")
     return judged
+
+
+def _helps(judged: Plan, left: Residual) -> bool:
+    """Whether nutation, distance from the target axis or from the final spin asked for is less than without pulses."""
+    body = judged.spacecraft
+    if body.goal.spin is not None and abs(judged.flight.settled.spin - body.goal.spin) < abs(
+        body.spin - body.goal.spin
+    ):
+        return True
+    return left.nutation < body.nutation or left.axis_error < body.to_turn
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
@@ -250,20 +263,20 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
 
     Of the plans that meet the requirement (all feasible ones without one), those within twice the least flown nutation
     or below 1e-3 deg; of these least propellant (impulse where unknown), then less shift of H, then earlier end. If
-    none meets it, least flown nutation.
+    none meets it, least flown nutation. With a target axis the distance from it counts where it exceeds the nutation.
     """
     judged = [(one, one.flown) for one in plans]
     feasible = [(one, left) for one, left in judged if left is not None]
     if not feasible:
         return None, "no scheme is feasible"
-    least = min(left.nutation for _, left in feasible)
+    least = min(_missed(one, left) for one, left in feasible)
     asked = any(one.meets_requirement is not None for one, _ in feasible)
     meeting = [(one, left) for one, left in feasible if one.meets_requirement is not False]
     if not meeting:
-        best = next(one for one, left in feasible if left.nutation == least)
+        best = next(one for one, left in feasible if _missed(one, left) == least)
         return best, "no feasible plan meets the requirement; this one leaves least nutation"
-    least = min(left.nutation for _, left in meeting)
-    close = [(one, left) for one, left in meeting if left.nutation <= max(2.0 * least, AS_GOOD)]
+    least = min(_missed(one, left) for one, left in meeting)
+    close = [(one, left) for one, left in meeting if _missed(one, left) <= max(2.0 * least, AS_GOOD)]
     those = "meet the requirement" if asked else "are feasible"
     if len(meeting) == 1:
         return meeting[0][0], f"the only plan that {'meets the requirement' if asked else 'is feasible'}"
@@ -280,9 +293,14 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     what = "propellant" if known else "impulse"
     if len(equal) == 1:
         return equal[0][0], f"least {what} of the {len(close)} plans that {those} and leave least nutation"
-    least_shift = min(left.momentum_shift for _, left in equal)
-    still = [one for one, left in equal if left.momentum_shift <= least_shift + 1e-9]
+    least_shift = min(left.axis_error for _, left in equal)
+    still = [one for one, left in equal if left.axis_error <= least_shift + 1e-9]
     best = min(still, key=lambda one: one.pulses.end)
     if len(still) == 1:
         return best, f"as little {what} as any, and less shift of H"
     return best, f"as little {what} and shift of H as any, and ends first"
+
+
+def _missed(judged: Plan, left: Residual) -> float:
+    """What a plan leaves, rad: nutation, or the distance from a target axis where that is more."""
+    return left.nutation if judged.spacecraft.goal.axis is None else max(left.nutation, left.axis_error)

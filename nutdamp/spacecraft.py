@@ -7,7 +7,7 @@ leads back to the axes of the file, which is where vectors and quaternions are s
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,6 +166,18 @@ class Requirement:
 
 
 @dataclass(frozen=True, slots=True)
+class Goal:
+    """Where the motion is to end, besides without nutation.
+
+    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
+    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes.
+    """
+
+    axis: Vector | None = None
+    spin: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Limits:
     """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
 
@@ -239,6 +251,7 @@ class Spacecraft:
     limits: Limits = field(default_factory=Limits)
     disturbances: tuple[Disturbance, ...] = ()
     dissipation: float | None = None
+    goal: Goal = field(default_factory=Goal)
 
     @property
     def growth(self) -> float:
@@ -291,6 +304,39 @@ class Spacecraft:
         return SpinState(omega, spin, quaternion)
 
     @property
+    def momentum(self) -> Vector:
+        """Angular momentum at t = 0 in the inertial frame, (3,) N m s."""
+        start = self.initial
+        return attitude.rotate(start.quaternion, start.rates * np.asarray(self.inertia.moments))
+
+    @property
+    def target_axis(self) -> Vector:
+        """Direction in which the angular momentum is to end, (3,) unit vector in the inertial frame."""
+        if self.goal.axis is not None:
+            return self.goal.axis
+        momentum = self.momentum
+        return np.asarray(momentum / np.linalg.norm(momentum))
+
+    @property
+    def to_turn(self) -> float:
+        """Angle from the angular momentum at t = 0 to the target axis, rad; exactly zero without a target."""
+        return 0.0 if self.goal.axis is None else float(attitude.angle_between(self.momentum, self.goal.axis))
+
+    @property
+    def turning_impulse(self) -> float:
+        """C |ω3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target with less."""
+        return self.inertia.C * abs(self.spin) * self.to_turn
+
+    def direction_in_n(self, tilt: float, azimuth: float) -> Vector:
+        """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x of the frame N."""
+        in_n = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+        if self.attitude is None:
+            return in_n
+        body_to_n = replace(self, attitude=None).initial.quaternion
+        in_body = attitude.matrix(body_to_n).T @ in_n
+        return attitude.rotate(self.initial.quaternion, in_body)
+
+    @property
     def nutation(self) -> float:
         """Nutation angle θ at t = 0, rad, Magnus (19)."""
         return float(cones.nutation_angle(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin))
@@ -319,3 +365,9 @@ class Spacecraft:
     def least_impulse(self) -> float:
         """A |ω0| in N m s: no schedule can remove the nutation with less."""
         return self.inertia.A * self.transverse_rate
+
+
+def on_sphere(right_ascension: float, declination: float) -> Vector:
+    """Unit vector (3,) towards ``right_ascension`` and ``declination``, rad."""
+    across = math.cos(declination)
+    return np.array([across * math.cos(right_ascension), across * math.sin(right_ascension), math.sin(declination)])

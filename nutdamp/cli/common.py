@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
@@ -46,16 +47,89 @@ class Quantity(click.ParamType["float"]):
         return self.kind.upper()
 
 
+class Aim(NamedTuple):
+    """A goal as the command line gives it, in place of the one in the file.
+
+    ``target``: two angles in rad, right ascension and declination where the file has an attitude, else tilt and
+    azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    """
+
+    target: tuple[float, float] | None = None
+    spin: float | str | None = None
+
+    def applied(self, spacecraft: Spacecraft) -> Spacecraft:
+        """The spacecraft with this goal; a usage error where it cannot be one."""
+        from dataclasses import replace
+
+        from nutdamp.spacecraft import on_sphere
+
+        goal, target = spacecraft.goal, self.target
+        if target is not None and spacecraft.attitude is not None:
+            if abs(target[1]) > 0.5 * math.pi:
+                raise click.BadParameter("a declination of -90 deg to 90 deg is wanted", param_hint="--target")
+            goal = replace(goal, axis=on_sphere(*target))
+        elif target is not None:
+            if not 0.0 <= target[0] < math.pi:
+                raise click.BadParameter("a tilt of at least 0 and below 180 deg is wanted", param_hint="--target")
+            goal = replace(goal, axis=spacecraft.direction_in_n(*target))
+        if self.spin is not None:
+            spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
+            if spin * spacecraft.spin <= 0.0:
+                raise click.BadParameter(
+                    f"a rate of the sign of the spin ({spacecraft.spin:.4g} rad/s) is wanted", param_hint="--spin"
+                )
+            goal = replace(goal, spin=spin)
+        return replace(spacecraft, goal=goal)
+
+
+class Direction(click.ParamType["tuple[float, float]"]):
+    """Two angles with a comma between them."""
+
+    name = "angle,angle"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Both in rad; a usage error for anything else."""
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).split(",")
+        if len(parts) != 2:
+            self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
+        first, second = (Quantity("angle").convert(part.strip(), param, ctx) for part in parts)
+        return first, second
+
+
+class FinalSpin(Quantity):
+    """A rate, or ``keep``."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The rate in rad/s, or ``keep`` as it stands."""
+        return value if value == "keep" else super().convert(value, param, ctx)
+
+
 def scheme_options(command: Command) -> Command:
-    """Options that the schemes read, gathered into one parameter ``options`` (`schemes.Options`)."""
+    """Options of planning, gathered into ``options`` for the schemes (`schemes.Options`) and the ``aim`` for `load`."""
 
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
-        return command(*args, options=chosen, **parameters)
+        aim = Aim(parameters.pop("target"), parameters.pop("spin"))
+        return command(*args, options=chosen, aim=aim, **parameters)
 
     wrapped: Any = gathered
     for option in (
+        click.option(
+            "--spin",
+            type=FinalSpin("rate"),
+            metavar="RATE|keep",
+            help="optimal: spin rate at the end, such as 30rpm, by channels with a torque about axis 3.",
+        ),
+        click.option(
+            "--target",
+            type=Direction(),
+            metavar="ANGLE,ANGLE",
+            help="Where the spin axis is to end: right ascension and declination where the file has an attitude, else "
+            "tilt from H and azimuth about it, such as 10deg,45deg.",
+        ),
         click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
         click.option("--free-axis", is_flag=True, help="optimal: let the angular momentum end where it likes."),
         click.option(
@@ -73,8 +147,16 @@ def scheme_options(command: Command) -> Command:
     return cast(Command, wrapped)
 
 
-def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
-    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example."""
+def load(path: str | None, remark: Callable[[str], None], aim: Aim | None = None) -> Spacecraft:
+    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example.
+
+    ``aim`` takes the place of the goal in the file.
+    """
+    body = _load(path, remark)
+    return body if aim is None else aim.applied(body)
+
+
+def _load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
     from pathlib import Path
 
     from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft

@@ -8,6 +8,7 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
+    Aim,
     load,
     one_stdout,
     quiet_option,
@@ -31,6 +32,7 @@ def command(
     spacecraft: str | None,
     names: tuple[str, ...],
     options: Options,
+    aim: Aim,
     csv: str | None,
     json: str | None,
     quiet: bool,
@@ -47,7 +49,7 @@ def command(
         raise click.UsageError("--csv writes one schedule: name one --scheme, or none for the recommended one")
     silent = one_stdout(csv=csv, json=json)
     remark = remarks(quiet)
-    body = load(spacecraft, remark)
+    body = load(spacecraft, remark, aim)
 
     from nutdamp.planning import compare
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from nutdamp.cli.common import (
+    Aim,
     Quantity,
     load,
     one_stdout,
@@ -38,6 +39,7 @@ def command(
     scheme: str | None,
     schedule: str | None,
     options: Options,
+    aim: Aim,
     real: bool,
     until: float | None,
     samples: int,
@@ -57,7 +59,7 @@ def command(
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
     silent = one_stdout(csv=csv, json=json, plot=plot)
     remark = remarks(quiet)
-    body = load(spacecraft, remark)
+    body = load(spacecraft, remark, aim)
 
     from nutdamp import flight
 

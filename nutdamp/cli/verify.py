@@ -8,6 +8,7 @@ import click
 
 from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
+    Aim,
     load,
     one_stdout,
     plan_or_read,
@@ -33,6 +34,7 @@ def command(
     scheme: str | None,
     schedule: str | None,
     options: Options,
+    aim: Aim,
     json: str | None,
     quiet: bool,
 ) -> None:
@@ -43,7 +45,7 @@ def command(
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to verify: either --scheme or --schedule")
     silent = one_stdout(json=json)
-    body = load(spacecraft, remarks(quiet))
+    body = load(spacecraft, remarks(quiet), aim)
 
     from nutdamp.planning import unrounded
     from nutdamp.verification import verify

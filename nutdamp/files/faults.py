@@ -14,8 +14,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.facts import Finding
 from nutdamp.files.models import SpacecraftFile
-from nutdamp.files.rules import Finding, findings
+from nutdamp.files.rules import findings
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 

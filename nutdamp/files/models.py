@@ -30,6 +30,7 @@ SMALLEST = 1e-15
 _BOUNDS = {
     "minimum": (operator.ge, "of at least"),
     "exclusiveMinimum": (operator.gt, "above"),
+    "maximum": (operator.le, "of at most"),
     "exclusiveMaximum": (operator.lt, "below"),
 }
 _RIGHT_ANGLE = parse("90 deg", "angle")
@@ -55,8 +56,11 @@ class Quantity:
     @property
     def range(self) -> str:
         """``an angle of at least 0 and below 90 deg``."""
+        angle = self.kind == "angle"
         bounds = (
-            f"{_BOUNDS[name][1]} {'90 deg' if limit == _RIGHT_ANGLE else f'{limit:g}'}"
+            f"{_BOUNDS[name][1]} {limit / _RIGHT_ANGLE * 90:g} deg"
+            if angle and limit
+            else f"{_BOUNDS[name][1]} {limit:g}"
             for name, limit in self.bounds.items()
         )
         return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
@@ -107,6 +111,8 @@ Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
 Rate = Annotated[float, Quantity("rate")]
 Angle = Annotated[float, Quantity("angle")]
 Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
+Tilt = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=2 * _RIGHT_ANGLE)]
+Declination = Annotated[float, Quantity("angle", minimum=-_RIGHT_ANGLE, maximum=_RIGHT_ANGLE)]
 AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
 Time = Annotated[float, Quantity("time", minimum=0)]
 PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
@@ -226,6 +232,22 @@ class RequirementSection(Section):
     )
 
 
+class GoalSection(Section):
+    """Where the motion is to end; without it the angular momentum stays where it is, and the spin as it comes."""
+
+    tilt: Tilt | None = Field(
+        default=None, description="Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg."
+    )
+    azimuth: Angle | None = Field(
+        default=None, description="Its direction about it, rad, from the side to which the spin axis leans at t = 0."
+    )
+    right_ascension: Angle | None = Field(default=None, description="Of the target axis in the attitude's frame, rad.")
+    declination: Declination | None = Field(
+        default=None, description="Of the target axis in the attitude's frame, rad."
+    )
+    spin: Rate | None = Field(default=None, description="Spin rate about axis 3 at the end, rad/s, signed.")
+
+
 class LimitsSection(Section):
     """What every schedule keeps."""
 
@@ -309,6 +331,7 @@ class SpacecraftFile(Section):
     )
     requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
     limits: LimitsSection | None = Field(default=None, description="Limits that every schedule keeps.")
+    goal: GoalSection | None = Field(default=None, description="Where axis and spin are to end.")
 
 
 def json_schema() -> dict[str, Any]:

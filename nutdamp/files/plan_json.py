@@ -42,6 +42,9 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "space_cone_deg": math.degrees(cones.space_cone(A, C, omega, spin)),
         "body_nutation_period_s": spacecraft.body_period,
         "inertial_nutation_period_s": spacecraft.inertial_period,
+        "target_axis": spacecraft.target_axis.tolist(),
+        "target_angle_deg": math.degrees(spacecraft.to_turn),
+        "target_spin_rad_s": spacecraft.goal.spin,
     }
 
 

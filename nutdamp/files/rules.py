@@ -8,17 +8,17 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.models import SMALLEST
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
 from nutdamp.physics import stability
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
-from nutdamp.units import parse, shown
+from nutdamp.units import shown
 
 Vector = NDArray[np.float64]
 
@@ -29,54 +29,21 @@ CANCELLED = 1e-12
 """A sum that is smaller than its terms by this factor is rounding; it counts as zero."""
 
 
-class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at its value."""
-
-    path: KeyPath
-    problem: str
-    at_key: bool = False
-
-
-class Facts:
-    """The values of a tree that can be read."""
-
-    def __init__(self, root: Node) -> None:
-        self.root = root
-
-    def has(self, *path: str | int) -> bool:
-        """Whether something stands at ``path``."""
-        return self.root.get(*path) is not None
-
-    def text(self, *path: str | int) -> str | None:
-        """The text at ``path``."""
-        node = self.root.get(*path)
-        return node.value if node is not None and isinstance(node.value, str) else None
-
-    def number(self, kind: str, *path: str | int) -> float | None:
-        """The quantity at ``path``, SI."""
-        node = self.root.get(*path)
-        try:
-            return None if node is None else parse(node.plain(), kind)
-        except ValueError:
-            return None
-
-    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
-        """The ``size`` quantities at ``path``, SI; None unless all can be read."""
-        if len(self.children(*path)) != size:
-            return None
-        numbers = [self.number(kind, *path, index) for index in range(size)]
-        return None if None in numbers else np.array(numbers, dtype=np.float64)
-
-    def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and what stands there."""
-        node = self.root.get(*path)
-        return [] if node is None else list(node.children())
-
-
 def findings(root: Node) -> Iterator[Finding]:
     """Everything wrong between the keys of a file."""
     facts = Facts(root)
-    for rule in (_names, _inertia, _motion, _attitude, _thrusters, _channels, _disturbances, _dissipation, _limits):
+    for rule in (
+        _names,
+        _inertia,
+        _motion,
+        _attitude,
+        _thrusters,
+        _channels,
+        _disturbances,
+        _dissipation,
+        _limits,
+        _goal,
+    ):
         yield from rule(facts)
 
 
@@ -397,3 +364,26 @@ def _limits(facts: Facts) -> Iterator[Finding]:
         window = facts.vector("time", 2, "limits", "blackout", index)
         if window is not None and window[1] < window[0]:
             yield Finding(("limits", "blackout", index), "ends before it begins; [begin, end] is wanted")
+
+
+def _goal(facts: Facts) -> Iterator[Finding]:
+    in_n, in_sky = (
+        [key for key in pair if facts.has("goal", key)]
+        for pair in (("tilt", "azimuth"), ("right_ascension", "declination"))
+    )
+    if in_n and in_sky:
+        problem = f"stands beside {' and '.join(in_sky)}; keep tilt and azimuth, or the other pair"
+        yield Finding(("goal", in_n[0]), problem, True)
+    elif in_n == ["azimuth"]:
+        yield Finding(("goal", "tilt"), "missing; azimuth alone names no direction")
+    elif len(in_sky) == 1:
+        other = "declination" if in_sky[0] == "right_ascension" else "right_ascension"
+        yield Finding(("goal", other), f"missing; {in_sky[0]} alone names no direction")
+    elif in_sky and not facts.has("attitude"):
+        problem = "needs attitude, which says where the body points at t = 0; without it give tilt and azimuth"
+        yield Finding(("goal", in_sky[0]), problem, True)
+    final, spin = facts.number("rate", "goal", "spin"), _spin(facts)
+    if final is not None and abs(final) < SMALLEST:
+        yield Finding(("goal", "spin"), "zero; a rate about axis 3 is wanted")
+    elif final is not None and spin is not None and final * spin < 0.0:
+        yield Finding(("goal", "spin"), "of the other sign than the spin at t = 0; the spin cannot be reversed")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pkgutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from nutdamp.files.faults import read_contents
 from nutdamp.files.models import (
     AttitudeSection,
     DisturbanceSection,
+    GoalSection,
     InertiaSection,
     LimitsSection,
     RequirementSection,
@@ -28,12 +30,14 @@ from nutdamp.spacecraft import (
     Attitude,
     Channel,
     Disturbance,
+    Goal,
     Inertia,
     Limits,
     Requirement,
     Spacecraft,
     Steerable,
     Thruster,
+    on_sphere,
 )
 
 __all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spacecraft"]
@@ -56,7 +60,7 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
-    return Spacecraft(
+    spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
         omega0=omega0,
@@ -71,6 +75,7 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
     )
+    return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 
 
 def built_in_example_text() -> str:
@@ -155,6 +160,17 @@ def _requirement(section: RequirementSection | None) -> Requirement | None:
     if section is None or (section.nutation is None and section.momentum_shift is None):
         return None
     return Requirement(section.nutation, section.momentum_shift)
+
+
+def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
+    """The goal of a file; its tilt and azimuth count from the motion at t = 0."""
+    if section is None:
+        return Goal()
+    if section.tilt is not None:
+        return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
+    if section.right_ascension is not None and section.declination is not None:
+        return Goal(on_sphere(section.right_ascension, section.declination), section.spin)
+    return Goal(spin=section.spin)
 
 
 def _limits(section: LimitsSection | None) -> Limits:

@@ -52,6 +52,12 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
     alone = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
     floor = "no schedule needs less" if alone else "the floor of a symmetric body left alone"
     table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
+    if spacecraft.goal.axis is not None:
+        turning = quantity(spacecraft.turning_impulse, "N m s")
+        table.add_row("target", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}, the least to turn H")
+    if spacecraft.goal.spin is not None:
+        final = spacecraft.goal.spin
+        table.add_row("final spin", f"{final * 30 / math.pi:.4g} rpm ({quantity(final, 'rad/s')})")
     table.add_row("actuators", _actuators(spacecraft))
     for name, value in more:
         table.add_row(name, value)
@@ -96,6 +102,15 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         ("  shift of H", lambda plan: _angle(plan.flown, "momentum_shift")),
         ("  spin change", lambda plan: quantity(plan.spin_change, "rad/s")),
     ]
+    goal = compared.spacecraft.goal
+    if goal.axis is not None:
+        rows.insert(-1, ("  off the target", lambda plan: _angle(plan.flown, "axis_error")))
+        turning = compared.spacecraft.turning_impulse
+        rows.insert(
+            4, ("  × C|ω3|β", lambda plan: f"{plan.pulses.total_impulse / turning:.4f}" if turning else MISSING)
+        )
+    if goal.spin is not None:
+        rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
     if any(plan.delta_v is not None for plan in compared.plans):
         rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
     if compared.spacecraft.requirement is not None:
@@ -106,6 +121,10 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
 
 def _angle(left: Residual | None, name: str) -> str:
     return MISSING if left is None else degrees(getattr(left, name))
+
+
+def _final_spin(plan: Plan) -> float | None:
+    return None if plan.spin_change is None else plan.spacecraft.spin + plan.spin_change
 
 
 def _speed(plan: Plan) -> float | None:

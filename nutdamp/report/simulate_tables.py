@@ -41,12 +41,15 @@ def _pulses(flight: Flight) -> Table:
 
 def _residuals(residual: Residual, flown: Residual) -> Table:
     table = columns("after the last pulse", "by impulses (17)", "flown, real widths")
-    for name, key in (
+    rows = [
         ("nutation", "nutation"),
         ("body cone", "body_cone"),
         ("space cone", "space_cone"),
         ("shift of H", "momentum_shift"),
-    ):
+    ]
+    if residual.axis_error != residual.momentum_shift:
+        rows.append(("off the target", "axis_error"))
+    for name, key in rows:
         table.add_row(Text(name, style="dim"), degrees(getattr(residual, key)), degrees(getattr(flown, key)))
     return table
 
