@@ -6,6 +6,7 @@ impulses. `flown` is the judge: real widths, true moments. Both give legs that c
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -194,8 +195,10 @@ class Setting:
             arc = Arc(self.moments[0], self.moments[2], start, state)
             if end == start:
                 return arc, state
-            body, quaternion = arc.motion(np.array([end]))
-            return arc, SpinState(complex(body[0, 0], body[0, 1]), float(body[0, 2]), quaternion[0])
+            A, _, C = self.moments
+            turned = cmath.exp(-1j * (A - C) / A * state.spin * (end - start))
+            quaternion = attitude.arc_end(A, C, state.quaternion, state.omega, state.spin, end - start)
+            return arc, SpinState(state.omega * turned, state.spin, quaternion)
         torque = np.asarray(sum(torques, self.constant))
         pieces = rigid.integrate(self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing)
         rates_, quaternion_ = pieces[-1].final
@@ -272,31 +275,31 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
     """
     setting, state = _setting(spacecraft, true=True), spacecraft.initial
-    pulses = schedule.pulses
-    last = max(until, schedule.end)
-    edges = sorted({0.0, last, *(pulse.start for pulse in pulses), *(pulse.end for pulse in pulses)})
+    pulses, over = schedule.pulses, schedule.end
+    spans = tuple((pulse.start, pulse.end) for pulse in pulses)
+    starts, ends = np.array(spans).reshape(-1, 2).T
+    last = max(until, over)
+    edges = sorted({0.0, last, *(time for span in spans for time in span)})
     legs: list[Leg] = []
     settled = state
     for now, end in zip(edges, [*edges[1:], last], strict=True):
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
-        kicks = [pulse.impulse for pulse in pulses if pulse.start == pulse.end == now]
+        kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
             legs.append(Leg(now, now, setting.path(state, now, now)[0], 0, jump=True, completed_at_end=0))
         for kick in kicks:
             state = setting.kicked(state, kick)
-        if now == schedule.end:
+        if now == over:
             settled = state
-        torques = [
-            pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start <= now and end <= pulse.end
-        ]
+        on = [pulses[index].torque for index in np.flatnonzero((starts <= now) & (end <= ends))]
+        torques = [torque for torque in on if torque is not None]
         path, following = setting.path(state, now, end, torques)
         completed, at_end = (
-            sum(pulse.end < time or (pulse.end == time and (pulse.start < time or time == now)) for pulse in pulses)
+            int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
             for time in (now, end)
         )
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
-    spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
 
 

@@ -110,3 +110,22 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
     )
     inner = np.stack([np.cos(half_about_axis), zero, zero, np.sin(half_about_axis)], axis=-1)
     return multiply(multiply(outer, quaternion), inner)
+
+
+def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float) -> Array:
+    """`arc` at one moment ``time`` s after its start, (4,): in plain numbers a tenth of the work of arrays."""
+    w, x, y, z = quaternion.tolist()
+    h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
+    size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
+    half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * (A - C) / A * spin * time
+    # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) = (cos, sin Rh) q.
+    sine = math.sin(half_about_momentum) / size if size > 0.0 else 0.0
+    p0, p1, p2, p3 = math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3
+    w, x, y, z = (
+        w * p0 - x * p1 - y * p2 - z * p3,
+        w * p1 + x * p0 + y * p3 - z * p2,
+        w * p2 - x * p3 + y * p0 + z * p1,
+        w * p3 + x * p2 - y * p1 + z * p0,
+    )
+    cosine, sine = math.cos(half_about_axis), math.sin(half_about_axis)
+    return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])

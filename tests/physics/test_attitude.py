@@ -136,6 +136,15 @@ def test_arc_is_the_motion_of_the_integrated_body(A: float, C: float, theta: flo
         assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN
 
 
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+@pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0)])
+@pytest.mark.parametrize("omega", [0.0 + 0.0j, 0.1 - 0.3j, 4.0 + 5.0j])
+def test_the_end_of_an_arc_is_its_last_row(A: float, C: float, spin: float, omega: complex) -> None:
+    start = attitude.from_matrix(reference.frame_n((A, A, C), np.array([0.3, -0.2, spin])))
+    last = attitude.arc(A, C, start, omega, spin, np.array([0.7, 11.3]))[-1]
+    assert attitude.arc_end(A, C, start, omega, spin, 11.3) == pytest.approx(last, abs=50 * EPS)
+
+
 @pytest.mark.parametrize("spin", [2.0, -2.0])
 @pytest.mark.parametrize(("A", "C"), BODIES.values(), ids=BODIES)
 def test_arcs_compose(A: float, C: float, spin: float) -> None:
