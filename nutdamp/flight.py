@@ -127,6 +127,16 @@ class Flight:
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(nutation, body_cone, tilt - body_cone, shift, error)
 
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""
+        times = np.asarray(times, dtype=float)
+        owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
+        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+        for index in np.unique(owner):
+            rows = owner == index
+            body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
+        return body, quaternion
+
     def track(self, samples: int, until: float) -> Track:
         """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
 

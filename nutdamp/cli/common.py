@@ -131,6 +131,11 @@ def scheme_options(command: Command) -> Command:
             "tilt from H and azimuth about it, such as 10deg,45deg.",
         ),
         click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
+        click.option(
+            "--shift",
+            type=Quantity("angle"),
+            help="optimal: how far from its target the angular momentum may end, such as 0.2deg.",
+        ),
         click.option("--free-axis", is_flag=True, help="optimal: let the angular momentum end where it likes."),
         click.option(
             "--least",

@@ -18,7 +18,7 @@ PLANNED = (*CLASSIC, "optimal")
 NAMES = (*PLANNED, "none")
 
 
-LEAST = ("propellant", "impulse")
+LEAST = ("propellant", "impulse", "time", "pulses")
 """What the scheme optimal can save."""
 
 
@@ -28,7 +28,8 @@ class Options(NamedTuple):
     ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)). ``coarse``: four-pulse without a
     last, shorter pulse. ``literal``: two-pulse as printed in Magnus 1970. ``with_disturbances``: plan on the motion
     with the disturbances of the file, which is otherwise only judged with them. ``least``: what optimal saves,
-    propellant (impulse where that is unknown) or impulse; ``free_axis``: optimal lets H go where it likes.
+    propellant (impulse where that is unknown), impulse, time or pulses; ``free_axis``: optimal lets H go where it
+    likes, ``shift`` up to so many rad from its target.
     """
 
     on_time: float | None = None
@@ -37,6 +38,7 @@ class Options(NamedTuple):
     with_disturbances: bool = False
     least: str = "propellant"
     free_axis: bool = False
+    shift: float | None = None
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:

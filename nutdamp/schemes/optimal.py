@@ -1,8 +1,9 @@
-"""Least propellant over channels and firing times: no nutation left, and H back where it was.
+"""Least propellant over channels and firing times: no nutation left, H on its target, and the spin as asked.
 
-The linear program of `program` finds the burns; what small angles neglect is measured on the flown schedule and given
-back to the program as a target; then moments and on-times are trimmed on the true motion. Two bounds go with the
-plan: the program's own least cost, to first order, and the rigorous one of the first equation alone.
+The linear program of `program` finds the burns, at first with small angles. The schedule is flown, the program's
+equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
+and on-times are polished on it. Two bounds go with the plan: the program's first least cost, of first order, and the
+rigorous one of the nutation alone.
 """
 
 from __future__ import annotations
@@ -10,42 +11,65 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from nutdamp import flight
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
-from nutdamp.schemes import Options, trim
+from nutdamp.schemes import Options, influence
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.influence import Equations
+from nutdamp.schemes.polish import polish
 from nutdamp.schemes.program import Burn, Program, Solution
 from nutdamp.schemes.windows import SLACK, Windows, usable
-from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.spacecraft import Channel, Spacecraft
 
-REPAIRS = 40
+REPAIRS = 60
 """Rounds in which burns that break a limit are moved elsewhere."""
 
-AIMS = 5
-"""Rounds in which the program's target is corrected by the shift of H that was flown."""
+CHOICES = 3
+"""Times that burns are chosen among all channels and moments: at small angles, then along the flight before."""
+
+AIMS = 8
+"""Flights along which the burns chosen are corrected, at most."""
+
+LOST = 0.5
+"""Share of what there is to do that corrected burns may fail to supply before others are chosen."""
 
 DEAR = 0.01
-"""Share above the program's least cost from which another round may find a cheaper schedule."""
+"""Share above the program's least cost from which all channels and moments are looked at again."""
+
+DEARER = 0.03
+"""Share above it from which shorter horizons are looked at too."""
+
+HALVINGS = 3
+"""Shorter horizons that are looked at where there is a schedule already."""
+
+GAIN = 0.0005
+"""Share of the cost that is not worth another turn, nor another pulse where there are few."""
 
 UNMET = 1e-7
-"""Share of A|ω0| that slots may fail to supply: the program's own tolerance."""
+"""Share of what there is to do that columns may fail to supply: the program's own tolerance."""
 
 THRIFT = 0.004
 """Share of the least cost that is given away for fewer pulses."""
 
-HASTE = 0.002
+HASTE = 0.0008
 """How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
 
 LEFT = math.radians(1e-6)
-"""rad of nutation and shift of H below which a plan has been found."""
+"""rad of nutation and distance from the target, and share of the spin, below which a plan has been found."""
 
-KNOBS = 8
-"""Pulses that are trimmed at most, two numbers each for four equations."""
+NEAR = 0.05
+"""rad left from which a flight is near enough to be polished."""
+
+LATEST = 64.0
+"""Times the horizon up to which a feasible one is looked for, to name it."""
+
+SHARPEST = 1e-3
+"""Relative accuracy of a least time, and the margin given to it."""
 
 
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
@@ -53,168 +77,284 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
-    channels = tuple(usable(spacecraft))
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
-    costs, unit = _costs(channels, options)
-    momentum = not options.free_axis
-    target = np.zeros(2)
-    first: Solution | None = None
-    found: list[tuple[bool, float, Schedule]] = []
-    for _ in range(AIMS):
-        program = Program(spacecraft, channels, costs, momentum, target)
-        solution = program.solve()
-        if first is None:
-            if solution.unmet > UNMET:
-                raise Infeasible(_unreachable(spacecraft, channels, costs, momentum))
-            first = solution
-        aimed = _repaired(spacecraft, program, _thinned(program, solution))
-        made = _trimmed(spacecraft, aimed, momentum)
-        left = _left(spacecraft, made, momentum)
-        price = _price(made, channels, costs)
-        found.append((left > LEFT, price if left <= LEFT else left, made))
-        if not momentum or (left <= LEFT and price <= first.cost * (1.0 + DEAR)):
-            break
-        target = target - _shift(spacecraft, aimed)
-    missed, left, best = min(found, key=lambda entry: entry[:2])
-    if spacecraft.limits.tick is None and missed:
-        raise Infeasible(
-            "not found: the refinement on the true motion did not converge "
-            f"(it leaves {math.degrees(left):.2g}°); a longer horizon may help"
-        )
-    assert first is not None
-    rigorous = Program(spacecraft, channels, costs, momentum=False, ideal=True).solve().cost
-    return Schedule(best.pulses, best.notes, Bounds(first.cost, min(rigorous, first.cost), unit))
+    search = _Search(spacecraft, options)
+    if options.least == "time":
+        search = search.sooner()
+    elif options.least == "pulses":
+        return _fewest(search)
+    return search.schedule()
 
 
-def _costs(channels: tuple[Channel, ...], options: Options) -> tuple[Vector, str]:
-    """Cost of one N m s of each channel's transverse impulse, and its unit."""
-    flows = [channel.mass_flow for channel in channels]
-    strengths = np.array([abs(channel.transverse) for channel in channels])
-    known = [flow for flow in flows if flow is not None]
-    if options.least == "propellant" and len(known) == len(flows):
-        return np.array(known) / strengths, "kg"
-    return np.array([float(np.linalg.norm(channel.torque)) for channel in channels]) / strengths, "N m s"
+def _fewest(search: _Search) -> Schedule:
+    """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
+    from nutdamp.schemes import one_pulse, two_pulse
+
+    body, options = search.spacecraft, search.options
+    scheme = one_pulse if options.free_axis else two_pulse
+    if body.torquer is None and body.goal.spin is None:
+        try:
+            made = scheme.schedule(body, options)
+        except Infeasible:
+            made = Schedule()
+        if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
+            return search.with_bounds(made)
+    return search.schedule()
 
 
-def _price(made: Schedule, channels: tuple[Channel, ...], costs: Vector) -> float:
-    """What a schedule costs by the program's own prices."""
-    price = {channel.name: cost for channel, cost in zip(channels, costs, strict=True)}
-    return math.fsum(price[pulse.channel] * math.hypot(*pulse.impulse[:2]) for pulse in made)
+class _Unrepairable(Exception):
+    """No burns were found that keep on-times, gap and max_pulses all at once."""
 
 
-def _left(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> float:
-    """Largest of what the flown schedule leaves, rad."""
-    residual = flight.flown(spacecraft, made).residual
-    return max(residual.nutation, residual.momentum_shift) if momentum else residual.nutation
+class _Search:
+    """What stays the same while a schedule is looked for."""
 
-
-def _shift(spacecraft: Spacecraft, made: Schedule) -> Vector:
-    """Δh of the flown schedule in the inertial directions e1(0), e2(0), N m s."""
-    start, moments = spacecraft.initial, np.asarray(spacecraft.inertia.moments)
-    end = flight.flown(spacecraft, made).settled
-    before = attitude.rotate(start.quaternion, start.rates * moments)
-    after = attitude.rotate(end.quaternion, end.rates * moments)
-    in_body = attitude.matrix(start.quaternion).T @ (after - before)
-    return np.asarray(in_body[:2])
-
-
-def _thinned(program: Program, solution: Solution) -> Solution:
-    """As few burns as cost hardly more: the longest are kept and may grow, as many as it takes.
-
-    The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
-    """
-    everywhere, most = program.forbidden, solution.cost * (1.0 + THRIFT)
-    program.haste = HASTE
-    solution = program.solve()
-    allowed, best = everywhere, solution
-    order = sorted(solution.burns, key=lambda burn: -burn.on_time * abs(burn.channel.transverse))
-    low, high = 1, len(order)
-    while low < high:
-        middle = (low + high) // 2
-        program.forbidden = everywhere.copy()
-        program.keep(order[:middle])
-        found = program.solve()
-        if found.unmet <= UNMET and found.cost <= most:
-            allowed, best, high = program.forbidden, found, middle
+    def __init__(self, spacecraft: Spacecraft, options: Options) -> None:
+        self.spacecraft, self.options = spacecraft, options
+        asked = spacecraft.goal.spin is not None
+        self.channels = tuple(usable(spacecraft, axial=asked))
+        if not self.channels:
+            raise Infeasible(no_channels(spacecraft))
+        if asked and not any(channel.axial for channel in self.channels):
+            raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
+        self.equations = Equations(shift=not options.free_axis, spin=asked)
+        flows = [channel.mass_flow for channel in self.channels]
+        known = [flow for flow in flows if flow is not None]
+        if options.least != "impulse" and len(known) == len(flows):
+            self.costs, self.unit = np.array(known), "kg"
         else:
-            low = middle + 1
-    program.forbidden = allowed
-    return best
+            self.costs = np.array([float(np.linalg.norm(channel.torque)) for channel in self.channels])
+            self.unit = "N m s"
+        self.size = float(np.linalg.norm(spacecraft.momentum))
 
+    def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
+        """The linear program of small angles, with another horizon or other equations if given."""
+        body, equations = spacecraft or self.spacecraft, equations or self.equations
+        aim = influence.small_angles(body, equations)
+        off = 0.0 if self.options.shift is None or not equations.shift else self.size * self.options.shift
+        return Program(body, self.channels, self.costs, aim, off=off)
 
-def _repaired(spacecraft: Spacecraft, program: Program, solution: Solution) -> Schedule:
-    """The burns as pulses, once none of them breaks a limit: where one does, its slots are forbidden."""
-    for _ in range(REPAIRS):
-        broken = next(_broken(spacecraft, program, solution.burns), None)
-        if broken is None:
-            break
-        program.forbid(*broken)
-        solution = program.solve()
-        if solution.unmet > UNMET:
-            raise Infeasible("not found: on-times, gap and max_pulses leave no burns that the program can use")
-    else:
-        raise Infeasible("not found: no burns were found that keep on-times, gap and max_pulses all at once")
-    windows = Windows(spacecraft)
-    pulses = []
-    for burn in solution.burns:
-        on_time = windows.on_time(burn.on_time, burn.channel.min_on_time, burn.channel.max_on_time)
-        start = windows.nearest_tick(max(burn.t - 0.5 * on_time, spacecraft.limits.earliest))
-        start = min(start, spacecraft.horizon - on_time)
-        pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
-    return Schedule(tuple(pulses))
+    def within(self, horizon: float) -> Spacecraft:
+        """The spacecraft with another horizon."""
+        return replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=horizon))
 
+    def feasible(self, horizon: float) -> bool:
+        """Whether the program of small angles has a solution within ``horizon`` s."""
+        return self.program(self.within(horizon)).solve().unmet <= UNMET
 
-Span = tuple[Channel | None, float, float]
+    def least_horizon(self, low: float, high: float) -> float:
+        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow."""
+        while high - low > SHARPEST * high:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.feasible(middle) else (middle, high)
+        return high
 
+    def sooner(self) -> _Search:
+        """The same search with the shortest horizon in which a schedule is found."""
+        horizon = self.spacecraft.horizon
+        if not self.feasible(horizon):
+            return self
+        earliest = self.least_horizon(self.spacecraft.limits.earliest, horizon)
+        for margin in (SHARPEST, 0.01, 0.03, 0.1, 0.3):
+            search = _Search(self.within(min(earliest * (1.0 + margin), horizon)), self.options)
+            try:
+                search.schedule()
+            except Infeasible:
+                continue
+            return search
+        return self
 
-def _broken(spacecraft: Spacecraft, program: Program, burns: tuple[Burn, ...]) -> Iterator[Span]:
-    """What to forbid: ends of too long burns, too short ones, the shorter of two too near, the least of too many."""
-    limits, width = spacecraft.limits, program.width
-    for burn in burns:
-        longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
-        if burn.on_time > longest + SLACK:
-            reach = burn.on_time + width
-            yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
-            yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
-        if burn.on_time < 0.5 * shortest:
-            yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
-    for one, two in itertools.pairwise(burns):
-        near = two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - SLACK
-        if near:
-            less = min(one, two, key=lambda burn: burn.on_time)
-            reach = 0.5 * less.on_time + width
-            yield less.channel, less.t - reach, less.t + reach
-    if limits.max_pulses is not None and len(burns) > limits.max_pulses:
-        least = min(burns, key=lambda burn: burn.on_time * abs(burn.channel.transverse))
-        reach = 0.5 * least.on_time + 2.0 * width
-        yield least.channel, least.t - reach, least.t + reach
+    def schedule(self) -> Schedule:
+        """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
+        first = self.program().solve()
+        if first.unmet > UNMET:
+            raise Infeasible(self.cure())
+        best, horizon = self.settled(first.cost), self.spacecraft.horizon
+        halvings = 0
+        while self.dear(best, first.cost) and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period:
+            halvings += 1
+            if best is not None and halvings > HALVINGS:
+                break
+            shorter = _Search(self.within(horizon), self.options)
+            if not shorter.feasible(horizon):
+                break
+            other = shorter.settled(first.cost)
+            if best is None or (other is not None and self.price(other) < self.price(best)):
+                best = other
+        if best is None:
+            raise Infeasible(
+                "not found: the program has solutions, but on the true motion the search did not settle on one that "
+                "keeps on-times, gap and max_pulses; another horizon may help"
+            )
+        return self.with_bounds(best, first)
 
+    def dear(self, made: Schedule | None, least: float) -> bool:
+        """Whether there is no schedule, or one so dear that it is worth looking for another."""
+        return made is None or self.price(made) > least * (1.0 + DEARER)
 
-def _trimmed(spacecraft: Spacecraft, made: Schedule, momentum: bool) -> Schedule:
-    """The schedule with the pulses that have most room trimmed on the flown motion."""
-    most = {channel.name: channel.max_on_time for channel in spacecraft.channels}
+    def settled(self, least: float) -> Schedule | None:
+        """The cheapest of the schedules on which the search settles from one choice of burns or another."""
+        program = self.program()
+        program.haste = HASTE
+        found: list[tuple[float, float, Schedule]] = []
+        for _ in range(CHOICES):
+            solution = program.solve()
+            if solution.unmet > UNMET:
+                break
+            try:
+                solution, last = self.thinned(program, solution, least), math.inf
+                for turn in range(AIMS):
+                    burns = self.repaired(program, solution)
+                    made = self.pulses(burns)
+                    flown = flight.flown(self.spacecraft, made)
+                    program.aim(influence.along(flown, self.equations, program.width))
+                    if self.left(flown) < NEAR:
+                        made = polish(self.spacecraft, made, self.equations, solution.off, program.width)
+                        left, price = self.left(flight.flown(self.spacecraft, made)), self.price(made)
+                        found.append((0.0 if left <= LEFT else left, price, made))
+                        if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
+                            break
+                        last = price if left <= LEFT else math.inf
+                    solution = program.solve(program.about(burns, zoom=2.0**turn))
+                    if solution.unmet > LOST:
+                        break
+            except _Unrepairable:
+                break
+            if any(left == 0.0 and price <= least * (1.0 + DEAR) for left, price, _ in found):
+                break
+        left, _, best = min(found, key=lambda one: one[:2], default=(math.inf, math.inf, None))
+        return None if left > 0.0 and self.spacecraft.limits.tick is None else best
 
-    def stiffness(index: int) -> tuple[bool, float]:
-        """Pulses that may still grow first, and of them the longest."""
-        pulse = made.pulses[index]
-        return pulse.on_time > 0.95 * most[pulse.channel], -pulse.magnitude
+    def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
+        """The schedule with what any other must cost."""
+        body = self.spacecraft
+        first = first or self.program().solve()
+        if any(channel.axial for channel in self.channels):  # the spin, and so the phases, may change
+            rigorous = self.cheapest() * body.least_impulse
+        else:
+            nutation = influence.small_angles(body, Equations(shift=False))
+            rigorous = 0.0
+            if np.any(nutation.goal):
+                rigorous = Program(body, self.channels, self.costs, nutation, ideal=True).solve().cost
+            if self.equations.shift and self.options.shift is None:
+                rigorous = max(rigorous, self.cheapest() * body.turning_impulse)
+        return Schedule(made.pulses, made.notes, Bounds(first.cost, min(rigorous, first.cost), self.unit))
 
-    chosen = sorted(sorted(range(len(made)), key=stiffness)[:KNOBS])
-    return trim.refine(spacecraft, made, chosen=chosen, momentum=momentum)
+    def cheapest(self) -> float:
+        """Least cost of one N m s of transverse impulse."""
+        strengths = np.array([abs(channel.transverse) for channel in self.channels])
+        return float(np.min(self.costs[strengths > 0.0] / strengths[strengths > 0.0]))
 
+    def price(self, made: Schedule) -> float:
+        """What a schedule costs by the program's own prices."""
+        price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
+        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
 
-def _unreachable(spacecraft: Spacecraft, channels: tuple[Channel, ...], costs: Vector, momentum: bool) -> str:
-    """Which limit to relax where the program has no solution."""
-    left = Program(spacecraft, channels, costs, momentum=False).solve().unmet
-    if momentum and left <= UNMET:
-        return (
-            f"within {spacecraft.horizon:.4g} s the nutation can be taken out, but H not be kept where it is; "
-            "set limits.horizon later, or use --free-axis"
+    def left(self, flown: flight.Flight) -> float:
+        """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
+        residual, goal = flown.residual, self.spacecraft.goal
+        off = max(residual.axis_error - (self.options.shift or 0.0), 0.0) if self.equations.shift else 0.0
+        spin = 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0)
+        return max(residual.nutation, off, spin)
+
+    def thinned(self, program: Program, solution: Solution, cost: float) -> Solution:
+        """As few burns as cost hardly more: the longest are kept and may grow, as many as it takes.
+
+        The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
+        """
+        few = len(solution.burns) <= 2 * len(self.equations.chosen)
+        most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
+        order = sorted(solution.burns, key=lambda burn: -burn.on_time * float(np.linalg.norm(burn.channel.torque)))
+        best, low, high = solution, 1, len(order)
+        allowed = self.spacecraft.limits.max_pulses
+        if self.options.least == "pulses" or (allowed is not None and high > allowed):
+            most = math.inf
+        while low < high:
+            middle = (low + high) // 2
+            found = program.solve(program.about(order[:middle]))
+            if found.unmet <= UNMET and found.cost <= most:
+                best, high = found, middle
+            else:
+                low = middle + 1
+        return best
+
+    def repaired(self, program: Program, solution: Solution) -> tuple[Burn, ...]:
+        """The burns, once none of them breaks a limit: where one does, its slots are forbidden."""
+        for _ in range(REPAIRS):
+            broken = next(self.broken(program, solution.burns), None)
+            if broken is None:
+                return solution.burns
+            program.forbid(*broken)
+            near = program.solve(program.about(solution.burns))
+            solution = near if near.unmet <= UNMET else program.solve()
+            if solution.unmet > UNMET:
+                raise _Unrepairable
+        raise _Unrepairable
+
+    def broken(self, program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
+        """What to forbid: ends of too long burns, too short ones, the less of two too near, the least if too many."""
+        limits, width = self.spacecraft.limits, program.width
+        for burn in burns:
+            longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
+            if burn.on_time > longest + SLACK:
+                reach = burn.on_time + width
+                yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
+                yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
+            if burn.on_time < 0.5 * shortest:
+                yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
+        for one, two in itertools.pairwise(burns):
+            if two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - SLACK:
+                less = min(one, two, key=lambda burn: burn.on_time)
+                reach = 0.5 * less.on_time + width
+                yield less.channel, less.t - reach, less.t + reach
+        if limits.max_pulses is not None and len(burns) > limits.max_pulses:
+            least = min(burns, key=lambda burn: burn.on_time * float(np.linalg.norm(burn.channel.torque)))
+            reach = 0.5 * least.on_time + 2.0 * width
+            yield least.channel, least.t - reach, least.t + reach
+
+    def pulses(self, burns: tuple[Burn, ...]) -> Schedule:
+        """The burns as pulses, on-times within their bounds."""
+        windows, body = (
+            Windows(replace(self.spacecraft, limits=replace(self.spacecraft.limits, tick=None))),
+            self.spacecraft,
         )
-    names = ", ".join(channel.name for channel in channels)
-    share = 100.0 * min(left, 1.0)
-    return (
-        f"within {spacecraft.horizon:.4g} s the channels ({names}) cannot take out the nutation, {share:.2g} % of it "
-        "stays; set limits.horizon later, shorten blackout windows, or allow longer pulses"
-    )
+        pulses = []
+        for burn in burns:
+            on_time = windows.on_time(burn.on_time, burn.channel.min_on_time, burn.channel.max_on_time)
+            start = max(burn.t - 0.5 * on_time, body.limits.earliest)
+            start = min(start, body.horizon - on_time)
+            pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
+        return Schedule(tuple(pulses))
+
+    def cure(self) -> str:
+        """Why the program has no solution, and which limit to relax."""
+        body = self.spacecraft
+        names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
+        nutation = Equations(shift=False)
+        left = self.program(body, nutation).solve().unmet
+        if left <= UNMET:
+            wanted = "H not be kept where it is" if body.goal.axis is None else "H not be brought to the target"
+            if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
+                wanted = "the spin not be brought to the rate asked for"
+            what = f"within {horizon:.4g} s the nutation can be taken out, but {wanted}"
+        else:
+            what = (
+                f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
+                f"{100.0 * min(left, 1.0):.2g} % of it stays"
+            )
+        return f"{what}; {self.relaxed()}"
+
+    def relaxed(self) -> str:
+        """The limit that has to be relaxed, and how far."""
+        body = self.spacecraft
+        horizon = later = body.horizon
+        while later < LATEST * horizon:
+            later *= 2.0
+            if self.feasible(later):
+                needed = self.least_horizon(0.5 * later, later)
+                more = "" if self.options.free_axis or not self.equations.shift else ", or use --free-axis"
+                return f"set limits.horizon to {needed:.4g} s or later ({needed - horizon:.3g} s more){more}"
+        if body.limits.blackout:
+            free = replace(body, limits=replace(body.limits, blackout=()))
+            if self.program(free).solve().unmet <= UNMET:
+                return "shorten the blackout windows (without any it can be done)"
+        return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"

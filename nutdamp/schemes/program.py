@@ -1,9 +1,8 @@
 """Least-cost firing of body-fixed channels as a linear program over channels and firing times.
 
-With impulses J >= 0 along directions d_c at times t, small angles:
-Σ J d_c e^{iaω3t} = -Aω0 (no nutation left; exact at any angle) and Σ J d_c e^{iω3t} = Δh (shift of H, first order).
-Time is cut into slots in which a channel can give at most its torque times the slot, so that long burns and what their
-width loses come out right. Slots enter the program by their price: four equations need few of them.
+Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
+and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at
+any moment. Columns enter the program by their price, since a handful of equations needs few of them.
 """
 
 from __future__ import annotations
@@ -16,36 +15,37 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.schemes.influence import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 SLOTS = 64
 """Slots in the faster of the two turns, at ω3 and at aω3."""
 
-MOST_SLOTS = 400_000
+MOST_SLOTS = 600_000
 """Slots of all channels together: a horizon of more is looked at as far as they reach."""
 
 SLACK_COST = 1e3
-"""Cost of what no slot supplies, over the dearest channel's: used only where there is no solution."""
+"""Cost of what no column supplies, over the dearest channel's: used only where there is no solution."""
 
 PRICE = 1e-7
-"""Relative reduced cost below which a slot cannot lower the cost any more."""
+"""Relative reduced cost below which a column cannot lower the cost any more."""
 
-BEST = 300
-"""Slots taken in per round, the best priced first."""
+BEST = 250
+"""Columns taken in per round, the best priced first."""
+
+FIRST = 400
+"""Columns to begin with."""
 
 ROUNDS = 60
 
+LOOK = 0.05
+"""Peaks of the price this far below zero are looked at more closely within their slots."""
 
-PEAK = 0.05
-"""Peaks of the price this far below zero are looked at more closely between the centres of slots."""
+SIDES = 32
+"""Directions in which H may end off the target, where it may."""
 
-
-class Column(NamedTuple):
-    """One unknown of the program: an impulse of a channel at ``t`` s, spread over ``width`` s (0: none)."""
-
-    channel: int
-    t: float
-    width: float
+SOME = 1e-12
+"""Share of what is needed below which an on-time is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,41 +57,52 @@ class Burn:
     on_time: float
 
 
+class Columns(NamedTuple):
+    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse)."""
+
+    channel: NDArray[np.int_]
+    t: Vector
+    width: Vector
+
+
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Burns of least ``cost`` in time order; ``unmet`` is what the slots could not supply, over A|ω0|."""
+    """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
+
+    ``off`` (2,) N m s is how far from the target H is to end, where it may; ``duals`` are the prices of the equations.
+    """
 
     burns: tuple[Burn, ...]
     cost: float
     unmet: float
+    off: Vector
+    duals: Vector
 
 
 @dataclass(eq=False)
 class Program:
     """The linear program of one spacecraft.
 
-    ``costs`` (channels,) of one N m s each. ``momentum``: H is to shift by ``target`` (2,) N m s along e1(0), e2(0);
-    else wherever it likes. ``ideal``: channels give any impulse at any moment, which no real one can do cheaper.
-    ``haste`` is by how much (relatively) the end of the horizon seems dearer than its beginning: among equals the
-    early moments are taken. ``forbidden`` (channels, slots) marks slots that may not be used.
+    ``costs`` (channels,) per second of on-time. ``influence`` holds the equations, which may be exchanged for others
+    between solutions. ``ideal``: channels give any impulse at any moment, which no real one can do cheaper. ``off``
+    N m s is how far from its target H may end. ``haste``: by how much (relatively) the end of the horizon seems dearer
+    than its beginning, among equals the early moments are taken. ``forbidden`` (channels, slots) may not be used.
     """
 
     spacecraft: Spacecraft
     channels: tuple[Channel, ...]
     costs: Vector
-    momentum: bool = True
-    target: Vector = field(default_factory=lambda: np.zeros(2))
+    influence: Influence
     ideal: bool = False
+    off: float = 0.0
     haste: float = 0.0
     width: float = field(init=False)
     centres: Vector = field(init=False)
     forbidden: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
-        body = self.spacecraft
-        nutation, spin = body.inertia.a * body.spin, body.spin
-        limits = body.limits
-        slot = 2 * math.pi / max(abs(nutation), abs(spin)) / SLOTS
+        body, limits = self.spacecraft, self.spacecraft.limits
+        slot = 2 * math.pi / max(abs(body.inertia.a * body.spin), abs(body.spin)) / SLOTS
         horizon = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
         count = max(math.ceil((horizon - limits.earliest) / slot), 1)
         edges = np.linspace(limits.earliest, horizon, count + 1)
@@ -101,125 +112,168 @@ class Program:
         for begins, ends in limits.blackout:
             blocked |= (edges[:-1] < ends) & (edges[1:] > begins)
         self.forbidden = np.tile(blocked, (len(self.channels), 1))
-        # What a slot loses to its width on each of the two equations.
-        losses = np.sinc(np.array([nutation, spin]) * self.width / (2 * math.pi))
-        phases = np.exp(1j * np.outer([nutation, spin], self.centres)) * losses[:, None]
-        self._phases = phases if self.momentum else phases[:1]
-        self._rates = np.array([nutation, spin][: len(self._phases)])
-        torques = np.array([channel.transverse for channel in self.channels])
-        self._strength = np.abs(torques)
-        self._directions = torques / self._strength
-        start = -body.inertia.A * complex(body.omega0[0], body.omega0[1])
-        self._scale = abs(start)
-        self._goal = np.array([start.real, start.imag, *self.target][: 2 * len(self._phases)]) / self._scale
-        # A channel that gives all that is needed within one slot fires impulses, at any moment.
-        self._strong = self._strength * (np.inf if self.ideal else self.width) > self._scale
+        self._pool: Columns | None = None
+        self._torques = np.array([channel.torque for channel in self.channels])
+        self.aim(self.influence)
 
-    def solve(self) -> Solution:
-        """Least cost over what is not forbidden, by column generation."""
+    def aim(self, influence: Influence) -> None:
+        """Take other equations."""
+        self.influence = influence
+        self._scale = float(np.linalg.norm(influence.goal))
+        strength = np.linalg.norm(self._torques, axis=1)
+        self._unit = self._scale / strength  # s of firing that are worth all there is to do
+        self._direction = self._torques / strength[:, None]
+        self._strong = (self._unit < self.width) | self.ideal
+        self._price = self.costs * self._unit
+        self._dearest = float(self._price.max())
+        self._grid: Vector | None = None
+
+    def solve(self, columns: Columns | None = None) -> Solution:
+        """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation."""
+        generate = columns is None
+        chosen = self._first() if columns is None else columns
+        amounts, duals, slack = self._master(chosen)
+        for _ in range(ROUNDS if generate else 0):
+            new = self._priced(duals, chosen)
+            if not len(new.t):
+                break
+            chosen = _joined(chosen, new)
+            amounts, duals, slack = self._master(chosen)
+        if generate:
+            self._pool = chosen
+        used = amounts > SOME
+        on_times = amounts[used] * self._unit[chosen.channel[used]]
+        return Solution(
+            self._burns(Columns(chosen.channel[used], chosen.t[used], chosen.width[used]), on_times),
+            float(self.costs[chosen.channel[used]] @ on_times),
+            float(slack[: 2 * len(duals)].sum()),
+            self._off_by(slack[2 * len(duals) :]),
+            duals * self._dearest / self._scale,
+        )
+
+    def _master(self, columns: Columns) -> tuple[Vector, Vector, Vector]:
+        """Amounts (n,) in units of all there is to do, prices (equations,), and slacks, of the columns' program."""
         from scipy.optimize import linprog  # here, because it takes longer to load than most plans
 
-        dearest = float(np.max(self.costs))
-        taken = set(self._first())
-        slack = np.hstack([np.eye(len(self._goal)), -np.eye(len(self._goal))])
-        for _ in range(ROUNDS):
-            columns = sorted(taken)
-            channels = np.array([column.channel for column in columns], dtype=int)
-            times, widths = np.array([(column.t, column.width) for column in columns]).reshape(-1, 2).T
-            cost = np.concatenate(
-                [self.costs[channels] / dearest * self._dearness(times), np.full(slack.shape[1], SLACK_COST)]
-            )
-            most = np.where(widths > 0.0, self._strength[channels] * self.width / self._scale, np.inf)
-            bounds = np.column_stack([np.zeros(len(cost)), np.concatenate([most, np.full(slack.shape[1], np.inf)])])
-            matrix = np.hstack([self._coefficients(channels, times, widths), slack])
-            found = linprog(cost, A_eq=matrix, b_eq=self._goal, bounds=bounds.tolist(), method="highs-ds")
-            if not found.success:
-                raise RuntimeError(f"the linear program ended with: {found.message}")
-            new = set(self._priced(np.asarray(found.eqlin.marginals), dearest)) - taken
-            if not new:
-                break
-            taken |= new
-        amounts = np.asarray(found.x)[: len(columns)] * self._scale
-        return Solution(
-            self._burns(channels, times, amounts),
-            float(self.costs[channels] @ amounts),
-            float(np.asarray(found.x)[len(columns) :].sum()),
+        count = len(self.influence.goal)
+        ring = self._ring()
+        matrix = np.hstack([self._coefficients(columns), np.eye(count), -np.eye(count), ring])
+        cost = np.concatenate(
+            [
+                self._price[columns.channel] / self._dearest * self._dearness(columns.t),
+                np.full(2 * count, SLACK_COST),
+                np.zeros(ring.shape[1]),
+            ]
         )
+        most = np.full(len(cost), np.inf)
+        wide = np.flatnonzero(columns.width)
+        most[wide] = columns.width[wide] / self._unit[columns.channel[wide]]
+        # The shares of the directions in which H may end off its target add up to no more than `off`.
+        limit = np.zeros((min(ring.shape[1], 1), len(cost)))
+        limit[:, len(cost) - ring.shape[1] :] = 1.0
+        found = linprog(
+            cost,
+            A_eq=matrix,
+            b_eq=self.influence.goal / self._scale,
+            A_ub=limit,
+            b_ub=np.full(len(limit), self.off / self._scale),
+            bounds=[(0.0, upper) for upper in most.tolist()],
+            method="highs-ds",
+        )
+        if not found.success:
+            raise RuntimeError(f"the linear program ended with: {found.message}")
+        x = np.asarray(found.x)
+        return x[: len(columns.t)], np.asarray(found.eqlin.marginals), x[len(columns.t) :]
+
+    def _ring(self) -> Vector:
+        """Columns for free in all directions of the shift, (equations, SIDES), where H may end off its target."""
+        if self.off == 0.0:
+            return np.zeros((len(self.influence.goal), 0))
+        angles = 2 * math.pi / SIDES * np.arange(SIDES)
+        ring = np.zeros((len(self.influence.goal), SIDES))
+        ring[2:4] = np.cos(angles), np.sin(angles)
+        return ring
+
+    def _off_by(self, amounts: Vector) -> Vector:
+        return np.asarray(-(self._ring() @ amounts)[2:4] * self._scale) if self.off > 0.0 else np.zeros(2)
 
     def _dearness(self, times: Vector) -> Vector:
         return 1.0 + self.haste * times / float(self.centres[-1])
 
-    def _coefficients(self, channels: NDArray[np.int_], times: Vector, widths: Vector) -> Vector:
+    def _coefficients(self, columns: Columns) -> Vector:
         """What one unit of each column does in the equations, (equations, n)."""
-        rates = self._rates[:, None]
-        losses = np.sinc(rates * widths / (2 * math.pi))
-        turned = self._directions[channels] * np.exp(1j * rates * times) * losses
-        return np.vstack([part for row in turned for part in (row.real, row.imag)])
+        rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
+        return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
 
-    def _first(self) -> list[Column]:
-        """A coarse start: every eighth slot that may be used."""
-        return [
-            self._column(int(channel), int(slot))
-            for channel, slot in np.argwhere(~self.forbidden)
-            if slot % (SLOTS // 8) == 0
-        ]
+    def _gains(self, weights: Vector) -> Vector:
+        """What one unit of each channel in each slot is worth by prices ``weights``, less what it costs."""
+        if self._grid is None:
+            lost = self.influence.widths(np.array([self.width]))[0]
+            self._grid = self.influence.rows(self.centres) * lost[:, None]
+        gains = self._direction @ np.tensordot(weights, self._grid, axes=(0, 1)).T
+        gains -= (self._price / self._dearest)[:, None] * self._dearness(self.centres)
+        gains[self.forbidden] = -np.inf
+        return np.asarray(gains)
 
-    def _column(self, channel: int, slot: int) -> Column:
-        return Column(channel, float(self.centres[slot]), 0.0 if self._strong[channel] else self.width)
+    def _first(self) -> Columns:
+        """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
+        if self._pool is not None:
+            pool = self._pool
+            allowed = ~self.forbidden[pool.channel, self._slot(pool.t)]
+            return Columns(pool.channel[allowed], pool.t[allowed], pool.width[allowed])
+        worth = self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
+        channel, slot = np.nonzero(worth > 0.7 * worth.max(initial=0.0) - 0.3)
+        chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
+        return self._slots(channel[chosen], slot[chosen])
 
-    def _priced(self, duals: Vector, dearest: float) -> list[Column]:
+    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
+        return Columns(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
+
+    def _priced(self, duals: Vector, taken: Columns) -> Columns:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
-        weights = duals[0::2] - 1j * duals[1::2]
-        gain = (self._directions[:, None] * (weights @ self._phases)).real
-        gain -= (self.costs / dearest)[:, None] * self._dearness(self.centres)
-        gain[self.forbidden] = -np.inf
-        best = np.argsort(gain.ravel())[::-1][:BEST]
-        weak = [divmod(int(index), gain.shape[1]) for index in best if gain.ravel()[index] > PRICE]
-        found = [self._column(channel, slot) for channel, slot in weak if not self._strong[channel]]
-        for channel in np.flatnonzero(self._strong):
-            padded = np.concatenate([[-np.inf], gain[channel], [-np.inf]])
-            peaks = np.flatnonzero(
-                (padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:]) & np.isfinite(gain[channel])
-            )
-            tops = peaks[gain[channel][peaks] > -PEAK]
-            times = self._climb(weights, int(channel), self.centres[tops])
-            worth = self._worth(weights, int(channel), times)[0]
-            worth = worth - self.costs[channel] / dearest * self._dearness(times)
-            order = np.argsort(worth)[::-1][:BEST]
-            found += [Column(int(channel), float(times[i]), 0.0) for i in order if worth[i] > PRICE]
-        return found
+        gains = self._gains(duals)
+        weak = np.where(self._strong[:, None], -np.inf, gains)
+        slots = taken.width > 0.0
+        weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
+        channel, slot = np.nonzero(weak > PRICE)
+        if len(slot) > BEST:
+            best = np.argpartition(weak[channel, slot], -BEST)[-BEST:]
+            channel, slot = channel[best], slot[best]
+        found = self._slots(channel, slot)
+        return _joined(found, self._peaks(gains, duals)) if self._strong.any() else found
 
-    def _worth(self, weights: NDArray[np.complex128], channel: int, times: Vector) -> tuple[Vector, Vector, Vector]:
-        """What an impulse is worth at ``times`` by the duals, with its first and second derivative."""
-        rates = self._rates[:, None]
-        terms = weights[:, None] * self._directions[channel] * np.exp(1j * rates * times)
-        return (
-            np.asarray(terms.sum(axis=0).real),
-            np.asarray((1j * rates * terms).sum(axis=0).real),
-            np.asarray((-(rates**2) * terms).sum(axis=0).real),
-        )
+    def _peaks(self, gains: Vector, duals: Vector) -> Columns:
+        """Moments within slots at which a strong channel is worth most."""
+        padded = np.pad(np.where(self._strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
+        middle = padded[:, 1:-1]
+        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
+        order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
+        channel, centre = channel[order], self.centres[slot[order]]
+        within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
+        times = centre[:, None] + within
+        fives = Columns(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
+        cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
+        worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
+        best = np.argmax(worth, axis=1)
+        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+        low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+        bend = low - 2.0 * top + high
+        aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+        aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
+        t = times[every, inner] + aside * 0.25 * self.width
+        good = worth[every, best] > PRICE
+        return Columns(channel[good], t[good], np.zeros(int(good.sum())))
 
-    def _climb(self, weights: NDArray[np.complex128], channel: int, times: Vector) -> Vector:
-        """Moments near ``times``, each within its slot, at which the worth is largest."""
-        low, high = times - 0.5 * self.width, times + 0.5 * self.width
-        for _ in range(4):
-            _, slope, bend = self._worth(weights, channel, times)
-            newton = np.where(bend < 0.0, -slope / np.where(bend < 0.0, bend, 1.0), np.sign(slope) * self.width)
-            times = np.clip(times + newton, low, high)
-        return times
-
-    def _burns(self, channels: NDArray[np.int_], times: Vector, amounts: Vector) -> tuple[Burn, ...]:
+    def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
         """Neighbouring columns of a channel as one burn about their common centre."""
         burns: list[Burn] = []
-        for index, channel in enumerate(self.channels):
-            mine = np.flatnonzero((channels == index) & (amounts > 1e-12 * self._scale))
-            if not len(mine):
-                continue
-            apart = np.flatnonzero(np.diff(times[mine]) > 1.01 * self.width) + 1
+        for index in np.unique(columns.channel):
+            mine = np.flatnonzero(columns.channel == index)
+            mine = mine[np.argsort(columns.t[mine], kind="stable")]
+            apart = np.flatnonzero(np.diff(columns.t[mine]) > 1.01 * self.width) + 1
             for group in np.split(mine, apart):
-                total = float(amounts[group].sum())
-                centre = float(amounts[group] @ times[group]) / total
-                burns.append(Burn(channel, centre, total / float(self._strength[index])))
+                total = float(on_times[group].sum())
+                burns.append(Burn(self.channels[index], float(on_times[group] @ columns.t[group]) / total, total))
         return tuple(sorted(burns, key=lambda burn: burn.t))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:
@@ -228,10 +282,38 @@ class Program:
         rows = slice(None) if channel is None else self.channels.index(channel)
         self.forbidden[rows, inside] = True
 
-    def keep(self, burns: Sequence[Burn]) -> None:
-        """Forbid all slots but those about ``burns``, which may grow by an eighth of the faster turn on each side."""
+    def about(self, burns: Sequence[Burn], zoom: float = 1.0) -> Columns:
+        """Columns from which ``burns`` may be made anew: their slots, and an eighth of the faster turn on each side.
+
+        Strong channels fire within that divided by ``zoom``.
+        """
         kept = np.zeros_like(self.forbidden)
+        moments: list[tuple[int, float]] = []
+        half = 0.5 * self.width
         for burn in burns:
+            index = self.channels.index(burn.channel)
             reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
-            kept[self.channels.index(burn.channel)] |= np.abs(self.centres - burn.t) < reach
-        self.forbidden |= ~kept
+            if self._strong[index]:
+                times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
+                times = np.unique(np.clip(times, self.centres[0] - half, self.centres[-1] + half))
+                allowed = ~self.forbidden[index, self._slot(times)]
+                moments += [(index, float(time)) for time in times[allowed]]
+            else:
+                kept[index] |= np.abs(self.centres - burn.t) < reach
+        slots = self._slots(*np.nonzero(kept & ~self.forbidden))
+        t = np.array([time for _, time in moments], dtype=float)
+        impulses = Columns(np.array([index for index, _ in moments], dtype=int), t, np.zeros(len(t)))
+        return _joined(slots, impulses)
+
+    def _slot(self, times: Vector) -> NDArray[np.int_]:
+        """The slots in which ``times`` (n,) s lie."""
+        slot = np.floor((times - self.centres[0]) / self.width + 0.5).astype(int)
+        return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
+
+
+def _joined(one: Columns, other: Columns) -> Columns:
+    return Columns(
+        np.concatenate([one.channel, other.channel]),
+        np.concatenate([one.t, other.t]),
+        np.concatenate([one.width, other.width]),
+    )

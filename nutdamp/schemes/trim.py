@@ -162,7 +162,7 @@ def solve(
         if norm <= CONVERGED:
             break
         jacobian = _slopes(residual, x, value, scale)
-        step = _step(jacobian, value, x, scale, lower, upper)
+        step = bounded_step(jacobian, value, x, scale, lower, upper)
         best, best_value, best_norm = x, value, norm
         for shrink in range(8):
             trial = np.clip(x + step * 0.5**shrink, lower, upper)
@@ -188,8 +188,8 @@ def _slopes(residual: Callable[[Vector], Vector], x: Vector, value: Vector, scal
     return np.column_stack(columns)
 
 
-def _step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
-    """Least-squares step; an unknown that it would push out of its bounds stays where it is."""
+def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
+    """Least-squares step (n,) for a ``jacobian`` (m, n) by scaled unknowns; one that would leave its bounds stays."""
     free = np.ones(len(x), dtype=bool)
     step = np.zeros(len(x))
     for _ in range(len(x)):

@@ -60,12 +60,12 @@ class Windows:
         return float(min(max(round(wanted / tick), least), most)) * tick
 
 
-def usable(spacecraft: Spacecraft) -> list[Channel]:
-    """The channels that schemes fire: more transverse than axial, with an on-time that can be commanded."""
+def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
+    """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time."""
     tick, time = spacecraft.limits.tick, spacecraft.horizon - spacecraft.limits.earliest
 
     def commandable(channel: Channel) -> bool:
         least = channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - SLACK) / tick), 1) * tick
         return least <= min(channel.max_on_time, time) + SLACK
 
-    return [channel for channel in spacecraft.channels if channel.damps and commandable(channel)]
+    return [channel for channel in spacecraft.channels if (channel.damps or axial) and commandable(channel)]
