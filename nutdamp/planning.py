@@ -110,7 +110,7 @@ class Plan:
             return ()
         gap = 100.0 * (spent / bounds.first_order - 1.0)
         return (
-            f"{scale * spent:.4g} {unit}; first-order least within {self.spacecraft.horizon:.4g} s "
+            f"{scale * spent:.4g} {unit}; first-order least within {bounds.within:.4g} s "
             f"{scale * bounds.first_order:.4g} {unit} (gap {gap:.2g} %); "
             f"no schedule at all below {scale * bounds.rigorous:.4g} {unit}",
         )

@@ -89,12 +89,14 @@ def steerable_pulse(
 class Bounds(NamedTuple):
     """Costs that other schedules of the same channels and limits cannot go below, in ``unit`` (kg or N m s).
 
-    ``first_order`` is the optimum of the small-angle program; ``rigorous`` holds at any angle for a symmetric body.
+    ``first_order`` is the optimum of the small-angle program ``within`` so many s; ``rigorous`` holds at any angle for
+    a symmetric body.
     """
 
     first_order: float
     rigorous: float
     unit: str
+    within: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,6 +43,14 @@ def write_whole(path: str, content: str | bytes) -> None:
         raise CannotWrite(path, reason.strerror or str(reason)) from reason
 
 
+def make_folder(path: str) -> None:
+    """Make the folder ``path`` unless it is there. Raises CannotWrite."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise CannotWrite(path, reason.strerror or str(reason)) from reason
+
+
 def _replace(target: Path, data: bytes) -> None:
     if target.is_dir():
         raise IsADirectoryError(0, "it is a directory")

@@ -68,8 +68,11 @@ NEAR = 0.05
 LATEST = 64.0
 """Times the horizon up to which a feasible one is looked for, to name it."""
 
-SHARPEST = 1e-3
-"""Relative accuracy of a least time, and the margin given to it."""
+SHARPEST, SHARP = 1e-3, 0.02
+"""Relative accuracy of a least time: by the program of small angles, and by schedules found."""
+
+MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""By how much more than the program's least time a schedule may need, tried in turn."""
 
 
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
@@ -150,18 +153,28 @@ class _Search:
 
     def sooner(self) -> _Search:
         """The same search with the shortest horizon in which a schedule is found."""
-        horizon = self.spacecraft.horizon
+        begin, horizon = self.spacecraft.limits.earliest, self.spacecraft.horizon
         if not self.feasible(horizon):
             return self
-        earliest = self.least_horizon(self.spacecraft.limits.earliest, horizon)
-        for margin in (SHARPEST, 0.01, 0.03, 0.1, 0.3):
-            search = _Search(self.within(min(earliest * (1.0 + margin), horizon)), self.options)
-            try:
-                search.schedule()
-            except Infeasible:
-                continue
-            return search
-        return self
+        span = self.least_horizon(begin, horizon) - begin
+        low, high = begin + span, horizon
+        for margin in MARGINS:  # small angles let channels fire at once, the schedule does not
+            end = begin + span * (1.0 + margin)
+            if end >= horizon:
+                break
+            if _Search(self.within(end), self.options).found():
+                high = end
+                break
+            low = end
+        while high - low > SHARP * high:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)
+        return _Search(self.within(high), self.options)
+
+    def found(self) -> bool:
+        """Whether a schedule is found with this very horizon."""
+        least = self.program().solve()
+        return least.unmet <= UNMET and self.settled(least.cost) is not None
 
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
@@ -237,7 +250,7 @@ class _Search:
                 rigorous = Program(body, self.channels, self.costs, nutation, ideal=True).solve().cost
             if self.equations.shift and self.options.shift is None:
                 rigorous = max(rigorous, self.cheapest() * body.turning_impulse)
-        return Schedule(made.pulses, made.notes, Bounds(first.cost, min(rigorous, first.cost), self.unit))
+        return Schedule(made.pulses, made.notes, Bounds(first.cost, min(rigorous, first.cost), self.unit, body.horizon))
 
     def cheapest(self) -> float:
         """Least cost of one N m s of transverse impulse."""

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import Infeasible
 from nutdamp.schemes.influence import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -171,17 +172,22 @@ class Program:
         # The shares of the directions in which H may end off its target add up to no more than `off`.
         limit = np.zeros((min(ring.shape[1], 1), len(cost)))
         limit[:, len(cost) - ring.shape[1] :] = 1.0
-        found = linprog(
-            cost,
-            A_eq=matrix,
-            b_eq=self.influence.goal / self._scale,
-            A_ub=limit,
-            b_ub=np.full(len(limit), self.off / self._scale),
-            bounds=[(0.0, upper) for upper in most.tolist()],
-            method="highs-ds",
-        )
-        if not found.success:
-            raise RuntimeError(f"the linear program ended with: {found.message}")
+        bounds = [(0.0, upper) for upper in most.tolist()]
+        for presolve in (True, False):  # rarely the solver loses its way after presolving
+            found = linprog(
+                cost,
+                A_eq=matrix,
+                b_eq=self.influence.goal / self._scale,
+                A_ub=limit,
+                b_ub=np.full(len(limit), self.off / self._scale),
+                bounds=bounds,
+                method="highs-ds",
+                options={"presolve": presolve},
+            )
+            if found.success:
+                break
+        else:
+            raise Infeasible(f"not found: the linear program's solver gave up ({found.message})")
         x = np.asarray(found.x)
         return x[: len(columns.t)], np.asarray(found.eqlin.marginals), x[len(columns.t) :]
 

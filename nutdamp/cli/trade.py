@@ -1,0 +1,102 @@
+"""``nutdamp trade``: what time costs, as a front of schedules."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from nutdamp.cli.boundary import INFEASIBLE
+from nutdamp.cli.common import (
+    Aim,
+    Quantity,
+    load,
+    one_stdout,
+    quiet_option,
+    remarks,
+    scheme_options,
+    show,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.schemes import Options
+
+
+class Allowance(Quantity):
+    """An angle, or ``any``."""
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The angle in rad, infinite for ``any``."""
+        return float("inf") if value == "any" else super().convert(value, param, ctx)
+
+
+@click.command("trade")
+@spacecraft_argument
+@click.option(
+    "--allow",
+    type=Allowance("angle"),
+    multiple=True,
+    metavar="ANGLE|any",
+    help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
+)
+@click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
+@scheme_options
+@click.option("--csv", metavar="FILE", help="Write the points.")
+@click.option("--json", metavar="FILE", help="Write the points with their pulses.")
+@click.option("--plot", metavar="FILE", help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
+@click.option("--schedules", metavar="FOLDER", help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@quiet_option
+def command(
+    spacecraft: str | None,
+    allow: tuple[float, ...],
+    points: int,
+    options: Options,
+    aim: Aim,
+    csv: str | None,
+    json: str | None,
+    plot: str | None,
+    schedules: str | None,
+    quiet: bool,
+) -> None:
+    """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
+
+    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT is a YAML file;
+    without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output.
+    """
+    if any(shift < 0.0 for shift in allow):
+        raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
+    silent = one_stdout(csv=csv, json=json, plot=plot)
+    body = load(spacecraft, remarks(quiet), aim)
+
+    from nutdamp import trade
+    from nutdamp.cli.progress import progress
+
+    shifts = allow or (0.0, trade.EVERYWHERE)
+    with progress("searching", points * len(set(shifts)), quiet=quiet) as step:
+        found = trade.fronts(body, options, count=points, shifts=shifts, progress=step)
+    outputs: list[tuple[str, str | bytes]] = []
+    if csv is not None or json is not None:
+        from nutdamp.files.output import json_text
+        from nutdamp.files.trade_files import trade_csv, trade_json
+
+        if csv is not None:
+            outputs.append((csv, trade_csv(found)))
+        if json is not None:
+            outputs.append((json, json_text(trade_json(body, found))))
+    if plot is not None:
+        from nutdamp.report import figures
+
+        outputs.append((plot, figures.rendered(figures.trade_figure(body, found), plot)))
+    if schedules is not None:
+        from nutdamp.files.output import make_folder
+        from nutdamp.files.trade_files import schedule_files
+
+        make_folder(schedules)
+        outputs.extend(schedule_files(found, schedules))
+    write_all(outputs)
+    if not silent:
+        from nutdamp.report.trade_tables import trade_screen
+
+        show(trade_screen(body, found))
+    if not any(front.points for front in found):
+        sys.exit(INFEASIBLE)

@@ -1,0 +1,77 @@
+"""Fronts of ``trade`` as CSV and JSON, and their schedules as files of pulses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.files.output import csv_text, number
+from nutdamp.files.plan_json import plan_json, spacecraft_json
+from nutdamp.files.pulses_csv import pulses_csv
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.trade import Front, Point
+
+HEADER = (
+    "point",
+    "shift_allowed_deg",
+    "end_s",
+    "pulses",
+    "propellant_kg",
+    "total_impulse_Nms",
+    "first_order_least",
+    "least_unit",
+    "nutation_deg",
+    "momentum_shift_deg",
+    "axis_error_deg",
+)
+
+
+def numbered(found: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
+    """All points of all fronts, numbered from 1."""
+    pairs = ((front, point) for front in found for point in front.points)
+    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))
+
+
+def trade_csv(found: Sequence[Front]) -> str:
+    """One row a point; a shift allowed of any size is empty."""
+    return csv_text(HEADER, (_row(index, front, point) for index, front, point in numbered(found)))
+
+
+def _row(index: int, front: Front, point: Point) -> list[str]:
+    plan, left = point.plan, point.plan.flight.residual
+    return [
+        str(index),
+        number(math.degrees(front.shift)),
+        number(plan.pulses.end),
+        str(len(plan.pulses)),
+        number(plan.pulses.propellant),
+        number(plan.pulses.total_impulse),
+        number(point.bounds.first_order),
+        point.bounds.unit,
+        *(number(math.degrees(angle)) for angle in (left.nutation, left.momentum_shift, left.axis_error)),
+    ]
+
+
+def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]:
+    """All fronts with their plans, as ``plan --json`` gives them."""
+    numbers: dict[int, list[dict[str, Any]]] = {id(front): [] for front in found}
+    for index, front, point in numbered(found):
+        numbers[id(front)].append({"point": index, "horizon_s": point.horizon, **plan_json(point.plan)})
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(spacecraft),
+        "fronts": [
+            {"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": numbers[id(front)]}
+            for front in found
+        ],
+    }
+
+
+def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str | bytes]]:
+    """The pulses of every point: (path in ``folder``, contents)."""
+    return [
+        (str(Path(folder) / f"point-{index}.csv"), pulses_csv(point.plan.flight)) for index, _, point in numbered(found)
+    ]

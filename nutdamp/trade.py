@@ -1,0 +1,110 @@
+"""What time costs: schedules of the scheme optimal from the shortest that is found to the longest that still saves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp import schemes
+from nutdamp.planning import Plan, plan
+from nutdamp.schedule import Bounds
+from nutdamp.spacecraft import Spacecraft
+
+SAVES = 1e-3
+"""Share of the cost that a later end must save to count as another point."""
+
+EVERYWHERE = math.inf
+"""Shift of H allowed that asks nothing."""
+
+
+class Point(NamedTuple):
+    """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within."""
+
+    plan: Plan
+    horizon: float
+
+    @property
+    def cost(self) -> float:
+        """What the schedule costs, in the unit of its bounds."""
+        schedule = self.plan.pulses
+        propellant = schedule.propellant
+        return propellant if self.bounds.unit == "kg" and propellant is not None else schedule.total_impulse
+
+    @property
+    def bounds(self) -> Bounds:
+        """What other schedules within the same horizon must cost."""
+        bounds = self.plan.pulses.bounds
+        assert bounds is not None
+        return bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Schedules none of which is both later and dearer than another; H may end ``shift`` rad off its target.
+
+    ``why`` says why there is none.
+    """
+
+    shift: float
+    points: tuple[Point, ...]
+    why: str | None = None
+
+
+def fronts(
+    spacecraft: Spacecraft,
+    options: schemes.Options,
+    *,
+    count: int,
+    shifts: Sequence[float],
+    progress: Callable[[int], None] = lambda _: None,
+) -> tuple[Front, ...]:
+    """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
+
+    A schedule that keeps a smaller shift stands for the larger ones too, where none beats it. ``progress`` is told
+    how many of the count × len(shifts) searches are done.
+    """
+    made: list[Front] = []
+    for index, shift in enumerate(sorted(set(shifts))):
+        before = index * count
+        front = _front(spacecraft, _allowing(options, shift), count, shift, lambda done, b=before: progress(b + done))
+        points = (*front.points, *(point for other in made for point in other.points))
+        made.append(Front(shift, _undominated(points), None if points else front.why))
+    return tuple(made)
+
+
+def _allowing(options: schemes.Options, shift: float) -> schemes.Options:
+    anywhere = math.isinf(shift)
+    return options._replace(free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+
+
+def _front(
+    spacecraft: Spacecraft, options: schemes.Options, count: int, shift: float, progress: Callable[[int], None]
+) -> Front:
+    """The fastest schedule, then horizons from its end to that of the file, evenly by their ratios."""
+    fastest = plan(spacecraft, "optimal", options._replace(least="time"))
+    progress(1)
+    if fastest.schedule is None or fastest.schedule.bounds is None:
+        return Front(shift, (), fastest.why or "there is nothing to do")
+    points = [Point(fastest, spacecraft.horizon)]
+    begin, end = spacecraft.limits.earliest, fastest.pulses.end
+    for index, share in enumerate(np.linspace(0.0, 1.0, count)[1:], start=2):
+        horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
+        body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
+        found = plan(body, "optimal", options)
+        progress(index)
+        if found.schedule is not None and found.schedule.bounds is not None:
+            points.append(Point(found, horizon))
+    return Front(shift, tuple(points))
+
+
+def _undominated(points: Sequence[Point]) -> tuple[Point, ...]:
+    """In the order of their ends, those that cost clearly less than all that end before."""
+    kept: list[Point] = []
+    for point in sorted(points, key=lambda one: (one.plan.pulses.end, one.cost)):
+        if not kept or point.cost < kept[-1].cost * (1.0 - SAVES):
+            kept.append(point)
+    return tuple(kept)
