@@ -133,6 +133,16 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
     )
 
 
+def body_mark(found: Cones, quaternion: Vector) -> Vector:
+    """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
+    if not len(found.body):
+        return np.full(3, np.nan)
+    in_body = attitude.rotate(quaternion * np.array([1.0, -1.0, -1.0, -1.0]), found.body)
+    azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
+    order = np.argsort(azimuth)
+    return np.array([np.interp(0.0, azimuth[order], found.body[order, part]) for part in range(3)])
+
+
 def around(axis: Vector, start: Vector) -> Vector:
     """Unit vectors (RIM, 3) on the circle that ``start`` describes about ``axis``, both unit; none on the axis."""
     square = start - axis * (axis @ start)

@@ -41,13 +41,18 @@ def motion_figure(flight: Flight, track: Track) -> Figure:
 
 def title(flight: Flight) -> str:
     """What every sheet is headed with."""
-    body, count = flight.spacecraft, len(flight.schedule)
-    name = body.name if len(body.name) <= LONGEST_NAME else f"{body.name[: LONGEST_NAME - 1].rstrip()}…"
-    start, left = math.degrees(body.nutation), math.degrees(flight.residual.nutation)
+    count = len(flight.schedule)
+    start, left = math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
     if not count:
-        return f"{name}: nutation {start:.3g}°, no pulse"
+        return f"{short_name(flight)}: nutation {start:.3g}°, no pulse"
     kept = f"{left:.3g}°" if left > 1e-6 else "0°"
-    return f"{name}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
+    return f"{short_name(flight)}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
+
+
+def short_name(flight: Flight) -> str:
+    """The name of the spacecraft, cut where it is too long for a heading."""
+    name = flight.spacecraft.name
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
