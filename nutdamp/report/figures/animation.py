@@ -47,11 +47,12 @@ HELD = 0.4
 def film_format(path: str) -> str:
     """The format of a film by the ending of its file, gif for standard output.
 
-    Raises BadRequest for others, CannotWrite for mp4 where ffmpeg is not installed.
+    Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
     """
     found = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
     if found not in FORMATS:
         raise BadRequest(f"--output {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
     if found == "mp4" and shutil.which("ffmpeg") is None:
         raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
     return found
@@ -96,7 +97,7 @@ def film(
 ) -> bytes:
     """The film as the content of a file of ``width`` pixels; ``progress`` is told how many frames are done.
 
-    Raises as `film_format`, and MissingExtra without matplotlib.
+    Raises as `film_format`.
     """
     kind = film_format(path)
     scene = Scene(flight, timed, width)
@@ -182,7 +183,7 @@ class Scene:
         history.cone_history(self.strip, flight, self.path)
         self.strip.set(xlabel="time, s", ylabel="deg")
         sphere.name_directions(self.sky)
-        style.legend(figure, [self.sky, self.strip], 4)
+        style.legend(figure, [self.sky, self.strip], 5)
         figure.suptitle(" ")
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # from now on nothing may move but the motion

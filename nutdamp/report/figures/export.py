@@ -25,11 +25,15 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def ending(path: str, option: str = "--plot") -> str:
-    """The format of a picture by the ending of its file, png for standard output; raises BadRequest for others."""
+def ending(path: str) -> str:
+    """The format of a picture by the ending of its file, png for standard output.
+
+    Raises BadRequest for other endings, MissingExtra without matplotlib.
+    """
     found = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
     if found not in FORMATS:
-        raise BadRequest(f"{option} {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
     return found
 
 

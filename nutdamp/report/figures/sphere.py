@@ -143,7 +143,8 @@ def name_cones(axes: Axes) -> None:
 
 def name_directions(axes: Axes) -> None:
     """The marks of `draw_circles` for the legend."""
-    for mark, colour, name in zip(MARKS, (MOMENTUM, INK, MOTION), ("H", "ω", "spin axis"), strict=True):
+    named = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"), ("D", MOTION, "body axis 1"))
+    for mark, colour, name in named:
         axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
 
 
