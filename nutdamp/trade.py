@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -69,11 +70,14 @@ def fronts(
     """
     made: list[Front] = []
     for index, shift in enumerate(sorted(set(shifts))):
-        before = index * count
-        front = _front(spacecraft, _allowing(options, shift), count, shift, lambda done, b=before: progress(b + done))
+        front = _front(spacecraft, _allowing(options, shift), count, shift, partial(_told, progress, index * count))
         points = (*front.points, *(point for other in made for point in other.points))
         made.append(Front(shift, _undominated(points), None if points else front.why))
     return tuple(made)
+
+
+def _told(progress: Callable[[int], None], before: int, done: int) -> None:
+    progress(before + done)
 
 
 def _allowing(options: schemes.Options, shift: float) -> schemes.Options:
@@ -108,3 +112,9 @@ def _undominated(points: Sequence[Point]) -> tuple[Point, ...]:
         if not kept or point.cost < kept[-1].cost * (1.0 - SAVES):
             kept.append(point)
     return tuple(kept)
+
+
+def numbered(found: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
+    """All points of all fronts, numbered from 1."""
+    pairs = ((front, point) for front in found for point in front.points)
+    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))

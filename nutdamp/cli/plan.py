@@ -9,8 +9,10 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    expect_picture,
     load,
     one_stdout,
+    plot_options,
     quiet_option,
     remarks,
     scheme_options,
@@ -27,6 +29,7 @@ from nutdamp.schemes import CLASSIC, PLANNED, Options
 @scheme_options
 @click.option("--csv", metavar="FILE", help="Write the pulses of the recommended plan, or the one named.")
 @click.option("--json", metavar="FILE", help="Write all plans with their residuals.")
+@plot_options
 @quiet_option
 def command(
     spacecraft: str | None,
@@ -35,6 +38,8 @@ def command(
     aim: Aim,
     csv: str | None,
     json: str | None,
+    plot: str | None,
+    figure: str,
     quiet: bool,
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
@@ -45,9 +50,12 @@ def command(
     if options.on_time is not None and options.on_time <= 0.0:
         raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
     names = tuple(dict.fromkeys(names))
-    if csv is not None and len(names) > 1:
-        raise click.UsageError("--csv writes one schedule: name one --scheme, or none for the recommended one")
-    silent = one_stdout(csv=csv, json=json)
+    for option, path in (("--csv", csv), ("--plot", plot)):
+        if path is not None and len(names) > 1:
+            raise click.UsageError(f"{option} shows one schedule: name one --scheme, or none for the recommended one")
+    silent = one_stdout(csv=csv, json=json, plot=plot)
+    if plot is not None:
+        expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
 
@@ -65,8 +73,13 @@ def command(
         from nutdamp.files.pulses_csv import pulses_csv
 
         outputs.append((csv, pulses_csv(chosen.flight)))
-    elif csv is not None:
-        click.echo(f"{csv} was not written: no plan is feasible", err=True)
+    if plot is not None and chosen is not None:
+        from nutdamp.report import figures
+
+        outputs.append((plot, figures.plan_picture(figure, chosen, plot)))
+    for path in (csv, plot):
+        if path is not None and chosen is None:
+            click.echo(f"{path} was not written: no plan is feasible", err=True)
     write_all(outputs)
     if not silent:
         from nutdamp.report.plan_tables import comparison_screen

@@ -10,6 +10,7 @@ from nutdamp.cli.boundary import INFEASIBLE
 from nutdamp.cli.common import (
     Aim,
     Quantity,
+    expect_picture,
     load,
     one_stdout,
     quiet_option,
@@ -66,6 +67,8 @@ def command(
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
     silent = one_stdout(csv=csv, json=json, plot=plot)
+    if plot is not None:
+        expect_picture(plot)
     body = load(spacecraft, remarks(quiet), aim)
 
     from nutdamp import trade

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import plan_json, spacecraft_json
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.trade import Front, Point
+from nutdamp.trade import Front, Point, numbered
 
 HEADER = (
     "point",
@@ -27,12 +27,6 @@ HEADER = (
     "momentum_shift_deg",
     "axis_error_deg",
 )
-
-
-def numbered(found: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
-    """All points of all fronts, numbered from 1."""
-    pairs = ((front, point) for front in found for point in front.points)
-    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))
 
 
 def trade_csv(found: Sequence[Front]) -> str:

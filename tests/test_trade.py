@@ -1,0 +1,92 @@
+"""Fronts of time against propellant: no point beaten by another, every schedule flown and within its limits."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import json
+import math
+from pathlib import Path
+
+import pytest
+from builders import cross, spinner
+from checker import violations
+from process import Run
+
+from nutdamp import trade
+from nutdamp.schemes import Options
+from nutdamp.spacecraft import Limits, Spacecraft
+
+HALF_DEGREE = math.radians(0.5)
+
+
+@pytest.fixture(scope="module")
+def body() -> Spacecraft:
+    return spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), limits=Limits(horizon=40.0))
+
+
+@pytest.fixture(scope="module")
+def found(body: Spacecraft) -> tuple[trade.Front, ...]:
+    return trade.fronts(body, Options(), count=4, shifts=(trade.EVERYWHERE, 0.0, HALF_DEGREE))
+
+
+def test_fronts_go_from_strict_to_free(found: tuple[trade.Front, ...]) -> None:
+    assert [front.shift for front in found] == [0.0, HALF_DEGREE, math.inf]
+
+
+def test_later_points_are_cheaper(found: tuple[trade.Front, ...]) -> None:
+    for front in found:
+        assert len(front.points) >= 2
+        for one, two in itertools.pairwise(front.points):
+            assert one.plan.pulses.end < two.plan.pulses.end
+            assert one.cost > two.cost
+
+
+def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[trade.Front, ...]) -> None:
+    for front in found:
+        for point in front.points:
+            assert violations(body, point.plan.pulses) == []
+            left = point.plan.flight.residual
+            assert left.nutation < math.radians(1e-6)
+            assert left.momentum_shift <= front.shift + math.radians(1e-6)
+            assert point.bounds.rigorous <= point.cost
+
+
+def test_what_is_allowed_more_costs_no_more(found: tuple[trade.Front, ...]) -> None:
+    for strict, free in itertools.pairwise(found):
+        for point in strict.points:
+            later = [other for other in free.points if other.plan.pulses.end <= point.plan.pulses.end + 1e-9]
+            assert min(other.cost for other in later) <= point.cost * (1 + 2 * trade.SAVES)
+
+
+def test_no_schedule_within_the_horizon_is_said_with_its_reason() -> None:
+    body = spinner(channels=cross(8.0)[:1], limits=Limits(horizon=0.2))
+    front = trade.fronts(body, Options(), count=3, shifts=(0.0,))[0]
+    assert front.points == ()
+    assert front.why is not None
+    assert "horizon" in front.why
+
+
+def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_path: Path) -> None:
+    files = ["--csv", "t.csv", "--json", "t.json", "--plot", "t.svg", "--schedules", "front"]
+    done = run("trade", "--points", "2", "--allow", "0", *files)
+    assert done.returncode == 0, done.stderr
+    assert "first-order least" in done.stdout
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text())))
+    points = json.loads((tmp_path / "t.json").read_text())["fronts"][0]["points"]
+    assert len(rows) == len(points) == len(list((tmp_path / "front").glob("point-*.csv")))
+    assert float(rows[0]["propellant_kg"]) == points[0]["propellant_kg"]
+    assert (tmp_path / "t.svg").read_text().startswith("<?xml")
+    again = run("simulate", "--schedule", "front/point-1.csv", "--flown", "--json", "-")
+    assert json.loads(again.stdout)["flown"]["nutation_deg"] < 1e-6
+
+
+def test_nothing_feasible_ends_with_status_3(run: Run, tmp_path: Path) -> None:
+    text = "name: x\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"
+    text += "thrusters: [{name: T, torque: [1, 0, 0]}]\nlimits: {horizon: 0.1}\n"
+    (tmp_path / "x.yaml").write_text(text)
+    done = run("trade", "x.yaml", "--points", "2")
+    assert done.returncode == 3
+    assert "none:" in done.stdout
+    assert run("trade", "--allow", "-1deg").returncode == 2
