@@ -127,13 +127,15 @@ class _Search:
         else:
             self.costs = np.array([float(np.linalg.norm(channel.torque)) for channel in self.channels])
             self.unit = "N m s"
-        self.size = float(np.linalg.norm(spacecraft.momentum))
 
     def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
         aim = influence.small_angles(body, equations)
-        off = 0.0 if self.options.shift is None or not equations.shift else self.size * self.options.shift
+        off = 0.0
+        if self.options.shift is not None and equations.shift:
+            final = body.spin if body.goal.spin is None else body.goal.spin
+            off = body.inertia.C * abs(final) * math.sin(min(self.options.shift, 0.5 * math.pi))
         return Program(body, self.channels, self.costs, aim, off=off)
 
     def within(self, horizon: float) -> Spacecraft:
@@ -216,8 +218,8 @@ class _Search:
             try:
                 solution, last = self.thinned(program, solution, least), math.inf
                 for turn in range(AIMS):
-                    burns = self.repaired(program, solution)
-                    made = self.pulses(burns)
+                    solution = self.repaired(program, solution)
+                    made = self.pulses(solution.burns)
                     flown = flight.flown(self.spacecraft, made)
                     program.aim(influence.along(flown, self.equations, program.width))
                     if self.left(flown) < NEAR:
@@ -227,7 +229,7 @@ class _Search:
                         if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
                             break
                         last = price if left <= LEFT else math.inf
-                    solution = program.solve(program.about(burns, zoom=2.0**turn))
+                    solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
                     if solution.unmet > LOST:
                         break
             except _Unrepairable:
@@ -290,12 +292,12 @@ class _Search:
                 low = middle + 1
         return best
 
-    def repaired(self, program: Program, solution: Solution) -> tuple[Burn, ...]:
-        """The burns, once none of them breaks a limit: where one does, its slots are forbidden."""
+    def repaired(self, program: Program, solution: Solution) -> Solution:
+        """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden."""
         for _ in range(REPAIRS):
             broken = next(self.broken(program, solution.burns), None)
             if broken is None:
-                return solution.burns
+                return solution
             program.forbid(*broken)
             near = program.solve(program.about(solution.burns))
             solution = near if near.unmet <= UNMET else program.solve()

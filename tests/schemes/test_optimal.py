@@ -7,8 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from builders import spinner
-from scipy.optimize import linprog
+import reference
+from builders import Outcome, spinner
+from checker import violations
+from scipy.optimize import least_squares, linprog
+from scipy.spatial.transform import Rotation
 
 from nutdamp.planning import broken_limits, plan
 from nutdamp.schemes import Options
@@ -181,3 +184,121 @@ def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent() -> None:
     assert len(made.pulses) <= 12
     for one, two in itertools.pairwise(made.pulses):
         assert one.t < two.t
+
+
+def random_layout(seed: int) -> Spacecraft:
+    """2 to 12 skew channels, some with axial torque, 1° to 30° of nutation, 1 to 50 body nutation periods."""
+    rng = np.random.default_rng(seed)
+    count, A, spin = int(rng.integers(2, 13)), rng.uniform(60, 200), rng.uniform(0.5, 6) * rng.choice([-1, 1])
+    C = A * float(rng.choice([rng.uniform(0.3, 0.95), rng.uniform(1.05, 1.9)]))
+    degrees = rng.uniform(1, 30)
+    period = 2 * math.pi / abs((A - C) / A * spin)
+    horizon = rng.uniform(1, 50) * period
+    needed = C * abs(spin) * math.tan(math.radians(degrees)) / period
+    made = []
+    for index in range(count):
+        angle, size = rng.uniform(0, 2 * math.pi), needed * 10 ** rng.uniform(-0.7, 1.5)
+        axial = rng.uniform(-0.2, 0.2) * size * (rng.random() < 0.4)
+        torque = np.array([size * math.cos(angle), size * math.sin(angle), axial])
+        shortest, longest = rng.choice([0.0, 0.02]), math.inf if rng.random() < 0.5 else rng.uniform(0.2, 4)
+        one = Thruster(f"c{index}", torque, None, rng.uniform(1, 20), 220.0, shortest, longest)
+        made.append(Channel(f"c{index}", (one,)))
+    return spinner(A, C, spin, degrees, rng.uniform(0, 6.28), channels=tuple(made), limits=Limits(horizon=horizon))
+
+
+TEN_MICRODEGREE = math.radians(1e-5)
+
+
+def flies(seed: int) -> None:
+    """Flown by the reference integrator, nothing is left, within all limits, and the rigorous bound holds."""
+    spacecraft = random_layout(seed)
+    made = plan(spacecraft, "optimal")
+    assert made.schedule is not None, made.why
+    assert made.schedule.bounds is not None
+    assert violations(spacecraft, made.pulses) == []
+    flown = Outcome(spacecraft, made.pulses)
+    assert flown.nutation < TEN_MICRODEGREE
+    assert flown.shift < TEN_MICRODEGREE
+    assert made.pulses.propellant is not None
+    bounds = made.schedule.bounds
+    assert bounds.rigorous <= made.pulses.propellant * (1 + 1e-9)
+    assert made.pulses.propellant <= 1.1 * bounds.first_order
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_random_layouts_are_planned(seed: int) -> None:
+    flies(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(16, 200))
+def test_many_random_layouts_are_planned(seed: int) -> None:
+    flies(seed)
+
+
+@pytest.mark.parametrize(("seed", "degrees"), [(0, 1.0), (1, 5.0)])
+def test_no_flown_schedule_of_a_brute_search_is_cheaper(seed: int, degrees: float) -> None:
+    brute_search(seed, degrees, 40)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [1.0, 3.0, 5.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_flown_schedule_of_a_long_brute_search_is_cheaper(seed: int, degrees: float) -> None:
+    brute_search(seed, degrees, 400)
+
+
+def brute_search(seed: int, degrees: float, tries: int) -> None:
+    """Two to four ideal impulses at random moments, each made exact by its own solver, against the plan."""
+    rng = np.random.default_rng(100 + seed)
+    horizon = float(rng.uniform(2.0, 8.0))
+    spacecraft = spinner(120.0, 80.0, 3.0, degrees, 0.7, channels=channels(1e7), limits=Limits(horizon=horizon))
+    made = plan(spacecraft, "optimal")
+    assert made.flown is not None, made.why
+    cheapest = math.inf
+    for _ in range(tries):
+        count = int(rng.integers(2, 5))
+        cost = exact_impulses(spacecraft, rng.choice(4, count), np.sort(rng.uniform(0, horizon, count)), rng)
+        cheapest = min(cheapest, cost)
+    assert cheapest < 1.5 * spacecraft.least_impulse  # the search is not blind
+    assert made.pulses.total_impulse <= cheapest * 1.001
+
+
+def exact_impulses(spacecraft: Spacecraft, which: np.ndarray, times: np.ndarray, rng: np.random.Generator) -> float:
+    """Impulse of a schedule that ends without nutation and with H where it was, found from these moments; or inf.
+
+    The motion is that of the exact arcs (physics sheet), written here once more; four unknowns at least are solved for.
+    """
+    inertia, horizon = spacecraft.inertia, spacecraft.horizon
+    directions = np.array([spacecraft.channels[index].transverse / 1e7 for index in which])
+
+    def left(x: np.ndarray) -> np.ndarray:
+        rotation = reference.frame_n(inertia.moments, spacecraft.omega0)
+        rates, now = spacecraft.omega0.copy(), 0.0
+        for t, strength, direction in zip(x[: len(which)], x[len(which) :], directions, strict=True):
+            rotation, rates = coasted(inertia.moments, rotation, rates, t - now)
+            rates = rates + np.array([direction.real, direction.imag, 0.0]) * strength / inertia.A
+            now = t
+        momentum = rotation @ (np.asarray(inertia.moments) * rates)
+        return np.array([rates[0], rates[1], momentum[0] / 240, momentum[1] / 240])
+
+    start = np.concatenate([times, np.full(len(which), spacecraft.least_impulse / len(which))])
+    lower = np.zeros(2 * len(which))
+    upper = np.concatenate([np.full(len(which), horizon), np.full(len(which), 10 * spacecraft.least_impulse)])
+    found = least_squares(left, np.clip(start, 1e-6, upper - 1e-6), bounds=(lower, upper), xtol=1e-12, max_nfev=40)
+    moments = found.x[: len(which)]
+    if np.linalg.norm(found.fun) > 1e-8 or np.any(np.diff(moments) < 0.0):
+        return math.inf
+    return float(found.x[len(which) :].sum())
+
+
+def coasted(
+    moments: tuple[float, float, float], rotation: np.ndarray, rates: np.ndarray, time: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """R(t) = Rot(H t/A) R Rot3(a ω3 t)."""
+    A, _, C = moments
+    momentum = rotation @ (np.asarray(moments) * rates)
+    turn = (A - C) / A * rates[2] * time
+    about_axis = Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
+    following = Rotation.from_rotvec(momentum * time / A).as_matrix() @ rotation @ about_axis
+    return following, about_axis.T @ rates
