@@ -103,6 +103,7 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
 
 def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
     force: Vector | None = None
+    position: Vector | None = None
     if entry.torque is not None:
         torque = np.array(entry.torque)
         thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
@@ -111,7 +112,8 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         assert entry.direction is not None
         assert entry.force is not None
         thrust, force = entry.force, force_vector(entry.direction, entry.force)
-        torque = np.cross(entry.position, force)
+        position = np.array(entry.position)
+        torque = np.cross(position, force)
     return Thruster(
         name=entry.name,
         torque=axes.T @ torque,
@@ -120,6 +122,7 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         isp=entry.isp,
         min_on_time=entry.min_on_time,
         max_on_time=math.inf if entry.max_on_time is None else entry.max_on_time,
+        position=None if position is None else axes.T @ position,
     )
 
 
