@@ -347,7 +347,7 @@ def test_what_the_example_shows_in_comments_works() -> None:
     ]
     assert (craft.spin_drift, craft.dissipation) == (-0.001 / 80, 600.0)
     assert craft.dispersions is not None
-    assert craft.dispersions.thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "steerable"}
+    assert craft.dispersions.thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"}
     assert craft.dispersions.timing_offset == Tolerance("bias", 0.002)
     others = re.sub(r"^(state|inertia): .*\n", "", built_in_example_text(), flags=re.MULTILINE)
     craft = read(uncommented(others, "inertia", "omega0"))
