@@ -205,11 +205,8 @@ class Setting:
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
-def setting_of(spacecraft: Spacecraft, *, true: bool) -> Setting:
-    """How a flight sees the spacecraft: ``true``, with its principal moments and with |H| kept by dissipation.
-
-    Else as the equivalent symmetric body, with the linear law of dissipation.
-    """
+def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
+    """``true``: the principal moments as they are and |H| kept by dissipation; else the linear, symmetric body."""
     inertia, disturbances = spacecraft.inertia, spacecraft.disturbances
     symmetric = (inertia.A, inertia.A, inertia.C)
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
@@ -232,7 +229,7 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     symmetric one. Disturbances and dissipation (by its linear law) act between the pulses. The last leg reaches at
     least to ``until`` s.
     """
-    setting, state = setting_of(spacecraft, true=False), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=False), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
     for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
@@ -272,7 +269,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     Coasts of symmetric bodies left alone are exact arcs, everything else Taylor series at rounding accuracy. The last
     leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
     """
-    setting, state = setting_of(spacecraft, true=True), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=True), spacecraft.initial
     pulses = schedule.pulses
     last = max(until, schedule.end)
     edges = sorted({0.0, last, *(pulse.start for pulse in pulses), *(pulse.end for pulse in pulses)})

@@ -172,14 +172,6 @@ def cos_sin(angle: Array) -> tuple[Array, Array]:
     return 2.0 * scale - 1.0, 2.0 * half * scale
 
 
-def rotate(quaternion: Array, vector: Array) -> Array:
-    """Components in the inertial frame of vectors given in the body, (4, n) and (3, n) -> (3, n)."""
-    w, a, b, c = quaternion
-    x, y, z = vector
-    i, j, k = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
-    return np.array([x + w * i + b * k - c * j, y + w * j + c * i - a * k, z + w * k + a * j - b * i])
-
-
 def _arc(moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
     """The exact torque-free arc of symmetric bodies, in place; see `attitude.arc`.
 

@@ -81,4 +81,4 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
         return made
     keeps = name == "two-pulse" or (name == "optimal" and not options.free_axis)
     chosen = tuple(range(min(len(made), 4))) if keeps else (-1,)
-    return trim.refine(model.spacecraft, made, chosen=chosen, momentum=keeps)
+    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps)

@@ -1,0 +1,87 @@
+"""Histograms and distribution functions of a dispersion study, as the bytes of a picture file."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.dispersion.statistics import Distribution
+from nutdamp.dispersion.study import Results
+from nutdamp.errors import BadRequest, MissingExtra
+from nutdamp.report.figures import FORMATS, GREY, MOTION, PULSE, _metadata
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BINS = 80
+
+
+def check_picture(path: str) -> str:
+    """The format that the ending of ``path`` asks for; raises BadRequest, or MissingExtra without matplotlib."""
+    ending = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if ending not in FORMATS:
+        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    try:
+        import matplotlib  # noqa: F401 - only whether it is there
+    except ImportError as reason:
+        raise MissingExtra("plot", "a picture") from reason
+    return ending
+
+
+def dispersion_picture(results: Results, path: str, *, scheme: str) -> bytes:
+    """Histogram and distribution function of nutation and shift of H, with what is required of them."""
+    ending = check_picture(path)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.0, 7.0), layout="constrained")
+    grid = figure.subplots(2, 2)
+    asked = results.study.model.spacecraft.requirement
+    limits = (None, None) if asked is None else (asked.nutation, asked.momentum_shift)
+    for row, output, name, limit in zip(
+        grid, ("nutation", "momentum_shift"), ("nutation left", "shift of H"), limits, strict=True
+    ):
+        found = results.distribution(output)
+        if found is None:
+            continue
+        limit_deg = None if limit is None else math.degrees(limit)
+        _histogram(row[0], found, name, limit_deg)
+        _function(row[1], found, name, limit_deg, results.probability)
+    figure.suptitle(f"{results.study.model.spacecraft.name}: {scheme}, {results.done:,} dispersed truths")
+    stream = io.BytesIO()
+    figure.savefig(stream, format=ending, dpi=150, metadata=_metadata(ending))
+    return stream.getvalue()
+
+
+def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) -> None:
+    """Up to what 999 of 1000 cases stay below; the rest would only stretch the axis."""
+    end = float(found.quantiles(np.array([0.999]))[0]) or 1e-12
+    edges = np.linspace(found.minimum, max(end, found.minimum * (1 + 1e-9) + 1e-15), BINS + 1)
+    counts = found.histogram(edges)
+    share = 100.0 * counts / max(counts.sum(), 1.0)
+    axes.stairs(share, np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
+    axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %", title=f"{name}: histogram")
+    _mark(axes, found, limit)
+    axes.legend(loc="best", fontsize=9)
+
+
+def _function(axes: Axes, found: Distribution, name: str, limit: float | None, probability: float) -> None:
+    """How many cases stay below: on a scale that shows the last per mille as well as the first half."""
+    tail = np.logspace(0.0, -4.0, 400)
+    axes.plot(np.degrees(found.quantiles(1.0 - tail)), 100.0 * tail, color=MOTION, linewidth=1.6, label="cases")
+    axes.axhline(100.0 * (1.0 - probability), color=GREY, linewidth=0.8, linestyle=":")
+    axes.set_yscale("log")
+    axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %", title=f"{name}: distribution function (1 - CDF)")
+    _mark(axes, found, limit)
+    axes.legend(loc="best", fontsize=9)
+    axes.grid(linewidth=0.4, color="#cccccc")
+
+
+def _mark(axes: Axes, found: Distribution, limit: float | None) -> None:
+    worst = math.degrees(float(found.quantiles(np.array([0.997]))[0]))
+    axes.axvline(worst, color=GREY, linewidth=1.0, linestyle="--", label=f"99.7 %: {worst:.3g}°")
+    if limit is not None:
+        axes.axvline(limit, color=PULSE, linewidth=1.6, label=f"required: {limit:.3g}°")
