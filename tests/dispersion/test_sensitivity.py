@@ -96,7 +96,7 @@ def test_sampled_shares_of_a_linear_sum_are_its_shares() -> None:
 
 
 def test_sampled_shares_see_curvature_and_leave_out_interplay() -> None:
-    """y = x1² + x2 x3: the first has 2/3 of the variance (a little is lost within classes), the others nothing alone."""
+    """y = x1² + x2 x3: the first has 2/3 of the variance (within classes a little is lost), the others none."""
     generator = np.random.default_rng(8)
     draws = {name: generator.normal(size=EARLY) for name in ("1", "2", "3")}
     out = np.zeros((ROWS, EARLY))
