@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from nutdamp.schedule import STEERABLE, Schedule
+from nutdamp.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Spacecraft, Thruster
 from nutdamp.tolerances import Tolerance
 
@@ -18,6 +18,9 @@ SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / ma
 """Standard deviation of each kind for a size of one."""
 
 KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
+
+
+SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class Input(NamedTuple):
@@ -66,6 +69,22 @@ def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
         else:
             drawn.append(entry)
     return Inputs(tuple(drawn), tuple(unused))
+
+
+def reachable(spacecraft: Spacecraft) -> Inputs:
+    """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
+
+    What each pulse draws stands there once.
+    """
+    pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
+    if spacecraft.torquer is not None:
+        pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
+    drawn, unused = list_inputs(spacecraft, Schedule(tuple(pulses)))
+    once = (entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1"))
+    return Inputs(
+        tuple(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once),
+        tuple(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in unused),
+    )
 
 
 def _no_size(entry: Input) -> str:
@@ -126,7 +145,7 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
 
 def _idle(name: str) -> str:
     who = "the steerable torquer" if name == STEERABLE else name
-    return f"the schedule does not fire {who}"
+    return f"{SCHEDULE_IDLE} {who}"
 
 
 def _thrust(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.dispersion.inputs import Input
+from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Array, cases_to_show
 from nutdamp.dispersion.study import EARLY, Results, Study
@@ -41,7 +41,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Renderabl
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
     if unused:
-        parts += [Text(), Text("Unused dispersions", style="bold"), _unused(results)]
+        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(unused)]
     return Group(*parts)
 
 
@@ -122,7 +122,7 @@ def _budget(results: Results) -> list[RenderableType]:
     listed = [int(row) for row in order]
     named = listed if len(listed) <= MOST_ROWS + 1 else listed[:MOST_ROWS]
     for row in named:
-        table.add_row(Text(inputs[row].name, style="dim"), _size(inputs[row]), *cells([row]))
+        table.add_row(Text(inputs[row].name, style="dim"), size_text(inputs[row]), *cells([row]))
     rest = listed[len(named) :]
     if rest:
         table.add_row(Text(f"{len(rest)} others", style="dim"), "", *cells(rest))
@@ -162,7 +162,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if share >= 5e-4 else "0"
 
 
-def _size(entry: Input) -> str:
+def size_text(entry: Input) -> str:
     """One sigma, or the bias, as the file might have it."""
     if entry.unit == "":
         return f"{100 * (entry.sigma or entry.size):.3g} %"
@@ -194,11 +194,11 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
 
 
-def _unused(results: Results) -> Table:
+def unused_table(unused: Iterable[Unused]) -> Table:
     """Names that share a reason stand together."""
     table = facts()
     reasons: dict[str, list[str]] = {}
-    for name, reason in results.study.model.inputs.unused:
+    for name, reason in unused:
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
         table.add_row(", ".join(names), reason)
