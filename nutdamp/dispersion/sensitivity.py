@@ -25,8 +25,11 @@ Array = NDArray[np.float64]
 STEP = 1e-30
 """Imaginary step, as a share of an input's size: nothing is subtracted, so nothing is lost however small it is."""
 
-CLASSES = 20
-"""Intervals of an input over which the cases are averaged."""
+CLASSES = 128
+"""Intervals of an input over which the cases are averaged, at most."""
+
+CLASS_SIZE = 32
+"""Cases in each of them, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +95,13 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
     """First-order Sobol index of each input, by output, from n cases.
 
     ``draws`` (n,) by input; ``outcome`` (10, n) as `outputs.vectors` gives it. What the averaging over few cases adds
-    by chance, (CLASSES - 1)/n of the variance, is taken off; nothing is below zero.
+    by chance, (classes - 1)/n of the variance, is taken off; nothing is below zero.
     """
     count = outcome.shape[1]
     centred = outcome - outcome.mean(axis=1, keepdims=True)
     variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
     found: dict[str, dict[str, float]] = {}
-    classes = min(CLASSES, count)
+    classes = min(CLASSES, max(count // CLASS_SIZE, 1))
     ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
     for name, draw in draws.items():
         edges = np.partition(draw, ranks)[ranks] if len(ranks) else draw[:0]

@@ -106,6 +106,7 @@ class Sketch:
         below = np.cumsum(self.counts)
         ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
         values = _middles()[np.searchsorted(below, ranks, side="right")]
+        values = np.where(ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values))
         return np.asarray(np.clip(values, self.minimum, self.maximum))
 
     def histogram(self, edges: Array) -> Array:

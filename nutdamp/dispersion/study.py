@@ -53,6 +53,9 @@ PROBABILITY = 0.997
 CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
 
+LONG_PULSE = 0.5
+"""rad that the body turns within a pulse, beyond which H moves noticeably otherwise than by an impulse (1 %)."""
+
 Collect = Callable[[int, Array], None]
 """Takes the number (from 0) of the first of some cases, and their outputs (5, n), in order."""
 
@@ -97,9 +100,17 @@ class Study:
             *["dissipation"] * (body.dissipation is not None),
             *["I1 ≠ I2 (their mean is flown)"] * (not body.inertia.symmetric),
         ]
-        if self.flown or not left:
+        if self.flown:
             return ()
-        return (f"the impulse sum (17) knows nothing of {' and '.join(left)}; --flown does",)
+        notes = [f"the impulse sum (17) knows nothing of {' and '.join(left)}; --flown does"] if left else []
+        longest = max((pulse.on_time for pulse in self.model.schedule), default=0.0)
+        turned = abs(body.spin) * longest
+        if turned > LONG_PULSE:
+            notes.append(
+                f"the body turns by up to {math.degrees(turned):.0f}° during a pulse: the impulse sum (17) has the "
+                f"nutation right, but the shift of H only roughly; --flown has both"
+            )
+        return tuple(notes)
 
     def source(self) -> Source:
         """Draws for one thread."""
@@ -229,12 +240,11 @@ class Results:
         """The same, with room for ``asked`` cases; raises BadRequest where that is fewer than are done."""
         if asked < self.done:
             raise BadRequest(f"{self.done} cases are done already: ask for as many, or leave out what is resumed")
-        more = Results(self.study, asked, self.done, self.redrawn, self.met, self.worst, early=self.early)
-        if more.values is not None:
-            assert self.values is not None
+        more = Results(
+            self.study, asked, self.done, self.redrawn, self.met, self.worst, sketches=self.sketches, early=self.early
+        )
+        if self.values is not None and more.values is not None:
             more.values[:, : self.done] = self.values[:, : self.done]
-        elif self.sketches is not None:
-            more.sketches = self.sketches
         elif self.values is not None and more.sketches is not None:
             for sketch, row in zip(more.sketches, self.values, strict=True):
                 sketch.add(row[: self.done])

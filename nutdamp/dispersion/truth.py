@@ -188,7 +188,7 @@ class Model:
         for number, one in enumerate(self._actuations, start=1):
             shift = plus(offset, draws.get(f"timing pulse {number}", 0.0))
             start = one.pulse.start
-            starts.append(start if _nothing(shift) else np.maximum(start + shift, 0.0))
+            starts.append(start if _nothing(shift) else _not_before(start + shift))
             factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
             torque, mean, flow = torques[one.source]
             if one.source == STEERABLE and not self._members[STEERABLE]:
@@ -274,6 +274,13 @@ class Model:
             return x, y, z
         cosine, sine = cos_sin(angle)
         return x * cosine - y * sine, x * sine + y * cosine, z
+
+
+def _not_before(start: Cases) -> Cases:
+    """A pulse shifted before t = 0 fires at 0; there its derivative is the mean of both sides, one half."""
+    if not np.iscomplexobj(start):
+        return np.maximum(start, 0.0)
+    return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
 
 
 def tilt_axes(force: Vector) -> tuple[Vector, Vector]:

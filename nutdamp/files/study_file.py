@@ -47,7 +47,7 @@ def load_results(path: str, study: Study, asked: int) -> Results:
     if not Path(path).exists():
         return Results(study, asked)
     try:
-        with np.load(path, allow_pickle=False) as kept:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in kept.files}
         if str(arrays["fingerprint"]) != study.fingerprint or str(arrays["made_by"]) != f"nutdamp {__version__}":
             raise BadRequest(f"cannot resume from {path}: {ANOTHER}")

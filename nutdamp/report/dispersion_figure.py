@@ -48,40 +48,44 @@ def dispersion_picture(results: Results, path: str, *, scheme: str) -> bytes:
         if found is None:
             continue
         limit_deg = None if limit is None else math.degrees(limit)
-        _histogram(row[0], found, name, limit_deg)
-        _function(row[1], found, name, limit_deg, results.probability)
+        _histogram(row[0], found, name)
+        _function(row[1], found, name, results)
+        for axes in row:
+            _mark(axes, found, limit_deg, results.probability)
     figure.suptitle(f"{results.study.model.spacecraft.name}: {scheme}, {results.done:,} dispersed truths")
     stream = io.BytesIO()
     figure.savefig(stream, format=ending, dpi=150, metadata=_metadata(ending))
     return stream.getvalue()
 
 
-def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) -> None:
+def _histogram(axes: Axes, found: Distribution, name: str) -> None:
     """Up to what 999 of 1000 cases stay below; the rest would only stretch the axis."""
-    end = float(found.quantiles(np.array([0.999]))[0]) or 1e-12
-    edges = np.linspace(found.minimum, max(end, found.minimum * (1 + 1e-9) + 1e-15), BINS + 1)
+    end = float(found.quantiles(np.array([0.999]))[0])
+    edges = np.linspace(found.minimum, max(end, found.minimum * (1.0 + 1e-9) + 1e-12), BINS + 1)
     counts = found.histogram(edges)
     share = 100.0 * counts / max(counts.sum(), 1.0)
     axes.stairs(share, np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
     axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %", title=f"{name}: histogram")
-    _mark(axes, found, limit)
-    axes.legend(loc="best", fontsize=9)
 
 
-def _function(axes: Axes, found: Distribution, name: str, limit: float | None, probability: float) -> None:
-    """How many cases stay below: on a scale that shows the last per mille as well as the first half."""
-    tail = np.logspace(0.0, -4.0, 400)
+def _function(axes: Axes, found: Distribution, name: str, results: Results) -> None:
+    """How many cases lie beyond: on a scale that shows the last per mille as well as the first half."""
+    tail = np.logspace(0.0, -math.log10(max(results.done, 10)), 400)
     axes.plot(np.degrees(found.quantiles(1.0 - tail)), 100.0 * tail, color=MOTION, linewidth=1.6, label="cases")
-    axes.axhline(100.0 * (1.0 - probability), color=GREY, linewidth=0.8, linestyle=":")
+    allowed = 100.0 * (1.0 - results.probability)
+    axes.axhline(allowed, color=GREY, linewidth=1.0, linestyle=":", label=f"{allowed:.3g} % allowed")
     axes.set_yscale("log")
-    axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %", title=f"{name}: distribution function (1 - CDF)")
-    _mark(axes, found, limit)
-    axes.legend(loc="best", fontsize=9)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %", title=f"{name}: distribution (1 - CDF)")
     axes.grid(linewidth=0.4, color="#cccccc")
 
 
-def _mark(axes: Axes, found: Distribution, limit: float | None) -> None:
-    worst = math.degrees(float(found.quantiles(np.array([0.997]))[0]))
-    axes.axvline(worst, color=GREY, linewidth=1.0, linestyle="--", label=f"99.7 %: {worst:.3g}°")
+def _mark(axes: Axes, found: Distribution, limit: float | None, probability: float) -> None:
+    """Where as many cases lie as shall meet the requirement, and the requirement."""
+    reached = math.degrees(float(found.quantiles(np.array([probability]))[0]))
+    axes.axvline(
+        reached, color=GREY, linewidth=1.0, linestyle="--", label=f"{100 * probability:.6g} % within {reached:.3g}°"
+    )
     if limit is not None:
         axes.axvline(limit, color=PULSE, linewidth=1.6, label=f"required: {limit:.3g}°")
+    axes.legend(loc="best", fontsize=9)

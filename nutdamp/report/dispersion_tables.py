@@ -18,13 +18,15 @@ from nutdamp.report.layout import columns, facts
 from nutdamp.report.text import MISSING, degrees, quantity
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, rad/s", "propellant, g")
-SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1.0, 1e3)
+NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin gain, mrad/s", "propellant, g")
+SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
 SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "m": ("mm", 1e3), "s": ("ms", 1e3)}
 """Units that people read for those of inputs, and the factor."""
 
 MOST_ROWS = 12
 """Inputs that the budget names; the rest is summed up."""
+
+TINY = 1e-300
 
 BUDGETED = (("nutation", "nutation"), ("momentum_shift", "shift of H"))
 
@@ -61,12 +63,18 @@ def _percentiles(results: Results) -> Table:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
         values = [float(plan), *found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
-        # What is below a trillionth of the largest is rounding.
-        least = 1e-12 * max(abs(found.minimum), abs(found.maximum))
-        table.add_row(
-            Text(name, style="dim"), *("0" if abs(value) <= least else f"{scale * value:.4g}" for value in values)
-        )
+        largest = scale * max(abs(found.minimum), abs(found.maximum))
+        table.add_row(Text(name, style="dim"), *(_beside(scale * value, largest) for value in values))
+    for column in table.columns:
+        column.no_wrap = True
     return table
+
+
+def _beside(value: float, largest: float) -> str:
+    """A number with the decimals that show four digits of the ``largest`` beside it."""
+    if largest == 0.0 or not 1e-5 <= largest < 1e6:
+        return f"{value:.2e}" if value else "0"
+    return f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
 
 
 def _requirement(results: Results) -> list[RenderableType]:
@@ -96,8 +104,7 @@ def _budget(results: Results) -> list[RenderableType]:
     first, sampled = study.first_order, results.shares
     shares = {output: first.shares(output) for output, _ in BUDGETED}
     effects = np.degrees(first.effects("nutation")), np.degrees(first.effects("momentum_shift"))
-    weight = np.max([shares[output] for output, _ in BUDGETED], axis=0)
-    weight = np.where([entry.kind == "bias" for entry in inputs], 2.0, weight)
+    weight = np.max([first.effects(output) / max(first.sigma(output), TINY) for output, _ in BUDGETED], axis=0)
     order = np.argsort(-weight, kind="stable")
     heads = ("nutation\ndeg", "linear\n%", "cases\n%", "H shift\ndeg", "linear\n%", "cases\n%")
     table = columns("input\n", "one sigma\nor bias", *heads)
@@ -108,10 +115,8 @@ def _budget(results: Results) -> list[RenderableType]:
             spread = math.sqrt(float((effect[list(rows)] ** 2).sum()))
             seen = math.fsum(sampled.get(inputs[row].name, {}).get(output, 0.0) for row in rows)
             varies = any(inputs[row].sigma for row in rows)
-            texts += [
-                f"{spread:.3g}",
-                *((_percent(float(shares[output][list(rows)].sum())), _percent(seen)) if varies else ("bias", MISSING)),
-            ]
+            both = (_share(float(shares[output][list(rows)].sum())), _share(seen)) if varies else ("bias", "")
+            texts += [f"{spread:.3g}", *both]
         return texts
 
     listed = [int(row) for row in order]
@@ -211,9 +216,10 @@ def case_screen(study: Study, case: int, draws: dict[str, float], flown: Array, 
         estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
         inputs.add_row(Text(entry.name, style="dim"), estimate, truth, off, sigmas)
     outcome = columns("", "nominal", "by impulses (17)", "flown, real widths")
-    summed = study.outputs_of(draws)
-    for name, scale, *values in zip(NAMES, SCALES, study.outputs_of({}), summed, flown, strict=True):
-        cells = (MISSING if math.isnan(value) else f"{scale * value:.4g}" for value in values)
+    closed = Study(study.model, study.seed)
+    for name, scale, *values in zip(NAMES, SCALES, closed.outputs_of({}), closed.outputs_of(draws), flown, strict=True):
+        largest = scale * float(np.max(np.abs(values)))
+        cells = (MISSING if math.isnan(value) else _beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     return Group(title, Text(), inputs, Text(), outcome)
