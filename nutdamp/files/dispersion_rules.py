@@ -42,6 +42,8 @@ def dispersion_findings(root: Node) -> Iterator[Finding]:
     """Everything wrong between the keys of the dispersions and with what else the file says."""
     facts = Facts(root)
     yield from _probability(facts)
+    if not facts.has("dispersions"):
+        return
     yield from _thruster_names(facts)
     for entry in _entries(facts):
         yield from _kinds(facts, entry)
