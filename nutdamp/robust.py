@@ -7,9 +7,10 @@ All of them fly the same draws, so that what is compared is the plans and not th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -107,40 +108,46 @@ class RobustComparison:
         return self.chosen.met >= self.probability
 
 
-def variants(comparison: Comparison, options: Options | None = None) -> list[tuple[str, Plan]]:
-    """Feasible plans, with what sets each apart from the one that its scheme makes; no schedule comes twice."""
-    body = comparison.spacecraft
-    found: dict[object, tuple[str, Plan]] = {}
+Attempt = Callable[[], Iterable[tuple[str, Plan]]]
+"""Makes plans when it is called, each with what sets it apart from the one that its scheme makes."""
+
+
+def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
+    """What `compare` is to try: the plans compared, and variants of each."""
+    body, options = comparison.spacecraft, options or Options()
+    found: list[Attempt] = []
     for base in comparison.plans:
-        for variant, plan in (("as planned", base), *_others(body, base, options or Options())):
-            # Planned for other limits or channels, but always flown by this spacecraft.
-            if plan.feasible and not planning.broken_limits(body, plan.pulses):
-                found.setdefault(
-                    _kind(plan), (variant, plan if plan.spacecraft is body else replace(plan, spacecraft=body))
-                )
-    return list(found.values())
+        found.append(partial(list, [("as planned", base)]))
+        found.append(partial(_alignments, body, base.scheme, options))
+        found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
+    return found
 
 
 def compare(
-    comparison: Comparison, plans: Sequence[tuple[str, Plan]], watch: Callable[[int], None] = lambda _: None
+    comparison: Comparison, trials: Sequence[Attempt], watch: Callable[[int], None] = lambda _: None
 ) -> RobustComparison:
-    """Let dispersed truths fly each of the ``plans``, as `variants` gives them, and recommend one.
+    """Make the plans of the ``trials``, let dispersed truths fly each, and recommend one; no schedule comes twice.
 
-    ``watch`` is told how many are done. Raises BadRequest for a spacecraft without dispersions.
+    ``watch`` is told how many trials are done. Raises BadRequest for a spacecraft without dispersions.
     """
-    spacecraft = comparison.spacecraft
-    asked = spacecraft.requirement
+    body = comparison.spacecraft
+    asked = body.requirement
     probability = PROBABILITY if asked is None or asked.probability is None else asked.probability
-    flown = bool(study_of(spacecraft, Schedule()).remarks)
+    flown = bool(study_of(body, Schedule()).remarks)
     samples = SAMPLES_FLOWN if flown else SAMPLES
-    candidates: list[Candidate] = []
-    for number, (variant, plan) in enumerate(plans):
+    found: dict[object, Candidate] = {}
+    for number, trial in enumerate(trials):
         watch(number)
-        with suppress(Infeasible):  # truths that cannot be flown, such as those that take too long
-            candidates.append(_dispersed(plan, variant, probability, samples, flown=flown))
-    candidates.sort(key=lambda one: (-_tier(one, probability), one.nutation, one.plan.pulses.end))
-    nominal = comparison.recommended
-    usual = next((one for one in candidates if nominal is not None and _kind(one.plan) == _kind(nominal)), None)
+        for variant, plan in trial():
+            kind = _kind(plan)
+            # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
+            if not plan.feasible or kind in found or planning.broken_limits(body, plan.pulses):
+                continue
+            own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
+            with suppress(Infeasible):  # truths that cannot be flown, such as those that take too long
+                found[kind] = _dispersed(own, variant, probability, samples, flown=flown)
+    candidates = sorted(found.values(), key=lambda one: (-_tier(one, probability), one.nutation, one.plan.pulses.end))
+    usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
     chosen, reason = _choose(candidates, probability)
     return RobustComparison(comparison, tuple(candidates), usual, chosen, reason, probability, samples, SEED, flown)
 
@@ -153,20 +160,27 @@ def _kind(plan: Plan) -> object:
     )
 
 
-def _others(body: Spacecraft, base: Plan, options: Options) -> Iterator[tuple[str, Plan]]:
-    """Variants of a scheme's plan."""
-    for plan in planning.alternatives(body, base.scheme, options):
+def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tuple[str, Plan]]:
+    """The plans by other alignments that a scheme weighs, named by their channels."""
+    for plan in planning.alternatives(body, scheme, options):
         yield " then ".join(dict.fromkeys(pulse.channel for pulse in plan.pulses)), plan
+
+
+def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
+    """Spacecraft for which the scheme plans in another way: later, or without one of the channels that it fires."""
     period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
     for periods in LATER:
         earliest = body.limits.earliest + periods * period
         if earliest < body.horizon:
-            limits = replace(body.limits, earliest=earliest)
-            yield f"from {earliest:.4g} s on", planning.plan(replace(body, limits=limits), base.scheme, options)
+            yield f"from {earliest:.4g} s on", replace(body, limits=replace(body.limits, earliest=earliest))
     for name in dict.fromkeys(pulse.channel for pulse in base.pulses):
         left = tuple(channel for channel in body.channels if channel.name != name)
         if left and len(left) < len(body.channels):
-            yield f"without {name}", planning.plan(replace(body, channels=left), base.scheme, options)
+            yield f"without {name}", replace(body, channels=left)
+
+
+def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:
+    return [(variant, planning.plan(body, scheme, options))]
 
 
 def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, flown: bool) -> Candidate:

@@ -109,6 +109,6 @@ def _disperse(compared: Comparison, options: Options, quiet: bool) -> RobustComp
     from nutdamp import robust
     from nutdamp.cli.progress import progress
 
-    plans = robust.variants(compared, options)
-    with progress("dispersing", len(plans), quiet=quiet) as told:
-        return robust.compare(compared, plans, told)
+    trials = robust.attempts(compared, options)
+    with progress("dispersing", len(trials), quiet=quiet) as told:
+        return robust.compare(compared, trials, told)
