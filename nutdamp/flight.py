@@ -220,7 +220,7 @@ class Setting:
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
-def _setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
+def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
     """``true``: the principal moments as they are and |H| kept by dissipation; else the linear, symmetric body."""
     inertia, disturbances = spacecraft.inertia, spacecraft.disturbances
     symmetric = (inertia.A, inertia.A, inertia.C)
@@ -244,7 +244,7 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     symmetric one. Disturbances and dissipation (by its linear law) act between the pulses. The last leg reaches at
     least to ``until`` s.
     """
-    setting, state = _setting(spacecraft, true=False), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=False), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
     for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
@@ -284,7 +284,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     Coasts of symmetric bodies left alone are exact arcs, everything else Taylor series at rounding accuracy. The last
     leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
     """
-    setting, state = _setting(spacecraft, true=True), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=True), spacecraft.initial
     pulses, over = schedule.pulses, schedule.end
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nutdamp import flight as flights
+from nutdamp.report.figures.dispersion import dispersion_figure
 from nutdamp.report.figures.export import ending, rendered, svg
 from nutdamp.report.figures.history import history_figure, timeline_figure
 from nutdamp.report.figures.motion import motion_figure
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from nutdamp.track import Track
 
 __all__ = [
+    "dispersion_figure",
     "ending",
     "history_figure",
     "motion_figure",

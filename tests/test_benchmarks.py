@@ -1,0 +1,50 @@
+"""The benchmarks stay runnable: files are sound, peers do the same work, the table says what was missed."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nutdamp.dispersion.inputs import list_inputs
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.planning import plan
+
+FOLDER = Path(__file__).parent / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def run_py() -> dict[str, Any]:
+    return runpy.run_path(str(FOLDER / "run.py"))
+
+
+def test_the_dispersed_plan_has_eleven_inputs(run_py: dict[str, Any]) -> None:
+    body = read_spacecraft(run_py["DISPERSED"], "dispersed.yaml")
+    inputs = list_inputs(body, plan(body, "two-pulse").pulses)
+    assert len(inputs.drawn) == 11
+    assert inputs.unused == ()
+
+
+@pytest.mark.parametrize(("channels", "periods"), [(4, 40.0), (16, 100.0)])
+def test_the_files_for_the_scheme_optimal(run_py: dict[str, Any], channels: int, periods: float) -> None:
+    body = read_spacecraft(run_py["fan"](channels, periods), "fan.yaml")
+    assert len(body.channels) == channels
+    assert body.horizon / body.body_period == pytest.approx(periods)
+
+
+def test_peers_fly_the_same_cases(run_py: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "dispersed.yaml").write_text(run_py["DISPERSED"], encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    works = runpy.run_path(str(FOLDER / "inside.py"))["works"]()  # compares solve_ivp with the flight on the way
+    assert works["one flight"]() == works["solve_ivp"]() > 10
+
+
+def test_a_missed_limit_is_marked(run_py: dict[str, Any]) -> None:
+    row, line = run_py["Row"], run_py["line"]
+    assert "MISSED" not in line(row("name", 0.1, 1.4, "import numpy", 1.5, memory=200.0, memory_limit=250.0))
+    assert "MISSED" in line(row("name", 0.1, 1.6, "import numpy", 1.5))
+    assert "MISSED" in line(row("name", 0.1, 1.4, "import numpy", 1.5, memory=260.0, memory_limit=250.0))
+    assert "MISSED" in line(row("name", 1e-7, 4000.0, "faster than solve_ivp", 5000.0, at_least=True))
+    assert "MISSED" not in line(row("name", 1e-7, 6000.0, "faster than solve_ivp", 5000.0, at_least=True))
