@@ -100,6 +100,8 @@ def command(
         raise click.UsageError("name what to disperse: either --scheme or --schedule")
     if case is not None and (csv or plot or resume):
         raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
+    if resume == "-":
+        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
     silent = one_stdout(csv=csv, json=json, plot=plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
