@@ -196,9 +196,12 @@ class Scene:
         self.strip.set(xlabel="time, s", ylabel="deg")
         sphere.name_directions(self.sky)
         style.legend(figure, [self.sky, self.strip], 5)
-        figure.suptitle(" ")
+        self.title = figure.suptitle(self.caption(0.0))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # from now on nothing may move but the motion
+        self.title.set_text("")
+        self.canvas.draw()  # type: ignore[no-untyped-call]
+        self.still = self.canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
     def show(self, number: int) -> None:
         """Frame ``number``, from 0."""
@@ -222,7 +225,7 @@ class Scene:
             for artist in axes.get_children()
             if artist not in before
         ]
-        self.figure.suptitle(f"{self.caption(now)}")
+        self.title.set_text(self.caption(now))
 
     def caption(self, now: float) -> str:
         """What stands above the frame: name, time, and what fires or just did."""
@@ -238,6 +241,8 @@ class Scene:
         return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
 
     def pixels(self) -> NDArray[np.uint8]:
-        """The frame as it stands, (height, width, 3)."""
-        self.canvas.draw()  # type: ignore[no-untyped-call]
-        return np.asarray(self.canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+        """The frame as it stands, (height, width, 3): what changes is drawn over what stands still."""
+        self.canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
+        for artist in sorted([*self._changing, self.title], key=lambda one: one.get_zorder()):
+            artist.draw(self.canvas.get_renderer())  # type: ignore[no-untyped-call]
+        return np.array(self.canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
