@@ -61,6 +61,14 @@ class Inertia:
         return abs(first - second) <= SYMMETRY_TOLERANCE * max(first, second)
 
     @property
+    def tensor(self) -> Vector:
+        """Inertia tensor in the axes of the file, (3, 3) kg m²."""
+        if self.aligned:
+            return np.diag(self.moments)
+        tensor = self.axes @ np.diag(self.moments) @ self.axes.T
+        return np.asarray(0.5 * (tensor + tensor.T))
+
+    @property
     def aligned(self) -> bool:
         """Whether the principal axes are the axes of the file."""
         return bool(np.array_equal(self.axes, np.eye(3)))
@@ -225,7 +233,7 @@ class Spacecraft:
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None.
+    which energy dissipation lets the nutation grow or decay, or None; ``object_id`` names it in messages.
     """
 
     name: str
@@ -239,6 +247,7 @@ class Spacecraft:
     limits: Limits = field(default_factory=Limits)
     disturbances: tuple[Disturbance, ...] = ()
     dissipation: float | None = None
+    object_id: str | None = None
 
     @property
     def growth(self) -> float:

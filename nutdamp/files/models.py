@@ -290,6 +290,9 @@ class SpacecraftFile(Section):
     )
 
     name: Name = Field(description="Name of the spacecraft.")
+    object_id: Name | None = Field(
+        default=None, description="International designator, such as 1998-001A, for messages to flight dynamics."
+    )
     mass: Mass | None = Field(default=None, description="Mass, kg; without it no velocity change is worked out.")
     inertia: InertiaSection = Field(description="Moments of inertia: A and C, or tensor, kg m².")
     omega0: Rates | None = Field(default=None, description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.")

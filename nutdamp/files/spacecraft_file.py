@@ -70,6 +70,7 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
         limits=_limits(contents.limits),
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
+        object_id=contents.object_id,
     )
 
 
