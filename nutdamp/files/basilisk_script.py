@@ -54,7 +54,7 @@ def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
         ]
         if end > now:
             for duration, torque in stretches(body, pulses, now, end, longest):
-                yield f"({' + '.join(firing) or 'coast'!r}, {duration!r}, {_vector(axes @ torque)})"
+                yield f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, {_vector(axes @ torque)})"
 
 
 def _vector(vector: Iterable[float] | Vector) -> str:

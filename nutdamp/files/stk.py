@@ -7,7 +7,7 @@ import datetime
 import numpy as np
 
 from nutdamp import __version__
-from nutdamp.files.frames import NANOSECOND, Reference, stretches
+from nutdamp.files.frames import NANOSECONDS, Reference, stretches
 from nutdamp.flight import Flight
 
 AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
@@ -27,7 +27,7 @@ def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
             if last is not None and t <= last[0]:
                 if np.allclose(rate, last[1], rtol=0.0, atol=1e-9 * np.linalg.norm(rate)):
                     continue
-                t = last[0] + NANOSECOND
+                t = last[0] + 1.0 / NANOSECONDS
             rows.append(" ".join([f"{t:.9f}", *(f"{part:.16e}" for part in (*vector, scalar, *rate))]))
             last = t, rate
     lines = [
