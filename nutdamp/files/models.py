@@ -290,9 +290,6 @@ class SpacecraftFile(Section):
     )
 
     name: Name = Field(description="Name of the spacecraft.")
-    object_id: Name | None = Field(
-        default=None, description="International designator, such as 1998-001A, for messages to flight dynamics."
-    )
     mass: Mass | None = Field(default=None, description="Mass, kg; without it no velocity change is worked out.")
     inertia: InertiaSection = Field(description="Moments of inertia: A and C, or tensor, kg m².")
     omega0: Rates | None = Field(default=None, description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.")
@@ -300,6 +297,9 @@ class SpacecraftFile(Section):
         default=None, description="Motion at t = 0 by spin and nutation; or instead omega0."
     )
     attitude: AttitudeSection | None = Field(default=None, description="Attitude at t = 0.")
+    object_id: Name | None = Field(
+        default=None, description="International designator, such as 1998-001A, for messages to flight dynamics."
+    )
     thrusters: list[ThrusterSection] = Field(default=[], description="Body-fixed thrusters.")
     channels: Annotated[dict[str, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)] | None = Field(
         default=None,

@@ -19,7 +19,7 @@ from nutdamp.files.pulses_csv import pulses_csv, read_pulses
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.planning import Plan
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Limits, Spacecraft
 
 CASES = pytest.mark.parametrize("case", messages.CASES)
@@ -118,6 +118,15 @@ def test_overlapping_manoeuvres_keep_apart_by_their_channels(tmp_path: Path) -> 
     _, found, schedule = imported(read_apm(str(tmp_path / "a.apm")), "a.apm")
     assert [one.channel for one in schedule] == ["steerable", "MAN2", "steerable"]
     assert flight.flown(found, schedule).settled.spin == pytest.approx(math.pi)
+
+
+def test_manoeuvres_stand_in_the_order_of_their_starts(tmp_path: Path) -> None:
+    """A long pulse that begins first may have its centre after a short one."""
+    torque = np.array([1.0, 0.0, 0.0])
+    pulses = Schedule((Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.2 * torque, torque)))
+    assert [one.channel for one in pulses] == ["short", "long"]
+    _, _, schedule = there_and_back(Plan(messages.spacecraft("prolate"), "by hand", pulses), tmp_path)
+    assert sorted(one.start for one in schedule) == pytest.approx([1.0, 1.4])
 
 
 def test_names_are_quoted_and_epochs_written_plainly(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     blocks.append(_block("INERTIA", _inertia(body)))
     blocks += [
         _block("MAN", _manoeuvre(pulse, number, body, reference), f"pulse {number}: {pulse.channel}")
-        for number, pulse in enumerate(plan.pulses, start=1)
+        for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
     ]
     about = block("", APM_METADATA, {**identity(body), "TIME_SYSTEM": "UTC"})
     return Message("APM", header(plan, created), (Segment(about, tuple(blocks)),))
@@ -155,7 +155,7 @@ def _inertia(body: Spacecraft) -> Values:
 
 
 def _manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
-    if pulse.torque is None:
+    if pulse.torque is None or pulse.on_time == 0.0:
         cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
         raise BadRequest(f"pulse {number} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
     torque = (body.inertia.axes @ pulse.torque).tolist()
