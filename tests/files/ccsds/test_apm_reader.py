@@ -9,8 +9,11 @@ from pathlib import Path
 import messages
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from nutdamp.errors import CannotRead, FaultyFile
+from nutdamp.files.apm_import import imported
 from nutdamp.files.ccsds.apm_reader import ApmContents, euler, read_apm
 from nutdamp.files.exchange import export_text
 from nutdamp.physics import attitude
@@ -381,3 +384,32 @@ def test_files_that_cannot_be_read(folder: Path) -> None:
     (folder / "a.apm").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FaultyFile, match="not UTF-8"):
         read_apm("a.apm")
+
+
+@pytest.mark.parametrize("xml", [False, True], ids=["kvn", "xml"])
+@given(data=st.data())
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_stands_in_the_file_is_read_or_told(folder: Path, xml: bool, data: st.DataObject) -> None:
+    """Lines dropped, doubled, swapped and changed: contents, or faults with lines; never anything else."""
+    text = export_text(messages.planned("prolate"), "apm", xml=True) if xml else GOOD
+    lines = text.splitlines()
+    for _ in range(data.draw(st.integers(1, 4))):
+        place, other = (data.draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        match data.draw(st.integers(0, 3)):
+            case 0 if len(lines) > 1:
+                del lines[place]
+            case 1:
+                lines.insert(place, lines[other])
+            case 2:
+                lines[place], lines[other % len(lines)] = lines[other % len(lines)], lines[place]
+            case _:
+                cut = data.draw(st.integers(0, len(lines[place % len(lines)])))
+                lines[place % len(lines)] = lines[place % len(lines)][:cut] + data.draw(st.text(max_size=3))
+    (folder / "a.apm").write_text("\n".join(lines), encoding="utf-8")
+    told: list[int] = [1]
+    try:
+        imported(read_apm("a.apm"), "a.apm")
+    except FaultyFile as wrong:
+        told = [fault.line for fault in wrong.faults]
+    assert told
+    assert min(told) >= 1
