@@ -60,14 +60,13 @@ class Stretch(NamedTuple):
 def reference(spacecraft: Spacecraft) -> Reference:
     """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no format knows."""
     given = spacecraft.attitude
-    values = {"epoch": given and given.epoch, "frame": given and given.frame, "quaternion": given and "given"}
-    missing = [key for key, value in values.items() if value is None]
     if given is None or given.epoch is None or given.frame is None:
-        lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
-        place = "add" if given is None else "add to its section"
+        missing = [key for key in EXAMPLE if given is None or getattr(given, key) is None]
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
+        lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
+        verb = "add" if given is None else "add there"
         raise BadRequest(
-            f"this format needs {names}, which the spacecraft file does not give; {place}\nattitude:\n{lines}"
+            f"this format needs {names}, which the spacecraft file does not give; {verb}\nattitude:\n{lines}"
         )
     if given.frame not in FRAMES:
         raise BadRequest(
