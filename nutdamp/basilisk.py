@@ -67,7 +67,7 @@ def fly(
         raise BadRequest(f"a step of integration is longer than 0 s, not {step} s")
     if spacecraft.growth != 0.0:
         raise Infeasible("Basilisk is flown without energy dissipation, because its hub is rigid, and this body has it")
-    longest = _default_step(spacecraft, schedule, until) if step is None else step
+    longest = default_step(spacecraft, schedule, until) if step is None else step
     hub = _Hub(spacecraft, longest)
     edges = {edge for pulse in schedule for edge in (pulse.start, pulse.end) if 0.0 < edge < until}
     knots = sorted({0.0, until, *np.linspace(0.0, until, samples).tolist(), *edges})
@@ -79,13 +79,13 @@ def fly(
                 hub.kick(pulse.impulse)
         motion.append(hub.motion)
         if end > now:
-            for duration, torque in _stretches(spacecraft, schedule, now, end, longest):
+            for duration, torque in stretches(spacecraft, schedule, now, end, longest):
                 taken = max(taken, hub.coast(duration, torque))
     rates, quaternion = (np.array(column) for column in zip(*motion, strict=True))
     return BasiliskFlight(np.array(knots), rates, quaternion, taken)
 
 
-def _default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> float:
+def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> float:
     """Step in s by the fastest that the body can ever turn.
 
     √(2T) = √(Σ Ij ωj²) is constant without torque, grows by |J|/√Imin at most under an impulse J, and bounds |ω| √Imin.
@@ -101,7 +101,7 @@ def _default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> f
     return angle / pace if pace > 0.0 else 1.0
 
 
-def _stretches(
+def stretches(
     spacecraft: Spacecraft, schedule: Schedule, start: float, end: float, longest: float
 ) -> Iterator[tuple[float, Vector]]:
     """Durations (s) and constant torques (3,) (N m) that make up one stretch between edges of pulses.

@@ -62,6 +62,15 @@ class Inertia:
         return abs(first - second) <= SYMMETRY_TOLERANCE * max(first, second)
 
     @property
+    def tensor(self) -> Vector:
+        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: what an eigensolver keeps of them."""
+        if self.aligned:
+            return np.diag(self.moments)
+        tensor = self.axes @ np.diag(self.moments) @ self.axes.T
+        digits = 13 - math.floor(math.log10(max(self.moments)))
+        return np.asarray(np.round(0.5 * (tensor + tensor.T), digits)) + 0.0
+
+    @property
     def aligned(self) -> bool:
         """Whether the principal axes are the axes of the file."""
         return bool(np.array_equal(self.axes, np.eye(3)))
@@ -246,7 +255,8 @@ class Spacecraft:
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off.
+    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off;
+    ``object_id`` names it in messages.
     """
 
     name: str
@@ -262,6 +272,7 @@ class Spacecraft:
     dissipation: float | None = None
     goal: Goal = field(default_factory=Goal)
     dispersions: Dispersions | None = None
+    object_id: str | None = None
 
     @property
     def growth(self) -> float:

@@ -34,3 +34,11 @@ def run(tmp_path: Path) -> Run:
         )
 
     return call
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What could not be checked on this machine is said aloud, once for each reason."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = {str(report.longrepr[2]) for report in skipped if isinstance(report.longrepr, tuple)}
+    for reason in sorted(reason.removeprefix("Skipped: ") for reason in reasons if "NOT CHECKED" in reason):
+        terminalreporter.write_line(reason, yellow=True)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from importlib import import_module
+from keyword import iskeyword
 
 import click
 
 from nutdamp import __version__
 from nutdamp.cli.boundary import run
 
-COMMANDS = ("plan", "simulate", "trade", "disperse", "animate", "verify", "check", "explain", "init", "schema")
+COMMANDS = (
+    "plan", "simulate", "trade", "disperse", "animate", "verify", "check", "export", "import", "explain", "init", "schema",
+)  # fmt: skip
 
 
 class Commands(click.Group):
@@ -23,7 +26,8 @@ class Commands(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(f"nutdamp.cli.{cmd_name}").command
+        module = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name
+        command: click.Command = import_module(f"nutdamp.cli.{module}").command
         return command
 
 

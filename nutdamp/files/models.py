@@ -241,6 +241,9 @@ class SpacecraftFile(Section):
         default=None, description="Motion at t = 0 by spin and nutation; or instead omega0."
     )
     attitude: AttitudeSection | None = Field(default=None, description="Attitude at t = 0.")
+    object_id: Name | None = Field(
+        default=None, description="International designator, such as 1998-001A, for messages to flight dynamics."
+    )
     thrusters: list[ThrusterSection] = Field(default=[], description="Body-fixed thrusters.")
     channels: Annotated[dict[str, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)] | None = Field(
         default=None,

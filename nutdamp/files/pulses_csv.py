@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from nutdamp.errors import CannotRead, Fault, FaultyFile
+from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.input import read_utf8
 from nutdamp.files.output import csv_text, number
 from nutdamp.flight import Flight
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
@@ -69,13 +70,7 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
     name = str(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as reason:
-        raise CannotRead(name, reason.strerror or str(reason)) from reason
-    except UnicodeDecodeError as reason:
-        raise FaultyFile([Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason
-    reader = csv.reader(io.StringIO(text, newline=""))
+    reader = csv.reader(io.StringIO(read_utf8(name), newline=""))
     try:
         rows = [(reader.line_num, row) for row in reader if row]
     except csv.Error as reason:

@@ -78,6 +78,7 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
+        object_id=contents.object_id,
     )
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from nutdamp.files.frames import file_axes
 from nutdamp.files.output import csv_text, number
-from nutdamp.physics import attitude
 from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track
 
@@ -33,10 +33,7 @@ HEADER = (
 
 def track_csv(track: Track, inertia: Inertia) -> str:
     """One row a sample; body rates and quaternion (body -> inertial, scalar first) in the axes of the file."""
-    rates, quaternion = track.rates, track.quaternion
-    if not inertia.aligned:
-        rates = rates @ inertia.axes.T
-        quaternion = attitude.multiply(quaternion, attitude.from_matrix(inertia.axes.T))
+    rates, quaternion = file_axes(track.rates, track.quaternion, inertia)
     cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
     table = np.column_stack([track.t, rates, quaternion, track.axis, track.momentum, cones])
     rows = ([*map(number, row), str(pulse)] for row, pulse in zip(table.tolist(), track.pulse.tolist(), strict=True))

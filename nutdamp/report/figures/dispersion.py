@@ -35,8 +35,13 @@ def dispersion_figure(results: Results, *, scheme: str) -> Figure:
         limit_deg = None if limit is None else math.degrees(limit)
         _histogram(row[0], found, name)
         _function(row[1], found, name, results)
+        reached = math.degrees(float(found.quantiles(np.array([results.probability]))[0]))
         for axes in row:
-            _mark(axes, found, limit_deg, results.probability)
+            _mark(axes, reached, limit_deg, results.probability)
+        required = "" if limit_deg is None else f", required {limit_deg:.3g}°"
+        row[0].set_title(f"{name}: histogram")
+        row[1].set_title(f"{100 * results.probability:.6g} % within {reached:.3g}°{required}")
+    style.legend(figure, list(grid.flat))
     figure.suptitle(f"{results.study.model.spacecraft.name}: {scheme}, {results.done:,} dispersed truths")
     return figure
 
@@ -48,7 +53,7 @@ def _histogram(axes: Axes, found: Distribution, name: str) -> None:
     counts = found.histogram(edges)
     share = 100.0 * counts / max(counts.sum(), 1.0)
     axes.stairs(share, np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
-    axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %", title=f"{name}: histogram")
+    axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %")
 
 
 def _function(axes: Axes, found: Distribution, name: str, results: Results) -> None:
@@ -56,19 +61,16 @@ def _function(axes: Axes, found: Distribution, name: str, results: Results) -> N
     tail = np.logspace(0.0, -math.log10(max(results.done, 10)), 400)
     axes.plot(np.degrees(found.quantiles(1.0 - tail)), 100.0 * tail, color=MOTION, linewidth=1.6, label="cases")
     allowed = 100.0 * (1.0 - results.probability)
-    axes.axhline(allowed, color=GREY, linewidth=1.0, linestyle=":", label=f"{allowed:.3g} % allowed")
+    axes.axhline(allowed, color=GREY, linewidth=1.0, linestyle=":", label=f"{allowed:.3g} % may lie beyond")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %", title=f"{name}: distribution (1 - CDF)")
+    axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %")
     axes.grid(True)
 
 
-def _mark(axes: Axes, found: Distribution, limit: float | None, probability: float) -> None:
-    """Where as many cases lie as shall meet the requirement, and the requirement."""
-    reached = math.degrees(float(found.quantiles(np.array([probability]))[0]))
-    axes.axvline(
-        reached, color=GREY, linewidth=1.0, linestyle="--", label=f"{100 * probability:.6g} % within {reached:.3g}°"
-    )
+def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -> None:
+    """Where as many cases lie as shall meet the requirement, and the requirement, degrees."""
+    axes.axvline(reached, color=GREY, linewidth=1.0, linestyle="--", label=f"{100 * probability:.6g} % of the cases")
     if limit is not None:
-        axes.axvline(limit, color=PULSE, linewidth=1.6, label=f"required: {limit:.3g}°")
-    axes.legend(loc="best")
+        axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")
+    axes.locator_params(axis="x", nbins=6)

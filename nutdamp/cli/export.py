@@ -1,0 +1,72 @@
+"""``nutdamp export``: a plan in the formats that flight dynamics reads."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from nutdamp.cli.boundary import REQUIREMENT_MISSED
+from nutdamp.cli.common import (
+    Aim,
+    Quantity,
+    load,
+    plan_or_read,
+    quiet_option,
+    remarks,
+    scheme_options,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
+from nutdamp.schemes import NAMES, Options
+
+
+@click.command("export")
+@spacecraft_argument
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    required=True,
+    help="apm: state and pulses (CCSDS); aem: attitude history (CCSDS); stk: the same as .a; basilisk: a script that "
+    "flies the schedule; json: as `plan --json`.",
+)
+@click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
+@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
+@click.option("--schedule", metavar="FILE", help="Export the pulses of a CSV file, as `plan --csv` writes it.")
+@scheme_options
+@click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
+@click.option("-o", "--output", metavar="FILE", default="-", help="Where to write it; default standard output.")
+@quiet_option
+def command(
+    spacecraft: str | None,
+    form: str,
+    xml: bool,
+    scheme: str | None,
+    schedule: str | None,
+    options: Options,
+    aim: Aim,
+    until: float | None,
+    output: str,
+    quiet: bool,
+) -> None:
+    """Write a schedule in a format that other tools read.
+
+    apm, aem and stk need attitude.epoch and attitude.frame in the spacecraft file. Vectors are in the axes of that
+    file.
+    """
+    if scheme is not None and schedule is not None:
+        raise click.UsageError("name what to export: either --scheme or --schedule")
+    if until is not None and until <= 0.0:
+        raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+    remark = remarks(quiet)
+    body = load(spacecraft, remark, aim)
+    plan = plan_or_read(body, scheme, schedule, options, remark)
+    notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
+    write_all([(output, export_text(plan, form, xml=notation, until=until))])
+    if output != "-":
+        remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
+    if plan.meets_requirement is False and scheme != "none":
+        remark(f"{plan.scheme} does not meet the requirement")
+        sys.exit(REQUIREMENT_MISSED)

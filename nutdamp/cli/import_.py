@@ -1,0 +1,39 @@
+"""``nutdamp import``: a spacecraft file from a message of flight dynamics."""
+
+from __future__ import annotations
+
+import click
+
+from nutdamp.cli.common import one_stdout, quiet_option, remarks, write_all
+
+
+@click.command("import")
+@click.argument("form", type=click.Choice(["apm"]), metavar="apm")
+@click.argument("file")
+@click.option("-o", "--output", metavar="FILE", default="-", help="Spacecraft file to write; default standard output.")
+@click.option("--schedule", metavar="FILE", help="Write the manoeuvres as a schedule for `simulate --schedule`.")
+@quiet_option
+def command(form: str, file: str, output: str, schedule: str | None, quiet: bool) -> None:  # noqa: ARG001 - one form
+    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN or XML).
+
+    The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
+    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque.
+    """
+    one_stdout(output=output, schedule=schedule)
+
+    from nutdamp.files.apm_import import imported
+    from nutdamp.files.ccsds.apm_reader import read_apm
+    from nutdamp.files.pulses_csv import pulses_csv
+    from nutdamp.flight import flown
+
+    contents = read_apm(file)
+    text, body, pulses = imported(contents, file)
+    outputs: list[tuple[str, str | bytes]] = [(output, text)]
+    if schedule is not None:
+        outputs.append((schedule, pulses_csv(flown(body, pulses))))
+    write_all(outputs)
+    remark = remarks(quiet)
+    for entry in contents.remarks:
+        remark(f"{file}: {entry}")
+    if pulses.pulses and schedule is None:
+        remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")

@@ -1,0 +1,324 @@
+"""Reads attitude parameter messages, KVN and XML: state, inertia and manoeuvres, with every fault and its line.
+
+Other readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here
+nothing is guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.ccsds.checked import Checked, unit_length
+from nutdamp.files.ccsds.epoch import Epoch
+from nutdamp.files.ccsds.kvn import from_kvn
+from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, VERSION, Block, Keyword
+from nutdamp.files.ccsds.xml import from_xml
+from nutdamp.files.frames import FRAMES
+from nutdamp.files.input import read_utf8
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import Vector
+
+UNIT = 1e-4
+"""Deviation from length one up to which a quaternion counts as rounded."""
+
+AGREES = 1e-4
+"""Difference up to which SPIN says the same as the other blocks: rad, and relative for rates."""
+
+SAME_AXES = {"ICRF": "GCRF"}
+"""Frames whose axes are those of another that a spacecraft file knows."""
+
+_VERSION = "CCSDS_APM_VERS"
+_OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
+_BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
+_NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
+_MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """A torque (3,) N m fixed in the body from ``start`` s after the epoch for ``duration`` s; ``mass`` kg or None."""
+
+    start: float
+    duration: float
+    torque: Vector
+    mass: float | None
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class ApmContents:
+    """What a message says, in body axes.
+
+    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m². ``lines``
+    are those where blocks begin; ``remarks`` what a reader should know.
+    """
+
+    name: str
+    object_id: str | None
+    epoch: Epoch
+    frame: str | None
+    quaternion: Vector | None
+    rates: Vector
+    tensor: Vector
+    manoeuvres: tuple[Manoeuvre, ...]
+    lines: dict[str, int]
+    remarks: tuple[str, ...]
+
+
+def read_apm(path: str) -> ApmContents:
+    """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
+    text = read_utf8(path)
+    blocks, faults = (from_xml if text.lstrip().startswith("<") else from_kvn)(text, path)
+    _refuse_other_versions(path, blocks[0], faults)
+    contents = _Reader(path, blocks, faults).read()
+    if faults or contents is None:
+        raise FaultyFile(faults)
+    return contents
+
+
+def _refuse_other_versions(path: str, outside: Block, faults: list[Fault]) -> None:
+    """Another message, or another version of it, makes no sense by these tables."""
+    first = outside.entries[0] if outside.entries else None
+    if first is None or not re.fullmatch("CCSDS_[A-Z]+_VERS", first.keyword):
+        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an APM: its first line is {_VERSION} = {VERSION}")])
+    if first.keyword != _VERSION:
+        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; {_VERSION} is wanted")])
+    if first.value != VERSION:
+        problem = f"version {first.value!r} is not read, its keywords are others; version {VERSION} is wanted"
+        raise FaultyFile([Fault(path, first.line, 1, _VERSION, problem)])
+
+
+class _Reader:
+    """One message; what is wrong goes to ``faults``."""
+
+    def __init__(self, path: str, blocks: list[Block], faults: list[Fault]) -> None:
+        self.path, self.faults = path, faults
+        self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
+        self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
+        self.remarks: list[str] = []
+        self.body: str | None = None
+        self.frame: str | None = None
+        self._sort(blocks[1:])
+
+    def _sort(self, blocks: list[Block]) -> None:
+        order, last = list(APM_BLOCKS), ""
+        for block in blocks:
+            if block.name not in APM_BLOCKS:
+                known = ", ".join(f"{name}_START" for name in order)
+                self._fault(block.line, f"{block.name}_START", f"unknown block; known are {known}")
+                continue
+            if last and order.index(block.name) < order.index(last):
+                self._fault(block.line, block.name, f"stands after {last}; the order is {', '.join(order)}")
+            elif self.blocks[block.name] and block.name != "MAN":
+                self._fault(block.line, block.name, "a second block of this kind; which one counts is not said")
+            last = block.name
+            self.blocks[block.name].append(Checked(self.path, block, APM_BLOCKS[block.name].keywords, self.faults))
+
+    def _fault(self, line: int, where: str, problem: str) -> None:
+        self.faults.append(Fault(self.path, line, 1, where, problem))
+
+    def _one(self, name: str) -> Checked | None:
+        return self.blocks[name][0] if self.blocks[name] else None
+
+    def read(self) -> ApmContents | None:
+        """The contents; None where faults leave none."""
+        outside = self.outside
+        if outside.text("TIME_SYSTEM") not in (None, "UTC"):
+            outside.fault("TIME_SYSTEM", f"{outside.text('TIME_SYSTEM')!r} stands where UTC is wanted")
+        epoch = outside.epoch("EPOCH")
+        quaternion = self._attitude()
+        rates = self._rates(quaternion)
+        quaternion, rates = self._spin(quaternion, rates)
+        tensor = self._inertia()
+        manoeuvres = self._manoeuvres(epoch)
+        if rates is None and not self.faults:
+            self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
+        if self.faults or epoch is None or rates is None or tensor is None:
+            return None
+        if quaternion is None:
+            self.remarks.append("the message gives no attitude: frame and epoch are left out")
+        object_id = outside.text("OBJECT_ID")
+        return ApmContents(
+            name=outside.text("OBJECT_NAME") or "UNKNOWN",
+            object_id=None if object_id == "UNKNOWN" else object_id,
+            epoch=epoch,
+            frame=self.frame,
+            quaternion=quaternion,
+            rates=rates,
+            tensor=tensor,
+            manoeuvres=manoeuvres,
+            lines={name: blocks[0].block.line for name, blocks in self.blocks.items() if blocks},
+            remarks=tuple(self.remarks),
+        )
+
+    def _endpoints(self, block: Checked, *, reversible: bool = True) -> bool | None:
+        """Whether the block leads from the inertial frame to the body (else the other way); None for other frames."""
+        first, second = block.text("REF_FRAME_A"), block.text("REF_FRAME_B")
+        if first is None or second is None:
+            return None
+        forward = _BODY.fullmatch(second) is not None
+        inertial, body = (first, second) if forward else (second, first)
+        keyword = "REF_FRAME_A" if forward else "REF_FRAME_B"
+        if not _BODY.fullmatch(body):
+            block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
+            return None
+        if inertial not in (*FRAMES, *SAME_AXES):
+            block.fault(keyword, f"{inertial!r} is no inertial frame known here; one of {', '.join(FRAMES)} is wanted")
+            return None
+        if not forward and not reversible:
+            block.fault("REF_FRAME_A", "the body stands first; this block leads from the inertial frame to the body")
+            return None
+        self._body_frame(block, "REF_FRAME_B" if forward else "REF_FRAME_A", body)
+        known = SAME_AXES.get(inertial, inertial)
+        if known != inertial:
+            self._remark(f"{inertial} is taken as {known}, whose axes are the same")
+        if self.frame not in (None, known):
+            block.fault(keyword, f"{inertial!r} stands here, {self.frame!r} in another block; one frame is wanted")
+        self.frame = self.frame or known
+        return forward
+
+    def _body_frame(self, block: Checked, keyword: str, frame: str | None) -> None:
+        """Every block must mean the same body axes."""
+        if frame is None:
+            return
+        if not _BODY.fullmatch(frame):
+            block.fault(keyword, f"{frame!r} is no frame fixed in the body; SC_BODY_1 is wanted")
+        elif self.body not in (None, frame):
+            block.fault(keyword, f"{frame!r} stands here, {self.body!r} in another block; one body frame is wanted")
+        else:
+            self.body = frame
+
+    def _remark(self, text: str) -> None:
+        if text not in self.remarks:
+            self.remarks.append(text)
+
+    def _attitude(self) -> Vector | None:
+        """Quaternion body -> frame of QUAT, or of EULER."""
+        turn: Vector | None = None
+        forward: bool | None = None
+        block = self._one("QUAT")
+        if block is not None:
+            forward, parts = self._endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
+            if parts is not None and not unit_length(parts, UNIT):
+                block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; 1 is wanted")
+            elif parts is not None and forward is not None:
+                turn = np.array(parts) / math.hypot(*parts)
+        elif (block := self._one("EULER")) is not None:
+            forward, parts = self._endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
+            sequence = block.text("EULER_ROT_SEQ") or ""
+            if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
+                block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
+            elif parts is not None and forward is not None:
+                turn = euler(sequence, *map(math.radians, parts))
+        return turn if turn is None or forward else turn * np.array([1.0, -1.0, -1.0, -1.0])
+
+    def _rates(self, quaternion: Vector | None) -> Vector | None:
+        """Rates of the body against the frame, in body axes, rad/s."""
+        block = self._one("ANGVEL")
+        if block is None:
+            return None
+        forward, parts = self._endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+        axes = block.text("ANGVEL_FRAME")
+        if parts is None or axes is None or forward is None:
+            return None
+        # The rate "from A to B" is that of B against A (annex F4).
+        rates = np.radians(parts) if forward else -np.radians(parts)
+        if _BODY.fullmatch(axes):
+            self._body_frame(block, "ANGVEL_FRAME", axes)
+            return rates
+        if SAME_AXES.get(axes, axes) != self.frame:
+            block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
+        elif quaternion is None:
+            block.fault("ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none")
+        else:
+            return np.asarray(attitude.matrix(quaternion).T @ rates)
+        return None
+
+    def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
+        """Fills in what the other blocks do not say; remarks where it says something else."""
+        block = self._one("SPIN")
+        if block is None or self._endpoints(block, reversible=False) is None:
+            return quaternion, rates
+        angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
+        nutating, with_momentum = block.has(_NUTATION), block.has(_MOMENTUM)
+        if nutating and with_momentum:
+            block.fault("MOMENTUM_ALPHA", "stands beside NUTATION; keep one set of the two")
+        if angles is None:
+            return quaternion, rates
+        alpha, delta, angle, about_axis = map(math.radians, angles)
+        turn = euler("ZXZ", alpha + 0.5 * math.pi, 0.5 * math.pi - delta, angle)
+        rate = np.array([0.0, 0.0, about_axis])
+        if nutating and (values := block.numbers(*_NUTATION)) is not None:
+            tilt, phase = math.radians(values[0]), math.radians(values[2])
+            if values[1] <= 0.0:
+                block.fault("NUTATION_PER", f"{values[1]:g} s is no period; more than 0 is wanted")
+                return quaternion, rates
+            side = math.sin(tilt)
+            momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
+            rate += 2.0 * math.pi / values[1] * momentum
+        elif with_momentum and (values := block.numbers(*_MOMENTUM)) is not None:
+            right, up, about_momentum = map(math.radians, values)
+            momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
+            rate += about_momentum * (attitude.matrix(turn).T @ momentum)
+        if quaternion is not None and not _same_turn(quaternion, turn):
+            self._remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
+        if rates is not None and not np.allclose(rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)):
+            self._remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
+        return turn if quaternion is None else quaternion, rate if rates is None else rates
+
+    def _inertia(self) -> Vector | None:
+        block = self._one("INERTIA")
+        if block is None:
+            self._fault(1, "INERTIA", "missing; a spacecraft file needs moments of inertia")
+            return None
+        self._body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
+        parts = block.numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ")
+        if parts is None:
+            return None
+        xx, yy, zz, xy, xz, yz = parts
+        # Beside the diagonal stands minus the product (annex F6); + 0.0 makes 0 of -0.
+        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
+
+    def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
+        found: list[Manoeuvre] = []
+        last: tuple[Epoch, int] | None = None
+        for block in self.blocks["MAN"]:
+            begins, duration = block.epoch("MAN_EPOCH_START"), block.number("MAN_DURATION")
+            torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
+            frame = block.text("MAN_REF_FRAME")
+            self._body_frame(block, "MAN_REF_FRAME", frame)
+            if duration is not None and duration <= 0.0:
+                block.fault("MAN_DURATION", f"{duration:g} s is no duration; more than 0 is wanted")
+            if mass is not None and mass > 0.0:
+                block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; 0 or less is wanted")
+            if torque is not None and not any(torque):
+                block.fault("MAN_TOR_X", "the torque is zero; at least one component other than 0 is wanted")
+            if begins is not None:
+                if epoch is not None and begins < epoch:
+                    block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")
+                if last is not None and begins < last[0]:
+                    block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
+                last = begins, block.block.line
+            if begins is not None and epoch is not None and duration is not None and torque is not None:
+                found.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
+        return tuple(found)
+
+
+def euler(sequence: str, *angles: float) -> Vector:
+    """Quaternion of successive turns by ``angles`` (rad) about the axes of the turned body (annex F3)."""
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    for axis, angle in zip(sequence, angles, strict=True):
+        step = np.zeros(4)
+        step[0], step[1 + "XYZ".index(axis)] = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        turn = attitude.multiply(turn, step)
+    return turn
+
+
+def _same_turn(first: Vector, second: Vector) -> bool:
+    """Whether two quaternions are the same attitude within `AGREES`."""
+    return float(min(np.linalg.norm(first - second), np.linalg.norm(first + second))) <= 0.5 * AGREES

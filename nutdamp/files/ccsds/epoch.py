@@ -1,0 +1,101 @@
+"""Moments of UTC, exact: leap seconds are counted, and nothing is rounded before it is written."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+LEAP_DAYS = tuple(
+    datetime.date(year, *((6, 30) if half == 1 else (12, 31))).toordinal()
+    for year, half in (
+        *((1972, 1), (1972, 2), (1973, 2), (1974, 2), (1975, 2), (1976, 2), (1977, 2), (1978, 2), (1979, 2)),
+        *((1981, 1), (1982, 1), (1983, 1), (1985, 1), (1987, 2), (1989, 2), (1990, 2), (1992, 1), (1993, 1)),
+        *((1994, 1), (1995, 2), (1997, 1), (1998, 2), (2005, 2), (2008, 2), (2012, 1), (2015, 1), (2016, 2)),
+    )
+)
+"""Days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since, and none was taken out."""
+
+FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
+"""UTC has whole leap seconds from here on; before, its seconds were of another length."""
+
+DIGITS = 9
+"""Digits of a second that are written: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond."""
+
+_TIME = re.compile(
+    r"(?P<year>[0-9]{4})-(?:(?P<month>[0-9]{2})-(?P<day>[0-9]{2})|(?P<day_of_year>[0-9]{3}))"
+    r"T(?P<hour>[0-9]{2}):(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}(?:\.[0-9]+)?))?"
+    r"(?:Z|(?P<sign>[+-])(?P<zone_hour>[0-9]{2}):(?P<zone_minute>[0-9]{2}))?"
+)
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Epoch:
+    """A moment by the SI seconds since 1972-01-01T00:00:00 UTC."""
+
+    elapsed: Fraction
+
+    @classmethod
+    def parse(cls, text: str) -> Epoch:
+        """The moment that an ISO 8601 date and time names, with month and day or day of the year; UTC without a zone.
+
+        Raises ValueError, which says what is wrong.
+        """
+        found = _TIME.fullmatch(text)
+        if found is None:
+            raise ValueError(f"{text!r} is no epoch; 2026-03-01T12:00:00.000 is of the form wanted")
+        try:
+            day = _day(found)
+        except ValueError as reason:
+            raise ValueError(f"{text!r} is no epoch: {reason}") from None
+        hour, minute = int(found["hour"]), int(found["minute"])
+        second = Fraction(found["second"] or "0")
+        east = 60 * int(found["zone_hour"] or "0") + int(found["zone_minute"] or "0")
+        minutes = 60 * hour + minute - (-east if found["sign"] == "-" else east)
+        day, minutes = day + minutes // 1440, minutes % 1440
+        within = 61 if minutes == 1439 and day in LEAP_DAYS else 60
+        if hour > 23 or minute > 59 or second >= within:
+            raise ValueError(f"{text!r} is no epoch: a time of day from 00:00:00 to 23:59:59.999… is wanted")
+        if day < FIRST_DAY:
+            raise ValueError(f"{text!r} lies before 1972, when UTC had seconds of another length")
+        return cls(Fraction(86400 * (day - FIRST_DAY) + _leaps_before(day) + 60 * minutes) + second)
+
+    def plus(self, seconds: float | Fraction) -> Epoch:
+        """The moment so many SI seconds later; exact for the number as it is stored."""
+        return Epoch(self.elapsed + Fraction(seconds))
+
+    def since(self, earlier: Epoch) -> float:
+        """SI seconds from another moment to this one."""
+        return float(self.elapsed - earlier.elapsed)
+
+    @property
+    def text(self) -> str:
+        """``2026-03-01T12:00:00.000000000``, rounded to `DIGITS`; within a leap second the seconds are 60."""
+        day, second, part = self._calendar()
+        date = datetime.date.fromordinal(day).isoformat()
+        clock = min(second // 60, 1439)
+        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{DIGITS}d}"
+
+    def _calendar(self) -> tuple[int, int, int]:
+        """Day (ordinal), whole second of the day, and the rest in units of the last digit written."""
+        whole, part = divmod(round(self.elapsed * 10**DIGITS), 10**DIGITS)
+        day = FIRST_DAY + whole // 86400
+        while 86400 * (day - FIRST_DAY) + _leaps_before(day) > whole:  # the days before were longer
+            day -= 1
+        return day, whole - 86400 * (day - FIRST_DAY) - _leaps_before(day), part
+
+
+def _day(found: re.Match[str]) -> int:
+    if found["day_of_year"] is None:
+        return datetime.date(int(found["year"]), int(found["month"]), int(found["day"])).toordinal()
+    first = datetime.date(int(found["year"]), 1, 1)
+    day = first.toordinal() + int(found["day_of_year"]) - 1
+    if not first.toordinal() <= day <= datetime.date(first.year, 12, 31).toordinal():
+        raise ValueError("that year has no such day")
+    return day
+
+
+def _leaps_before(day: int) -> int:
+    """Leap seconds inserted since 1972 before the day begins."""
+    return sum(leap < day for leap in LEAP_DAYS)

@@ -1,0 +1,202 @@
+"""What an attitude data message holds, whatever its notation: blocks of keywords, and the tables that rule them.
+
+The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML).
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import NamedTuple
+
+VERSION = "2.0"
+"""Version of both messages in issue 2 of the standard. Version 1 has other keywords."""
+
+BODY_FRAME = "SC_BODY_1"
+
+LONGEST_LINE = 254
+"""ASCII characters that a line may have."""
+
+SIGNIFICANT = 16
+"""Most digits that a number may have."""
+
+
+class Keyword(NamedTuple):
+    """One row of a table: its unit, whether it must be there, and the XML tag that wraps it besides the block's."""
+
+    name: str
+    unit: str = ""
+    required: bool = True
+    tag: str = ""
+    text: bool = False
+
+
+class Layout(NamedTuple):
+    """A block: its tag in XML and its keywords in their order."""
+
+    tag: str
+    keywords: tuple[Keyword, ...]
+
+
+def _text(*names: str, required: bool = True) -> tuple[Keyword, ...]:
+    return tuple(Keyword(name, required=required, text=True) for name in names)
+
+
+def _numbers(*names: str, unit: str = "", required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
+    return tuple(Keyword(name, unit, required, tag) for name in names)
+
+
+_FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
+_QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
+_ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+
+HEADER = (
+    *_text("CLASSIFICATION", required=False),
+    *_text("CREATION_DATE", "ORIGINATOR"),
+    *_text("MESSAGE_ID", required=False),
+)
+
+APM_METADATA = (
+    *_text("OBJECT_NAME", "OBJECT_ID"),
+    *_text("CENTER_NAME", required=False),
+    *_text("TIME_SYSTEM"),
+)
+
+APM_BLOCKS: dict[str, Layout] = {
+    "QUAT": Layout(
+        "quaternionState",
+        (
+            *_FRAMES,
+            *_QUATERNION,
+            *_numbers("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
+        ),
+    ),
+    "EULER": Layout(
+        "eulerAngleState",
+        (
+            *_FRAMES,
+            *_text("EULER_ROT_SEQ"),
+            *_numbers("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
+            *_numbers("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
+        ),
+    ),
+    "ANGVEL": Layout("angularVelocity", (*_FRAMES, *_text("ANGVEL_FRAME"), *_numbers(*_ANGVEL, unit="deg/s"))),
+    "SPIN": Layout(
+        "spin",
+        (
+            *_FRAMES,
+            *_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"),
+            *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
+            *_numbers("NUTATION", unit="deg", required=False),
+            *_numbers("NUTATION_PER", unit="s", required=False),
+            *_numbers("NUTATION_PHASE", "MOMENTUM_ALPHA", "MOMENTUM_DELTA", unit="deg", required=False),
+            *_numbers("NUTATION_VEL", unit="deg/s", required=False),
+        ),
+    ),
+    "INERTIA": Layout(
+        "inertia",
+        (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")),
+    ),
+    "MAN": Layout(
+        "maneuverParameters",
+        (
+            *_text("MAN_EPOCH_START"),
+            *_numbers("MAN_DURATION", unit="s"),
+            *_text("MAN_REF_FRAME"),
+            *_numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z", unit="N*m"),
+            *_numbers("MAN_DELTA_MASS", unit="kg", required=False),
+        ),
+    ),
+}
+"""The blocks of an APM's data, in their order."""
+
+AEM_METADATA = _text(
+    *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
+    *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
+)
+"""What is written of table 4-3."""
+
+AEM_RECORD = (*_text("EPOCH"), *_QUATERNION, *_numbers(*_ANGVEL, unit="deg/s", tag="angVel"))
+"""A data line of ATTITUDE_TYPE QUATERNION/ANGVEL."""
+
+
+class Entry(NamedTuple):
+    """A keyword with its value, as texts; ``line`` counts from 1 in a message that was read."""
+
+    keyword: str
+    value: str
+    unit: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Keywords that belong together; ``name`` is that of the layout, empty for what stands outside of blocks."""
+
+    name: str
+    entries: tuple[Entry, ...]
+    comments: tuple[str, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Metadata and the data that they describe: blocks (APM) or records (AEM)."""
+
+    metadata: Block
+    blocks: tuple[Block, ...] = ()
+    records: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A whole message; ``kind`` is APM or AEM."""
+
+    kind: str
+    header: Block
+    segments: tuple[Segment, ...]
+
+
+def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> Block:
+    """A block with ``values`` in the order of the table; numbers in the unit of the table."""
+    entries = tuple(
+        Entry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
+        for keyword in keywords
+        if (value := values.get(keyword.name)) is not None
+    )
+    return Block(name, entries, tuple(comment(text) for text in comments))
+
+
+def number(value: float) -> str:
+    """A number as the standard has it: at most 16 digits, at least one on either side of the point, no -0."""
+    if value == 0.0:
+        return "0.0"
+    exact = Decimal(repr(float(value)))
+    if len(exact.as_tuple().digits) > SIGNIFICANT:
+        exact = Decimal(f"{value:.{SIGNIFICANT - 1}e}")
+    exact = exact.normalize()
+    fixed = f"{exact:f}"
+    if "." not in fixed:
+        fixed += ".0"
+    if sum(character.isdigit() for character in fixed) <= SIGNIFICANT:
+        return fixed
+    sign, digits, _ = exact.as_tuple()
+    first, *rest = (str(digit) for digit in digits)
+    return f"{'-' * sign}{first}.{''.join(rest) or '0'}E{exact.adjusted():+03d}"
+
+
+def label(text: str) -> str:
+    """A name as a value of the standard: printable ASCII in capitals; UNKNOWN where nothing is left."""
+    return " ".join(_ascii(text).upper().split())[:200] or "UNKNOWN"
+
+
+def comment(text: str) -> str:
+    """A comment as the standard has it: printable ASCII, short enough for one line."""
+    return _ascii(text)[: LONGEST_LINE - len("COMMENT ")]
+
+
+def _ascii(text: str) -> str:
+    """Without accents and without what ASCII does not have."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return "".join(character if character.isprintable() else " " for character in plain)

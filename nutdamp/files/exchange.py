@@ -1,0 +1,65 @@
+"""Plans as other tools read them: one entry for each format that `nutdamp export` writes."""
+
+from __future__ import annotations
+
+import datetime
+from typing import TYPE_CHECKING
+
+from nutdamp.errors import BadRequest
+
+if TYPE_CHECKING:
+    from nutdamp.planning import Plan
+
+FORMATS = ("apm", "aem", "stk", "basilisk", "json")
+"""Formats by name; the first two are CCSDS messages in either of two notations."""
+
+MESSAGES = ("apm", "aem")
+TRACKS = ("aem", "stk")
+
+
+def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
+    """The text of a plan in the format ``form``; messages in XML or else in keyword = value notation.
+
+    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises BadRequest where the
+    format needs what the spacecraft file does not give, or cannot hold what the plan has.
+    """
+    if xml and form not in MESSAGES:
+        raise BadRequest(f"{form} has no XML notation; {' and '.join(MESSAGES)} have")
+    if until is not None and form not in TRACKS:
+        raise BadRequest(f"an end belongs to a track ({' or '.join(TRACKS)}); {form} is none")
+    if form == "json":
+        from nutdamp.files.output import json_text
+        from nutdamp.files.plan_json import comparison_json
+        from nutdamp.planning import Comparison
+
+        return json_text(comparison_json(Comparison(plan.spacecraft, (plan,), plan, "the plan exported")))
+    if form == "basilisk":
+        from nutdamp.files.basilisk_script import basilisk_script
+
+        return basilisk_script(plan)
+    return _with_epoch(plan, form, xml, until)
+
+
+def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
+    from nutdamp import flight
+    from nutdamp.files.frames import reference
+
+    body = plan.spacecraft
+    place = reference(body)
+    end = plan.pulses.end + body.inertial_period if until is None else until
+    if form == "stk":
+        from nutdamp.files.stk import stk_attitude
+
+        return stk_attitude(flight.flown(body, plan.pulses, end), end, place)
+    from nutdamp.files.ccsds.aem import aem
+    from nutdamp.files.ccsds.apm import apm
+    from nutdamp.files.ccsds.epoch import Epoch
+    from nutdamp.files.ccsds.kvn import to_kvn
+    from nutdamp.files.ccsds.xml import to_xml
+
+    created = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    if form == "apm":
+        message = apm(plan, place, created)
+    else:
+        message = aem(plan, flight.flown(body, plan.pulses, end), end, place, created)
+    return to_xml(message) if xml else to_kvn(message)

