@@ -11,8 +11,9 @@ from nutdamp import __version__
 from nutdamp.cli.boundary import run
 
 COMMANDS = (
-    "plan", "simulate", "trade", "disperse", "animate", "verify", "check", "export", "import", "explain", "init", "schema",
-)  # fmt: skip
+    *("plan", "simulate", "trade", "disperse", "animate", "verify", "check"),
+    *("export", "import", "explain", "init", "schema"),
+)
 
 
 class Commands(click.Group):
