@@ -291,14 +291,14 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     feasible = [(one, left) for one, left in judged if left is not None]
     if not feasible:
         return None, "no scheme is feasible"
-    least = min(_missed(one, left) for one, left in feasible)
+    least = min(missed(one, left) for one, left in feasible)
     asked = any(one.meets_requirement is not None for one, _ in feasible)
     meeting = [(one, left) for one, left in feasible if one.meets_requirement is not False]
     if not meeting:
-        best = next(one for one, left in feasible if _missed(one, left) == least)
+        best = next(one for one, left in feasible if missed(one, left) == least)
         return best, "no feasible plan meets the requirement; this one leaves least nutation"
-    least = min(_missed(one, left) for one, left in meeting)
-    close = [(one, left) for one, left in meeting if _missed(one, left) <= max(2.0 * least, AS_GOOD)]
+    least = min(missed(one, left) for one, left in meeting)
+    close = [(one, left) for one, left in meeting if missed(one, left) <= max(2.0 * least, AS_GOOD)]
     those = "meet the requirement" if asked else "are feasible"
     if len(meeting) == 1:
         return meeting[0][0], f"the only plan that {'meets the requirement' if asked else 'is feasible'}"
@@ -323,6 +323,6 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     return best, f"as little {what} and shift of H as any, and ends first"
 
 
-def _missed(judged: Plan, left: Residual) -> float:
+def missed(judged: Plan, left: Residual) -> float:
     """What a plan leaves, rad: nutation, or the distance from a target axis where that is more."""
     return left.nutation if judged.spacecraft.goal.axis is None else max(left.nutation, left.axis_error)

@@ -17,6 +17,7 @@ import numpy as np
 
 from nutdamp import planning
 from nutdamp.dispersion import study_of
+from nutdamp.dispersion.outputs import aim_output
 from nutdamp.dispersion.study import PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.planning import Comparison, Plan
@@ -43,15 +44,26 @@ AS_GOOD = 1.05
 class Candidate:
     """A plan and how it fares with dispersed truths.
 
-    ``variant`` says how it differs from what its scheme plans; ``nutation`` and ``momentum_shift`` rad are not exceeded
-    with the probability asked; ``met`` is the fraction of truths that keep the requirement, None without one.
+    ``variant`` says how it differs from what its scheme plans; ``nutation`` and ``off`` rad (how far H ends from
+    where it shall) are not exceeded with the probability asked; ``met`` is the fraction of truths that keep the
+    requirement, None without one.
     """
 
     plan: Plan
     variant: str
     nutation: float
-    momentum_shift: float
+    off: float
     met: float | None
+
+    @property
+    def left(self) -> float:
+        """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
+        return self.nutation if self.plan.spacecraft.goal.axis is None else max(self.nutation, self.off)
+
+    @property
+    def nominal(self) -> float | None:
+        """The same for the estimate, rad."""
+        return None if self.plan.flown is None else planning.missed(self.plan, self.plan.flown)
 
     @property
     def cost(self) -> float:
@@ -97,7 +109,7 @@ class RobustComparison:
             (more.propellant or 0.0) - (less.propellant or 0.0) if known else None,
             more.total_impulse - less.total_impulse,
             more.end - less.end,
-            self.chosen.nutation - self.usual.nutation,
+            self.chosen.left - self.usual.left,
         )
 
     @property
@@ -146,7 +158,7 @@ def compare(
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # truths that cannot be flown, such as those that take too long
                 found[kind] = _dispersed(own, variant, probability, samples, flown=flown)
-    candidates = sorted(found.values(), key=lambda one: (-_tier(one, probability), one.nutation, one.plan.pulses.end))
+    candidates = sorted(found.values(), key=lambda one: (-_tier(one, probability), one.left, one.plan.pulses.end))
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
     chosen, reason = _choose(candidates, probability)
     return RobustComparison(comparison, tuple(candidates), usual, chosen, reason, probability, samples, SEED, flown)
@@ -188,7 +200,8 @@ def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, fl
     study = study_of(plan.spacecraft, plan.pulses, seed=SEED, flown=flown)
     results = run(Results(study, samples), threads=threads_here())
     ends = []
-    for output in ("nutation", "momentum_shift"):
+    aim, _ = aim_output(plan.spacecraft)
+    for output in ("nutation", aim):
         distribution = results.distribution(output)
         assert distribution is not None
         ends.append(float(distribution.quantiles(np.array([probability]))[0]))
@@ -209,7 +222,7 @@ def _choose(candidates: Sequence[Candidate], probability: float) -> tuple[Candid
     best = candidates[0]
     tier = _tier(best, probability)
     those = [one for one in candidates if _tier(one, probability) == tier]
-    close = [one for one in those if one.nutation <= AS_GOOD * best.nutation]
+    close = [one for one in those if one.left <= AS_GOOD * best.left]
     known = all(one.plan.pulses.propellant is not None for one in close)
 
     def cost(one: Candidate) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nutdamp import flight
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
-from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS, aim_output, measure, vectors
 from nutdamp.dispersion.sensitivity import FirstOrder, first_order, sampled_shares
 from nutdamp.dispersion.statistics import (
     EXACT_CASES,
@@ -137,11 +137,18 @@ class Study:
         return out[:, 0]
 
     def severity(self, values: Array) -> Array:
-        """How bad cases are: by what the requirement asks, relative to it; without one by the nutation left."""
-        asked = self.model.spacecraft.requirement
-        limits = () if asked is None else ((0, asked.nutation), (1, asked.momentum_shift))
+        """How bad cases are: by what the requirement asks, relative to it; without one by the nutation left.
+
+        With a target axis the distance from it stands for the shift of H.
+        """
+        body = self.model.spacecraft
+        asked, aim = body.requirement, OUTPUTS.index(aim_output(body)[0])
+        limits = () if asked is None else ((0, asked.nutation), (aim, asked.momentum_shift))
         ratios = [values[row] / limit for row, limit in limits if limit is not None]
-        return values[0] if not ratios else np.asarray(np.max(ratios, axis=0))
+        if not ratios:
+            worst = values[0] if body.goal.axis is None else np.maximum(values[0], values[aim])
+            return np.asarray(worst)
+        return np.asarray(np.max(ratios, axis=0))
 
     @property
     def fingerprint(self) -> str:

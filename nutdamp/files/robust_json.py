@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from nutdamp.dispersion.outputs import aim_output
 from nutdamp.files.plan_json import plan_json
 from nutdamp.robust import Candidate, RobustComparison
 
@@ -44,6 +45,6 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "propellant_kg": pulses.propellant,
         "nominal_nutation_deg": None if plan.flown is None else math.degrees(plan.flown.nutation),
         "nutation_deg": math.degrees(one.nutation),
-        "momentum_shift_deg": math.degrees(one.momentum_shift),
+        aim_output(plan.spacecraft)[0] + "_deg": math.degrees(one.off),
         "met_fraction": one.met,
     }

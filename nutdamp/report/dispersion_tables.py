@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.dispersion.inputs import Input, Unused
-from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.outputs import OUTPUTS, aim_output
 from nutdamp.dispersion.statistics import Array, cases_to_show
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.report.layout import columns, facts
@@ -30,8 +30,6 @@ TINY = 1e-300
 
 ROUNDING = 1e-12
 """rad; what varies by less does not vary."""
-
-BUDGETED = (("nutation", "nutation"), ("momentum_shift", "shift of H"))
 
 
 def dispersion_screen(results: Results, *, scheme: str, worst: int) -> RenderableType:
@@ -86,7 +84,7 @@ def _requirement(results: Results) -> list[RenderableType]:
     asked, fraction = results.study.model.spacecraft.requirement, results.met_fraction
     if asked is None or fraction is None:
         return [Text("The file has no requirement to meet.")]
-    limits = ((asked.nutation, "nutation"), (asked.momentum_shift, "shift of H"))
+    limits = ((asked.nutation, "nutation"), (asked.momentum_shift, aim_output(results.study.model.spacecraft)[1]))
     wanted = " and ".join(f"{name} within {degrees(limit)}" for limit, name in limits if limit is not None)
     low, high = results.interval
     verdict = ("met", "green") if results.meets_requirement else ("NOT met", "red")
@@ -107,16 +105,18 @@ def _budget(results: Results) -> list[RenderableType]:
     if not any(entry.sigma for entry in inputs):
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
     first, sampled = study.first_order, results.shares
-    shares = {output: first.shares(output) for output, _ in BUDGETED}
-    effects = np.degrees(first.effects("nutation")), np.degrees(first.effects("momentum_shift"))
-    weight = np.max([first.effects(output) / max(first.sigma(output), TINY) for output, _ in BUDGETED], axis=0)
+    budgeted = _budgeted(study)
+    shares = {output: first.shares(output) for output, _ in budgeted}
+    effects = tuple(np.degrees(first.effects(output)) for output, _ in budgeted)
+    weight = np.max([first.effects(output) / max(first.sigma(output), TINY) for output, _ in budgeted], axis=0)
     order = np.argsort(-weight, kind="stable")
-    heads = ("nutation\ndeg", "linear\n%", "cases\n%", "H shift\ndeg", "linear\n%", "cases\n%")
+    aim = "H shift" if study.model.spacecraft.goal.axis is None else "axis err"
+    heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
     table = columns("input\n", "one sigma\nor bias", *heads)
 
     def cells(rows: Sequence[int]) -> list[str]:
         texts = []
-        for (output, _), effect in zip(BUDGETED, effects, strict=True):
+        for (output, _), effect in zip(budgeted, effects, strict=True):
             spread = math.sqrt(float((effect[list(rows)] ** 2).sum()))
             seen = math.fsum(sampled.get(inputs[row].name, {}).get(output, 0.0) for row in rows)
             varies = any(inputs[row].sigma for row in rows)
@@ -133,7 +133,7 @@ def _budget(results: Results) -> list[RenderableType]:
         table.add_row(Text(f"{len(rest)} others", style="dim"), "", *cells(rest))
     remainder = [
         1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
-        for output, _ in BUDGETED
+        for output, _ in budgeted
     ]
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
     table.add_row(Text("together", style="dim"), "", *texts)
@@ -149,7 +149,7 @@ def _dominating(results: Results) -> list[RenderableType]:
     """The tolerances of the file with the largest shares, by name."""
     first = results.study.first_order
     lines: list[RenderableType] = []
-    for output, name in BUDGETED:
+    for output, name in _budgeted(results.study):
         sums: dict[str, float] = {}
         for entry, share in zip(first.inputs, first.shares(output).tolist(), strict=True):
             sums[entry.tolerance] = sums.get(entry.tolerance, 0.0) + share
@@ -189,7 +189,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         "what counts most, in sigmas",
         text=("what counts most, in sigmas",),
     )
-    effects = np.hypot(study.first_order.effects("nutation"), study.first_order.effects("momentum_shift"))
+    effects = np.hypot(study.first_order.effects("nutation"), study.first_order.effects(_budgeted(study)[1][0]))
     cases = results.worst.cases[:count].tolist()
     for case in cases:
         draws = study.draws_of(case)
@@ -231,3 +231,8 @@ def case_screen(study: Study, case: int, draws: dict[str, float], flown: Array, 
         outcome.add_row(Text(name, style="dim"), *cells)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     return Group(title, Text(), inputs, Text(), outcome)
+
+
+def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
+    """The outputs of the tolerance budget, and what people call them."""
+    return ("nutation", "nutation"), aim_output(study.model.spacecraft)

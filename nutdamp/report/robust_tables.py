@@ -44,18 +44,18 @@ def _candidates(found: RobustComparison) -> RenderableType:
     for one in named:
         plan, pulses = one.plan, one.plan.pulses
         spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse
-        nominal = None if plan.flown is None else plan.flown.nutation
         table.add_row(
             Text(plan.scheme, style="bold" if one is found.chosen else ""),
             one.variant + " *" * (one is found.usual),
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
-            *(degrees(angle).removesuffix(" deg") for angle in (nominal, one.nutation)),
+            *(degrees(angle).removesuffix(" deg") for angle in (one.nominal, one.left)),
             *[MISSING if one.met is None else f"{100 * one.met:.4g} %"] * requirement,
         )
+    what = _what(found)
     rest = len(found.candidates) - len(named)
     more = f"{rest} more come behind. " if rest else ""
-    note = f"{more}nominal, {level}: the nutation left for the estimate, and not exceeded by so many truths."
+    note = f"{more}nominal, {level}: the {what} left for the estimate, and not exceeded by so many truths."
     star = " * is what is recommended for the estimate." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))
 
@@ -74,9 +74,14 @@ def _cost(found: RobustComparison) -> str:
         spent = _more(cost.propellant, mass(abs(cost.propellant)), "propellant")
     when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
     return (
-        f"Against {usual.plan.scheme}, recommended for the estimate: {degrees(chosen.nutation)} instead of "
-        f"{degrees(usual.nutation)} of nutation within {level}; it takes {spent} and ends {when}."
+        f"Against {usual.plan.scheme}, recommended for the estimate: {degrees(chosen.left)} instead of "
+        f"{degrees(usual.left)} of {_what(found)} within {level}; it takes {spent} and ends {when}."
     )
+
+
+def _what(found: RobustComparison) -> str:
+    """What the plans are ranked by."""
+    return "nutation" if found.comparison.spacecraft.goal.axis is None else "nutation or axis error"
 
 
 def _more(difference: float, shown: str, what: str) -> str:
