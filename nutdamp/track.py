@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,14 @@ def make_track(
         space_cone=nutation - body_cone,
         pulse=pulse,
     )
+
+
+def in_axes(track: Track, axes: Array) -> Track:
+    """The track with rates and quaternion in other body axes; the columns of ``axes`` (3, 3) are the principal ones."""
+    if np.array_equal(axes, np.eye(3)):
+        return track
+    quaternion = attitude.multiply(track.quaternion, attitude.from_matrix(axes.T))
+    return replace(track, rates=track.rates @ axes.T, quaternion=quaternion)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,160 @@
+"""What stands on the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple
+
+from nutdamp import __version__
+from nutdamp.planning import Comparison, Plan
+from nutdamp.report.check_tables import channel_table, disturbance_table
+from nutdamp.report.page.document import (
+    Block,
+    Facts,
+    Figure,
+    Listing,
+    Page,
+    Picture,
+    Prose,
+    Remarks,
+    Section,
+    sheet_of,
+)
+from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
+from nutdamp.report.text import degrees, mass, moment, quantity
+from nutdamp.report.verify_tables import budget_table, conservation, methods_table
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.verification import Verification
+
+
+class Repeat(NamedTuple):
+    """What it takes to make the page again: the command, and the input file by name and text."""
+
+    command: str
+    name: str
+    text: str
+
+
+def report_page(
+    compared: Comparison,
+    repeat: Repeat,
+    *,
+    verified: Verification | None = None,
+    pictures: tuple[Picture, ...] = (),
+    more: tuple[Section, ...] = (),
+) -> Page:
+    """The page; ``verified`` is of the recommended schedule, ``more`` sections stand before the last."""
+    body, chosen = compared.spacecraft, compared.recommended
+    sections = [_spacecraft(body), _schemes(compared)]
+    if chosen is not None:
+        sections.append(_schedule(chosen))
+    if pictures:
+        sections.append(Section("pictures", "Pictures", pictures))
+    if chosen is not None and verified is not None:
+        sections.append(_budget(chosen, verified))
+    good = chosen is not None and chosen.meets_requirement is not False
+    return Page(
+        title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
+        verdict=_verdict(compared),
+        good=good,
+        figures=() if chosen is None else tuple(_figures(chosen)),
+        sections=(*sections, *more, _repeat(repeat)),
+        made_by=f"Made by nutdamp {__version__}.",
+    )
+
+
+def _verdict(compared: Comparison) -> str:
+    chosen = compared.recommended
+    if chosen is None:
+        return f"No recommendation: {compared.reason}."
+    return f"Recommended: {chosen.scheme} – {compared.reason}."
+
+
+def _figures(chosen: Plan) -> Iterator[Figure]:
+    """The numbers to read first."""
+    body, left, pulses = chosen.spacecraft, chosen.flown, chosen.pulses
+    assert left is not None
+    yield Figure("nutation", f"{degrees(body.nutation)} → {degrees(left.nutation)}")
+    yield Figure("shift of H", degrees(left.momentum_shift))
+    yield Figure("pulses", f"{len(pulses)}, until {moment(pulses.end)}" if len(pulses) else "none")
+    if pulses.propellant is None:
+        yield Figure("impulse", quantity(pulses.total_impulse, "N m s"))
+    else:
+        yield Figure("propellant", mass(pulses.propellant))
+    if chosen.meets_requirement is not None:
+        yield Figure("requirement", VERDICT[chosen.meets_requirement])
+
+
+def _spacecraft(body: Spacecraft) -> Section:
+    blocks: list[Block] = [spacecraft_facts(body)]
+    if body.channels:
+        blocks.append(
+            sheet_of("Channels, and the nutation that their shortest and longest pulse takes", channel_table(body))
+        )
+    if body.disturbances:
+        blocks.append(sheet_of("Disturbances, and what each does alone", disturbance_table(body)))
+    return Section("spacecraft", "Spacecraft", tuple(blocks))
+
+
+def _schemes(compared: Comparison) -> Section:
+    """The comparison, why a scheme is infeasible, and the remarks of the others."""
+    remarks = tuple(
+        (plan.scheme, remark)
+        for plan in compared.plans
+        for remark in ((plan.why,) if plan.why is not None else plan.remarks)
+    )
+    note = Prose(
+        "By impulses: each pulse acts at its centre with its effective impulse, Magnus (17). The other figures "
+        "integrate Euler's equations through the real widths; recommendation and requirement go by them."
+    )
+    blocks: tuple[Block, ...] = (comparison_sheet(compared), note)
+    return Section("schemes", "Schemes compared", (*blocks, Remarks(remarks)) if remarks else blocks)
+
+
+def _schedule(chosen: Plan) -> Section:
+    title = f"Recommended schedule: {chosen.scheme}"
+    if not len(chosen.pulses):
+        return Section("schedule", title, (Prose("No pulse is needed."),))
+    note = Prose(
+        "A pulse is on from its start for its on-time; the centre lies halfway. "
+        "Nutation: before the pulse, and after it."
+    )
+    return Section("schedule", title, (pulse_sheet(chosen), note))
+
+
+def _budget(chosen: Plan, verified: Verification) -> Section:
+    agree = "agree" if verified.agree else "DO NOT AGREE"
+    missing = tuple((method.name, method.missing) for method in verified.methods if method.missing)
+    blocks: list[Block] = [
+        sheet_of("What each imperfection alone leaves, everything else ideal", budget_table(verified)),
+        sheet_of("The schedule flown by independent means", methods_table(verified)),
+        Prose(f"Taylor series and DOP853 {agree}. {conservation(chosen.spacecraft, verified)}"),
+    ]
+    if missing:
+        blocks.append(Remarks(missing))
+    return Section("budget", "Error budget", tuple(blocks))
+
+
+def _repeat(repeat: Repeat) -> Section:
+    return Section(
+        "repeat",
+        "To repeat it",
+        (
+            Listing("Command", repeat.command, "console"),
+            Facts("Versions", tuple(_versions())),
+            Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"),
+        ),
+    )
+
+
+def _versions() -> Iterator[tuple[str, str]]:
+    """What the numbers and pictures depend on."""
+    yield "nutdamp", __version__
+    yield "Python", platform.python_version()
+    for package in ("numpy", "scipy", "matplotlib"):
+        try:
+            yield package, version(package)
+        except PackageNotFoundError:
+            yield package, "not installed"
