@@ -79,9 +79,9 @@ def command(
 
         outputs.append((json, json_text(simulation_json(chosen, track, residual, flown, scheme=plan.scheme))))
     if plot is not None:
-        from nutdamp.report.figures import motion_picture
+        from nutdamp.report import figures
 
-        outputs.append((plot, motion_picture(chosen, track, plot)))
+        outputs.append((plot, figures.rendered(figures.overview_figure(chosen, track), plot)))
     write_all(outputs)
     if not silent:
         from nutdamp.report.simulate_tables import simulation_screen

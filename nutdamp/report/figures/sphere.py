@@ -1,0 +1,208 @@
+"""The spherical view: body cone rolling on space cone, spin axis and angular momentum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.report import geometry
+from nutdamp.report.figures import style
+from nutdamp.report.figures.motion import title
+from nutdamp.report.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.report.geometry import Cones
+from nutdamp.spacecraft import Vector
+from nutdamp.track import Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ELEVATION = math.radians(28.0)
+"""From where the sphere is seen: above the plane square to H(0)."""
+
+ASIDE = math.radians(65.0)
+"""The spin axis leans to the right at t = 0, this far round from the viewer."""
+
+WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
+"""Below the first angle from H(0) everything is magnified, to the second one at most."""
+
+STEPS = (1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True)
+class View:
+    """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
+
+    ``magnified`` stretches what lies square to H(0): straight lines, tangents and coplanar lines stay what they are.
+    """
+
+    plane: Vector
+    azimuth: float
+    magnified: float
+
+    def seen(self, directions: Vector) -> tuple[Vector, Vector]:
+        """Places on paper (n, 2), and heights towards the viewer (n,)."""
+        local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
+        turn, rise = self.azimuth, ELEVATION
+        right = np.array([-math.sin(turn), math.cos(turn), 0.0])
+        near = np.array([math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), math.sin(rise)])
+        up = np.cross(near, right)
+        return np.column_stack([local @ right, local @ up]), np.asarray(local @ near, dtype=np.float64)
+
+
+def view(flight: Flight, track: Track) -> View:
+    """The view in which everything that moves on ``track`` has its place."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    first = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    local = first.axis @ plane.T
+    shown = np.vstack([track.axis, track.momentum, first.body, first.space])
+    angles = np.radians(np.hypot(*geometry.on_sky(plane, shown).T))
+    return View(plane, math.atan2(local[1], local[0]) - ASIDE, magnification(float(angles.max())))
+
+
+def magnification(widest: float) -> float:
+    """How much angles from H(0) are stretched where the ``widest`` is so many rad: 1, 2, 5, 10, …"""
+    if widest >= WIDE or widest < geometry.NO_CONE:
+        return 1.0
+    room = math.tan(DRAWN) / math.tan(widest)
+    decade = 10.0 ** math.floor(math.log10(room))
+    return decade * max(step for step in STEPS if step * decade <= room * (1.0 + 1e-12))
+
+
+@style.styled
+def sphere_figure(flight: Flight, track: Track) -> Figure:
+    """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
+    figure = style.sheet(7.4, 4.3)
+    space, plan = figure.subplots(1, 2)
+    sphere(space, flight, track)
+    along_momentum(plan, flight, track)
+    style.legend(figure, [space, plan], 6)
+    figure.suptitle(title(flight))
+    style.settle(figure)
+    return figure
+
+
+def sphere(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 and the path of the spin axis, seen from outside."""
+    track = geometry.drawn(flight, track)
+    looked = view(flight, track)
+    draw_ground(axes, looked, flight, track)
+    draw_cones(axes, looked, geometry.cones(flight, track.rates[0], track.quaternion[0]))
+    much = looked.magnified
+    axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
+
+
+def draw_ground(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
+    """Sphere, path of the spin axis and of H; and room for them."""
+    corners = [np.array([[0.0, 0.0]])]
+    if looked.magnified == 1.0:
+        turn = np.linspace(0.0, 2 * math.pi, 181)
+        outline = np.column_stack([np.cos(turn), np.sin(turn)])
+        axes.plot(*outline.T, color=GREY, linewidth=0.7)
+        for height in (0.0, 0.5, math.sqrt(0.75)):
+            radius = math.sqrt(1.0 - height * height)
+            ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
+            _hidden_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
+        corners.append(outline)
+    path, _ = looked.seen(track.axis)
+    corners.append(path)
+    for stretch in geometry.stretches(flight, track):
+        rows = slice(stretch.first, stretch.last + 1)
+        colour = MOTION if stretch.pulse is None else PULSE
+        _hidden_line(axes, looked, track.axis[rows], colour, 1.0 if stretch.pulse is None else 1.8)
+    size = np.linalg.norm(track.momentum, axis=1, keepdims=True)
+    momentum, _ = looked.seen(track.momentum / size)
+    axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    corners += [momentum, *(looked.seen(rim)[0] for rim in _rims(flight, track) if len(rim))]
+    _frame(axes, np.vstack(corners))
+
+
+def _rims(flight: Flight, track: Track) -> tuple[Vector, Vector]:
+    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    return found.body, found.space
+
+
+def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
+    """Space cone, body cone, and the three axes that lie in one plane."""
+    for rim, colour, name in ((found.space, MOMENTUM, "space cone"), (found.body, MOTION, "body cone")):
+        if len(rim):
+            _cone(axes, looked, rim, colour, name)
+    for direction, colour, name in (
+        (found.momentum, MOMENTUM, "H"),
+        (found.rotation, INK, "ω"),
+        (found.axis, MOTION, "spin axis"),
+    ):
+        tip = looked.seen(direction)[0][0]
+        style.arrow(axes, np.zeros(2), 1.0 * tip, colour, width=1.2)
+        style.label(axes, name, tip, colour if colour != INK else INK)
+
+
+def _cone(axes: Axes, looked: View, rim: Vector, colour: str, name: str) -> None:
+    """A cone from the centre to its rim: outline filled, rim drawn."""
+    points, _ = looked.seen(rim)
+    way = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=0.16, edgecolor="none", label=name)
+    axes.plot(*points.T, color=colour, linewidth=1.0)
+    if abs(way[-1] - way[0]) < math.pi:  # the centre is outside the rim: the cone is seen from its side
+        for row in (int(np.argmin(way)), int(np.argmax(way))):
+            axes.plot([0.0, points[row, 0]], [0.0, points[row, 1]], color=colour, linewidth=0.8)
+
+
+def _outline(points: Vector, way: Vector) -> Vector:
+    """The rim, and the centre where the cone is seen from its side."""
+    if abs(way[-1] - way[0]) >= math.pi:
+        return points
+    low, high = int(np.argmin(way)), int(np.argmax(way))
+    ring = np.roll(points[:-1], -low, axis=0) if np.allclose(points[0], points[-1]) else points
+    far = (high - low) % max(len(points) - 1, 1)
+    one, other = ring[: far + 1], ring[far:]
+    outer = one if np.hypot(*one.mean(axis=0)) > np.hypot(*other.mean(axis=0)) else other
+    return np.vstack([[0.0, 0.0], outer, [0.0, 0.0]])
+
+
+def _hidden_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
+    """A line on the sphere: where it runs behind it, dotted, or not at all."""
+    points, height = looked.seen(directions)
+    front = height >= 0.0 if looked.magnified == 1.0 else np.ones(len(height), dtype=bool)
+    axes.plot(*np.where(front[:, None], points, np.nan).T, color=colour, linewidth=width)
+    if back and not front.all():
+        axes.plot(*np.where(front[:, None], np.nan, points).T, color=colour, linewidth=0.7 * width, linestyle=":")
+
+
+def _frame(axes: Axes, points: Vector) -> None:
+    """Equal scales, no ticks: this picture has no axis to read a number from."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.57 * float((high - low).max())
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+
+
+def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 seen along H(0), true to scale along every radius."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    shown = draw_circles(axes, plane, geometry.cones(flight, track.rates[0], track.quaternion[0]))
+    style.square(axes, shown, margin=0.14)
+    x, y = geometry.sky_names(flight)
+    axes.set(xlabel=x, ylabel=y, title="The same, seen along H")
+
+
+def draw_circles(axes: Axes, plane: Vector, found: Cones) -> Vector:
+    """Rims of the cones with their axes and where they touch, on the sky; returns the points drawn (n, 2)."""
+    points = [np.zeros((1, 2))]
+    for rim, colour, name in ((found.space, MOMENTUM, "space cone"), (found.body, MOTION, "body cone")):
+        if len(rim):
+            ring = geometry.on_sky(plane, rim)
+            axes.fill(*ring.T, facecolor=colour, alpha=0.16, edgecolor=colour, linewidth=1.0, label=name)
+            points.append(ring)
+    places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
+    axes.plot(*places.T, color=GREY, linewidth=0.8)
+    for place, mark, colour, name in zip(places, "+os", (MOMENTUM, INK, MOTION), ("H", "ω", "spin axis"), strict=True):
+        axes.plot(*place, mark, color=colour, markersize=4.5 if mark != "+" else 8, markeredgewidth=1.4)
+        style.label(axes, name, place, colour)
+    return np.vstack([*points, places])

@@ -1,0 +1,219 @@
+"""The one style of all figures: colours, sizes, marks, labels that make room for each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from nutdamp.errors import MissingExtra
+from nutdamp.spacecraft import Vector
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+# Okabe & Ito's palette, told apart by colour-blind readers and, with the line styles, in grey print
+# (jfly.uni-koeln.de/color).
+MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
+"""Spin axis, body cone and what moves; firings; angular momentum and space cone."""
+
+INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
+"""Text and ω; marks; grid lines."""
+
+LINE, THIN = 1.3, 0.7
+"""Line widths, points."""
+
+SMALL = 7.5
+"""Size of labels inside a panel, points."""
+
+_SETTINGS: dict[str, Any] = {
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
+    "font.size": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.facecolor": "none",
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "figure.titlesize": 10.5,
+    "figure.titleweight": "bold",
+    "figure.facecolor": "white",
+    "grid.color": FAINT,
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": LINE,
+    "lines.solid_capstyle": "round",
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "svg.hashsalt": "nutdamp",  # the same flight gives the same file
+}
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Draws in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+
+    @wraps(draw)
+    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        try:
+            from matplotlib import style
+        except ImportError as reason:
+            raise MissingExtra("plot", "a picture") from reason
+        with style.context(["default", _SETTINGS]):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure, inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=200, layout="constrained")
+
+
+def arrow(axes: Axes, start: Vector, end: Vector, colour: str, *, width: float = LINE, head: float = 9.0) -> None:
+    """An arrow between two points of the data."""
+    axes.annotate(
+        "",
+        (float(end[0]), float(end[1])),
+        (float(start[0]), float(start[1])),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": colour,
+            "linewidth": width,
+            "mutation_scale": head,
+            "shrinkA": 0.0,
+            "shrinkB": 0.0,
+        },
+        annotation_clip=False,
+    )
+
+
+def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
+    """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
+    for row in places:
+        if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
+            arrow(axes, path[row - 1], path[row], colour, width=0.0, head=8.0)
+
+
+def square(axes: Axes, points: Vector, *, margin: float = 0.1, least: float = 1e-6, centre: bool = False) -> None:
+    """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.zeros(2) if centre else 0.5 * (low + high)
+    half = (1.0 + margin) * max(float(np.abs(points - middle).max()), 0.0)
+    half = half if half > least else 1.0
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(nbins=6)
+    axes.grid()
+
+
+def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, vital: bool = False) -> None:
+    """A label near a point, moved or left out by `settle`; what is ``vital`` stays."""
+    note = axes.annotate(
+        text,
+        (float(place[0]), float(place[1])),
+        xytext=(0, 0),
+        textcoords="offset points",
+        color=colour,
+        fontsize=SMALL,
+        ha="center",
+        va="center",
+    )
+    note.set_gid("vital" if vital else "label")
+
+
+_AROUND = [(8.0 * step * x, 7.0 * step * y) for step in (1.0, 1.5, 2.1) for x, y in (
+    (1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.3), (0, -1.3))]  # fmt: skip
+
+
+def settle(figure: Figure) -> None:
+    """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        notes = [note for note in axes.texts if note.get_gid() in ("label", "vital")]
+        if not notes:
+            continue
+        window = axes.get_window_extent()
+        taken: list[Any] = [
+            other.get_window_extent() for other in axes.texts if other not in notes and other.get_text()
+        ]
+        curves = _inked(axes)
+        for note in sorted(notes, key=lambda one: one.get_gid() != "vital"):
+            _settle(note, taken, curves, window)  # type: ignore[arg-type]
+
+
+def _settle(note: Annotation, taken: list[Any], curves: Vector, window: Any) -> None:
+    best, least = None, np.inf
+    for offset in _AROUND:
+        wide = offset[0] * (1.0 + 0.22 * max(len(note.get_text()) - 2, 0))
+        note.set_position((wide, offset[1]))
+        box = note.get_window_extent().padded(2.0)
+        if any(box.overlaps(other) for other in taken):
+            continue
+        if box.x0 < window.x0 or box.x1 > window.x1 or box.y0 < window.y0 or box.y1 > window.y1:
+            continue
+        inside = (curves[:, 0] > box.x0) & (curves[:, 0] < box.x1) & (curves[:, 1] > box.y0) & (curves[:, 1] < box.y1)
+        covered = float(np.count_nonzero(inside)) + 0.3 * float(np.hypot(*offset)) / 8.0
+        if covered < least:
+            best, least = (note.get_position(), box), covered
+    if best is None:
+        note.set_visible(False)
+        return
+    note.set_position(best[0])
+    taken.append(best[1])
+
+
+def _inked(axes: Axes) -> Vector:
+    """Points of all curves in pixels, close enough together that none passes a label unseen."""
+    points = [np.empty((0, 2))]
+    for line in axes.lines:
+        if line.get_transform() != axes.transData:
+            continue
+        path = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()]))
+        path = path[np.isfinite(path).all(axis=1)]
+        if len(path) > 1:
+            steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+            even = np.linspace(0.0, steps[-1], min(int(steps[-1] / 4.0) + 2, 20_000))
+            points.append(np.column_stack([np.interp(even, steps, column) for column in path.T]))
+    return np.concatenate(points)
+
+
+def legend(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
+    """One legend under all panels, each name once, where no curve can run into it."""
+    found: dict[str, Artist] = {}
+    for one in axes:
+        for handle, name in zip(*one.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    if found:
+        figure.legend(
+            list(found.values()),
+            list(found),
+            loc="outside lower center",
+            ncols=columns,
+            handlelength=2.2,
+            borderpad=0.2,
+        )
+
+
+def thinned(count: int, most: int = 30) -> range:
+    """Which of ``count`` numbered things to label."""
+    return range(0, count, max(1, -(-count // most)))

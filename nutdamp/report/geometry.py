@@ -1,0 +1,144 @@
+"""What pictures of a flight are made of: directions as angles, rolling cones, stretches of the track. No matplotlib."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude, triaxial
+from nutdamp.spacecraft import Vector
+from nutdamp.track import Track
+
+ROWS_A_TURN = 60
+"""Rows in a nutation period from which a polygon looks like the curve."""
+
+MOST_ROWS = 30_000
+"""Rows of a picture at most; a longer track is drawn as far as they reach."""
+
+RIM = 121
+"""Points around the rim of a cone."""
+
+NO_CONE = 1e-10
+"""Half-angle in rad below which a cone is not told from its axis."""
+
+
+def drawn(flight: Flight, track: Track) -> Track:
+    """``track``, or the same stretch of ``flight`` in as many rows as its curves need.
+
+    Where that would be more than `MOST_ROWS`, a shorter stretch from t = 0.
+    """
+    until = float(track.t[-1])
+    body = flight.spacecraft
+    momentum = np.linalg.norm(body.omega0 * np.asarray(flight.moments))
+    quickest = min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum))
+    step = quickest / ROWS_A_TURN
+    if until / step <= len(track.t):
+        return track
+    reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
+    return flight.track(min(math.ceil(reach / step) + 1, MOST_ROWS), reach)
+
+
+class Stretch(NamedTuple):
+    """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that fires, from 0."""
+
+    first: int
+    last: int
+    pulse: int | None
+
+
+def stretches(flight: Flight, track: Track) -> Iterator[Stretch]:
+    """The track cut where pulses begin and end, in order; an impulse is a stretch of two rows."""
+    now, last = 0, len(track.t) - 1
+    for number, (begins, ends) in enumerate(flight.spans):
+        if begins > track.t[last]:
+            break
+        first = max(now, int(np.searchsorted(track.t, begins, side="left")))
+        until = max(first, min(last, int(np.searchsorted(track.t, ends, side="right")) - 1))
+        if first > now:
+            yield Stretch(now, first, None)
+        yield Stretch(first, until, number)
+        now = until
+    if now < last:
+        yield Stretch(now, last, None)
+
+
+def sky_plane(flight: Flight, momentum: Vector) -> Vector:
+    """Rows: two directions square to ``momentum``, and its own. In a celestial frame east and north, in N its x, y."""
+    up = momentum / np.linalg.norm(momentum)
+    framed = flight.spacecraft.attitude is not None
+    first = np.cross([0.0, 0.0, 1.0], up) if framed else np.array([1.0, 0.0, 0.0])
+    if np.linalg.norm(first) < 1e-9:  # H at the pole: there is no east
+        first = np.array([1.0, 0.0, 0.0])
+    first = first - up * (first @ up)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first), up])
+
+
+def sky_names(flight: Flight) -> tuple[str, str]:
+    """What the two angles of `on_sky` are called."""
+    if flight.spacecraft.attitude is None:
+        return "towards x of N, deg", "towards y of N, deg"
+    return "east of H(0), deg", "north of H(0), deg"
+
+
+def on_sky(plane: Vector, directions: Vector) -> Vector:
+    """Directions (n, 3) as angles from H(0) in degrees, true to scale along every radius (azimuthal equidistant)."""
+    local = directions @ plane.T
+    across = np.hypot(local[:, 0], local[:, 1])
+    angle = np.degrees(np.arctan2(across, local[:, 2]))
+    scale = np.divide(angle, across, out=np.zeros_like(angle), where=across > 0)
+    return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
+
+
+class Cones(NamedTuple):
+    """Body cone and space cone at one moment, as unit vectors in the inertial frame.
+
+    ``axis`` spin axis, ``momentum`` direction of H, ``rotation`` of ω, (3,); ``body`` and ``space`` (n, 3) are the
+    rims of the cones, which touch along ``rotation``. A rim is empty where there is no cone.
+    """
+
+    axis: Vector
+    momentum: Vector
+    rotation: Vector
+    body: Vector
+    space: Vector
+
+
+def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
+    """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion (4,).
+
+    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4).
+    """
+    moments = np.asarray(flight.moments)
+    sense = math.copysign(1.0, flight.spacecraft.spin)
+    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, sense]))
+    turning = attitude.rotate(quaternion, rates)
+    momentum = attitude.rotate(quaternion, moments * rates)
+    rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
+    if moments[0] == moments[1]:
+        return Cones(axis, direction, rotation, around(axis, rotation), around(direction, rotation))
+    period = triaxial.nutation_period(flight.moments, rates)
+    if not math.isfinite(period):
+        return Cones(axis, direction, rotation, np.empty((0, 3)), np.empty((0, 3)))
+    times = np.linspace(0.0, period, 4 * RIM)
+    polhode = triaxial.free_rates(flight.moments, rates, times)
+    turns = triaxial.free_attitude(flight.moments, rates, quaternion, times)
+    size = np.linalg.norm(polhode, axis=1, keepdims=True)
+    return Cones(
+        axis, direction, rotation, attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
+    )
+
+
+def around(axis: Vector, start: Vector) -> Vector:
+    """Unit vectors (RIM, 3) on the circle that ``start`` describes about ``axis``, both unit; none on the axis."""
+    square = start - axis * (axis @ start)
+    if np.linalg.norm(square) < NO_CONE:
+        return np.empty((0, 3))
+    turn = np.linspace(0.0, 2 * math.pi, RIM)[:, None]
+    return np.asarray(
+        axis * (axis @ start) + np.cos(turn) * square + np.sin(turn) * np.cross(axis, square), dtype=np.float64
+    )
