@@ -52,6 +52,8 @@ def scheme_options(command: Command) -> Command:
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
+        if chosen.on_time is not None and chosen.on_time <= 0.0:
+            raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
         return command(*args, options=chosen, **parameters)
 
     wrapped: Any = gathered
@@ -75,17 +77,25 @@ def scheme_options(command: Command) -> Command:
 
 def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
     """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example."""
+    from nutdamp.files.spacecraft_file import read_spacecraft
+
+    return read_spacecraft(*source(path, remark))
+
+
+def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
+    """The text of the spacecraft file that `load` reads, and its name."""
     from pathlib import Path
 
-    from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
+    from nutdamp.files.spacecraft_file import built_in_example_text
+    from nutdamp.files.yaml_tree import read_text
 
     if path is None and Path(DEFAULT_FILE).exists():
         remark(f"reading {DEFAULT_FILE}")
         path = DEFAULT_FILE
     if path is not None:
-        return load_spacecraft(path)
+        return read_text(Path(path)), path
     remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
-    return read_spacecraft(built_in_example_text(), "example.yaml")
+    return built_in_example_text(), "example.yaml"
 
 
 def plan_or_read(

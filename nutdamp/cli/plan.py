@@ -40,8 +40,6 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output.
     """
-    if options.on_time is not None and options.on_time <= 0.0:
-        raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
     names = tuple(dict.fromkeys(names))
     if csv is not None and len(names) > 1:
         raise click.UsageError("--csv writes one schedule: name one --scheme, or none for the recommended one")

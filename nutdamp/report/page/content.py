@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 from nutdamp import __version__
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Comparison, Plan, unrounded
 from nutdamp.report.check_tables import channel_table, disturbance_table
 from nutdamp.report.page.document import (
     Block,
@@ -16,17 +16,17 @@ from nutdamp.report.page.document import (
     Figure,
     Listing,
     Page,
-    Picture,
     Prose,
     Remarks,
     Section,
     sheet_of,
 )
+from nutdamp.report.page.pictures import pictures_of
 from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.report.text import degrees, mass, moment, quantity
 from nutdamp.report.verify_tables import budget_table, conservation, methods_table
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.verification import Verification
+from nutdamp.verification import verify
 
 
 class Repeat(NamedTuple):
@@ -41,26 +41,23 @@ def report_page(
     compared: Comparison,
     repeat: Repeat,
     *,
-    verified: Verification | None = None,
-    pictures: tuple[Picture, ...] = (),
-    more: tuple[Section, ...] = (),
+    pictured: bool,
 ) -> Page:
-    """The page; ``verified`` is of the recommended schedule, ``more`` sections stand before the last."""
+    """The page; ``pictured``: with pictures of the recommended schedule. Raises MissingExtra without matplotlib."""
     body, chosen = compared.spacecraft, compared.recommended
     sections = [_spacecraft(body), _schemes(compared)]
     if chosen is not None:
         sections.append(_schedule(chosen))
-    if pictures:
-        sections.append(Section("pictures", "Pictures", pictures))
-    if chosen is not None and verified is not None:
-        sections.append(_budget(chosen, verified))
+        if pictured:
+            sections.append(Section("pictures", "Pictures", pictures_of(chosen)))
+        sections.append(_budget(chosen))
     good = chosen is not None and chosen.meets_requirement is not False
     return Page(
         title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
         verdict=_verdict(compared),
         good=good,
         figures=() if chosen is None else tuple(_figures(chosen)),
-        sections=(*sections, *more, _repeat(repeat)),
+        sections=(*sections, _repeat(repeat)),
         made_by=f"Made by nutdamp {__version__}.",
     )
 
@@ -106,7 +103,7 @@ def _schemes(compared: Comparison) -> Section:
         for remark in ((plan.why,) if plan.why is not None else plan.remarks)
     )
     note = Prose(
-        "By impulses: each pulse acts at its centre with its effective impulse, Magnus (17). The other figures "
+        "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "
         "integrate Euler's equations through the real widths; recommendation and requirement go by them."
     )
     blocks: tuple[Block, ...] = (comparison_sheet(compared), note)
@@ -124,7 +121,8 @@ def _schedule(chosen: Plan) -> Section:
     return Section("schedule", title, (pulse_sheet(chosen), note))
 
 
-def _budget(chosen: Plan, verified: Verification) -> Section:
+def _budget(chosen: Plan) -> Section:
+    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen))
     agree = "agree" if verified.agree else "DO NOT AGREE"
     missing = tuple((method.name, method.missing) for method in verified.methods if method.missing)
     blocks: list[Block] = [

@@ -5,10 +5,23 @@ from __future__ import annotations
 import base64
 import hashlib
 import pkgutil
+import re
 from html import escape
 from string import Template
 
-from nutdamp.report.page.document import Block, Column, Facts, Listing, Page, Picture, Prose, Remarks, Section, Sheet
+from nutdamp.report.page.document import (
+    Block,
+    Column,
+    Facts,
+    Figure,
+    Listing,
+    Page,
+    Picture,
+    Prose,
+    Remarks,
+    Section,
+    Sheet,
+)
 from nutdamp.report.text import MISSING
 
 
@@ -16,9 +29,7 @@ def page_html(page: Page) -> str:
     """The whole file. Whatever a spacecraft file says is escaped; the policy in its head allows no other script."""
     script = _part("sort.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    figures = "".join(
-        f"<div><dt>{escape(figure.name)}</dt><dd>{escape(figure.value)}</dd></div>" for figure in page.figures
-    )
+    figures = "".join(map(_figure, page.figures))
     links = "".join(f'<li><a href="#{section.name}">{escape(section.title)}</a></li>' for section in page.sections)
     return Template(_part("page.html")).substitute(
         title=escape(page.title),
@@ -41,6 +52,13 @@ def _part(name: str) -> str:
     return data.decode("utf-8").strip()
 
 
+def _figure(figure: Figure) -> str:
+    """A number to read first, which breaks at commas and arrows only."""
+    parts = re.split(r"(?<=[→,]) ", figure.value)
+    value = " ".join(f"<span>{escape(part)}</span>" for part in parts)
+    return f"<div><dt>{escape(figure.name)}</dt><dd>{value}</dd></div>"
+
+
 def _section(section: Section) -> str:
     blocks = "\n".join(map(block_html, section.blocks))
     return f'<section id="{section.name}">\n<h2>{escape(section.title)}</h2>\n{blocks}\n</section>'
@@ -59,17 +77,16 @@ def block_html(block: Block) -> str:
             rows = "".join(f"<li><b>{escape(name)}:</b> {escape(text)}</li>" for name, text in block.rows)
             return f'<ul class="remarks">{rows}</ul>'
         case Picture():
-            return (
-                f'<figure><div class="picture" role="img" aria-label="{escape(block.described)}">{block.svg}</div>'
-                f"<figcaption>{escape(block.caption)}</figcaption></figure>"
-            )
+            picture = block.svg.replace("<svg ", f'<svg aria-label="{escape(block.described)}" ', 1)
+            box = _box(block.described, picture, "wide picture")
+            return f"<figure>{box}<figcaption>{escape(block.caption)}</figcaption></figure>"
         case Listing():
             return f"<h3>{escape(block.title)}</h3>\n" + _box(block.title, f"<pre>{escape(block.text)}</pre>")
 
 
-def _box(title: str, content: str) -> str:
+def _box(title: str, content: str, kind: str = "wide") -> str:
     """Wide content scrolls in here, by keyboard too, and never the page."""
-    return f'<div class="wide" role="region" tabindex="0" aria-label="{escape(title)}">{content}</div>'
+    return f'<div class="{kind}" role="region" tabindex="0" aria-label="{escape(title)}">{content}</div>'
 
 
 def sheet_html(sheet: Sheet) -> str:
@@ -83,7 +100,7 @@ def sheet_html(sheet: Sheet) -> str:
         )
         rows.append(f'<tr class="mark">{cells}</tr>' if index == sheet.mark else f"<tr>{cells}</tr>")
     return (
-        f'<table class="sheet"><caption>{escape(sheet.title)}</caption>'
+        f'<table class="sheet"><caption><span>{escape(sheet.title)}</span></caption>'
         f"<thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
@@ -117,4 +134,4 @@ def facts_html(facts: Facts) -> str:
     rows = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>' for name, value in facts.rows
     )
-    return f'<table class="facts"><caption>{escape(facts.title)}</caption><tbody>{rows}</tbody></table>'
+    return f'<table class="facts"><caption><span>{escape(facts.title)}</span></caption><tbody>{rows}</tbody></table>'

@@ -26,7 +26,7 @@ def _asked(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if asked is not None:
         most = (("nutation", asked.nutation), ("shift of H", asked.momentum_shift))
         yield "requirement", ", ".join(f"{name} at most {degrees(value)}" for name, value in most if value is not None)
-    yield "horizon", moment(spacecraft.horizon)
+    yield "horizon", duration(spacecraft.horizon)
     kept = []
     if limits.earliest > 0.0:
         kept.append(f"nothing before {duration(limits.earliest)}")
@@ -72,10 +72,11 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
     columns += [
         (Column("nutation left", "deg"), lambda plan: _angle(plan.flown, "nutation")),
         (Column("shift of H", "deg"), lambda plan: _angle(plan.flown, "momentum_shift")),
-        (Column("by impulses: nutation", "deg"), lambda plan: _angle(plan.residual, "nutation")),
-        (Column("by impulses: shift of H", "deg"), lambda plan: _angle(plan.residual, "momentum_shift")),
-        (Column("spin change", "rad/s"), lambda plan: _number(plan.spin_change)),
+        (Column("nutation by (17)", "deg"), lambda plan: _angle(plan.residual, "nutation")),
+        (Column("shift by (17)", "deg"), lambda plan: _angle(plan.residual, "momentum_shift")),
     ]
+    if any(plan.spin_change for plan in compared.plans):
+        columns.append((Column("spin change", "rad/s"), lambda plan: _number(plan.spin_change)))
     if any(plan.delta_v is not None for plan in compared.plans):
         columns.append(
             (Column("|ΔV|", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
