@@ -21,15 +21,19 @@ if TYPE_CHECKING:
 ALIKE = math.radians(2.0)
 """Channels whose torques point within this angle share one arrow."""
 
+LONGEST_NAME = 40
+"""Characters of a name that fit above a picture."""
+
 
 @style.styled
 def motion_figure(flight: Flight, track: Track) -> Figure:
     """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
+    track = geometry.drawn(flight, track)
     figure = style.sheet(7.4, 4.3)
     body, space = figure.subplots(1, 2)
     pole_curve(body, flight, track)
     axis_track(space, flight, track)
-    style.legend(figure, [body, space], 6)
+    style.legend(figure, [body, space])
     figure.suptitle(title(flight))
     style.settle(figure)
     return figure
@@ -38,11 +42,12 @@ def motion_figure(flight: Flight, track: Track) -> Figure:
 def title(flight: Flight) -> str:
     """What every sheet is headed with."""
     body, count = flight.spacecraft, len(flight.schedule)
-    pulses = "no pulse" if count == 0 else "1 pulse" if count == 1 else f"{count} pulses"
+    name = body.name if len(body.name) <= LONGEST_NAME else f"{body.name[: LONGEST_NAME - 1].rstrip()}…"
     start, left = math.degrees(body.nutation), math.degrees(flight.residual.nutation)
-    kept = f"{left:.3g}°" if left > 1e-6 else "zero"
-    change = f"nutation {start:.3g}°, then {kept}" if count else f"nutation {start:.3g}°"
-    return f"{body.name}: {change}, {pulses}"
+    if not count:
+        return f"{name}: nutation {start:.3g}°, no pulse"
+    kept = f"{left:.3g}°" if left > 1e-6 else "0°"
+    return f"{name}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
 
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
@@ -52,15 +57,13 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     size = float(np.hypot(*rates.T).max())
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
-    _path(axes, flight, track, rates, "ω in the body")
+    _path(axes, flight, track, rates)
     named = _directions(axes, flight, size)
-    style.square(axes, rates, margin=0.42 if named else 0.12, centre=True)
-    aligned = flight.spacecraft.inertia.aligned
-    axes.set(
-        xlabel="ω1, deg/s",
-        ylabel="ω2, deg/s",
-        title="Pole curve in the body" + ("" if aligned else " (principal axes)"),
-    )
+    style.square(axes, rates, margin=0.45 if named else 0.12, centre=True)
+    body = flight.spacecraft
+    told = "" if body.inertia.aligned else ", principal axes"
+    told += ", spin about −3" if body.spin < 0.0 else ""
+    axes.set(xlabel=f"ω1, deg/s{told}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
 
 
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
@@ -70,43 +73,50 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     path, momentum = geometry.on_sky(plane, track.axis), geometry.on_sky(plane, track.momentum)
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
-    _path(axes, flight, track, path, "spin axis")
+    _path(axes, flight, track, path)
     axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
-    before, after = (geometry.on_sky(plane, state.momentum) for state in flight.around_pulses())
-    stations = np.vstack([momentum[:1], after])
-    axes.plot(
-        *stations.T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H", linestyle=(0, (3, 1.5)),
-        linewidth=0.0,
-    )  # fmt: skip
-    for start, end in zip(before, after, strict=True):
-        if np.hypot(*(end - start)) > 0.08 * np.ptp(path, axis=0).max():
-            style.heads(axes, np.array([start, 0.5 * (start + end)]), [1], MOMENTUM)
+    stations = [momentum[:1]]
+    for stretch in geometry.stretches(flight, track):
+        if stretch.pulse is not None:
+            moved = _refined(momentum[stretch.first : stretch.last + 1])
+            stations.append(moved[-1:])
+            if np.hypot(*(moved[-1] - moved[0])) > 0.08 * np.ptp(path, axis=0).max():
+                style.heads(axes, moved, _halfway(moved), MOMENTUM)
+    axes.plot(*np.vstack(stations).T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
     x, y = geometry.sky_names(flight)
     style.square(axes, np.vstack([path, momentum]), margin=0.14)
-    axes.set(xlabel=x, ylabel=y, title="Axis track in space")
+    axes.set(xlabel=x, ylabel=y, title="Axis track: spin axis in space")
 
 
-def _path(axes: Axes, flight: Flight, track: Track, points: Vector, name: str) -> None:
+def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     """A path (n, 2) with its beginning, its sense, and its pulses: numbered where there is room."""
-    first: int | None = None
-    numbered = style.thinned(len(flight.schedule))
+    coasts, firings = [], []
+    width = float(np.ptp(points, axis=0).max())
+    numbered = style.thinned(len(flight.schedule), 16)
     for stretch in geometry.stretches(flight, track):
         rows = points[stretch.first : stretch.last + 1]
         if stretch.pulse is None:
-            axes.plot(*rows.T, color=MOTION, label=name if first is None else None)
-            first = stretch.first if first is None else first
+            coasts.append(rows)
             style.heads(axes, rows, _halfway(rows), MOTION)
             continue
-        axes.plot(*rows.T, color=PULSE, linewidth=2.2, label="pulse" if stretch.pulse == 0 else None)
-        way = rows[-1] - rows[0]
-        if np.hypot(*way) > 0.03 * np.ptp(points, axis=0).max():
-            style.arrow(axes, rows[-1] - 0.02 * way if len(rows) < 3 else rows[-2], rows[-1], PULSE, width=1.0)
-        axes.plot(*rows[0], ".", color=PULSE, markersize=5)
+        firings.append(rows)
+        fine = _refined(rows)
+        if np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
+            style.heads(axes, fine, [len(fine) - 1], PULSE)
         if stretch.pulse in numbered:
-            style.label(axes, str(stretch.pulse + 1), 0.5 * (rows[0] + rows[-1]), PULSE)
-    axes.plot(*points[0], "o", color=MOTION, markersize=4.5, label="t = 0")
+            style.label(axes, str(stretch.pulse + 1), fine[len(fine) // 2], PULSE)
+    axes.plot(*style.joined(coasts).T, color=MOTION, label="path")
+    if firings:
+        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=2.2, label="pulse")
+        axes.plot(*np.array([rows[0] for rows in firings]).T, ".", color=PULSE, markersize=5)
+    axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
-    style.label(axes, "t = 0", points[0], INK, vital=True)
+    style.label(axes, "t = 0", points[0], INK, role="vital")
+
+
+def _refined(rows: Vector) -> Vector:
+    """A path of some rows at least: an impulse has only its two ends."""
+    return rows if len(rows) > 2 else np.linspace(rows[0], rows[-1], 21)
 
 
 def _halfway(rows: Vector) -> list[int]:
@@ -132,13 +142,13 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
             group.append(channel)
     for group in groups:
         torque = group[0].transverse / abs(group[0].transverse)
-        way = np.array([torque.real, torque.imag]) * (size if size > 1e-6 else 1.0 / 1.42)
-        style.arrow(axes, 1.08 * way, 1.22 * way, GREY, width=1.2)
+        way = np.array([torque.real, torque.imag]) * (size if size > 1e-6 else 0.7)
+        axes.plot(*np.outer(way, [1.1, 1.28]), color=GREY, linewidth=1.2)
+        style.heads(axes, np.outer([1.1, 1.3], way), [1], GREY)
         names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
-        at = 1.31 * way
-        axes.annotate(names, (at[0], at[1]), color=INK, fontsize=style.SMALL, ha="center", va="center")
+        style.label(axes, names, 1.2 * way, INK, role="vital")
     if groups:
-        axes.plot([], [], color=GREY, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque of a channel")
+        axes.plot([], [], color=GREY, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
     return bool(groups)
 
 

@@ -30,7 +30,7 @@ ASIDE = math.radians(65.0)
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
-STEPS = (1.0, 2.0, 5.0)
+STEPS = (1.0, 2.0, 3.0, 5.0)
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,12 @@ def magnification(widest: float) -> float:
 @style.styled
 def sphere_figure(flight: Flight, track: Track) -> Figure:
     """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
+    track = geometry.drawn(flight, track)
     figure = style.sheet(7.4, 4.3)
     space, plan = figure.subplots(1, 2)
     sphere(space, flight, track)
     along_momentum(plan, flight, track)
-    style.legend(figure, [space, plan], 6)
+    style.legend(figure, [space, plan])
     figure.suptitle(title(flight))
     style.settle(figure)
     return figure

@@ -14,8 +14,9 @@ from nutdamp.spacecraft import Vector
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
 
 # Okabe & Ito's palette, told apart by colour-blind readers and, with the line styles, in grey print
 # (jfly.uni-koeln.de/color).
@@ -55,6 +56,7 @@ _SETTINGS: dict[str, Any] = {
     "lines.linewidth": LINE,
     "lines.solid_capstyle": "round",
     "text.color": INK,
+    "text.parse_math": False,  # names may hold a dollar sign
     "xtick.color": INK,
     "ytick.color": INK,
     "xtick.labelsize": 8,
@@ -110,10 +112,10 @@ def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
     """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
     for row in places:
         if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
-            arrow(axes, path[row - 1], path[row], colour, width=0.0, head=8.0)
+            arrow(axes, path[row - 1], path[row], colour, width=0.0, head=9.0)
 
 
-def square(axes: Axes, points: Vector, *, margin: float = 0.1, least: float = 1e-6, centre: bool = False) -> None:
+def square(axes: Axes, points: Vector, *, margin: float = 0.1, least: float = 1e-9, centre: bool = False) -> None:
     """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = np.zeros(2) if centre else 0.5 * (low + high)
@@ -126,8 +128,12 @@ def square(axes: Axes, points: Vector, *, margin: float = 0.1, least: float = 1e
     axes.grid()
 
 
-def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, vital: bool = False) -> None:
-    """A label near a point, moved or left out by `settle`; what is ``vital`` stays."""
+def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str = "label") -> None:
+    """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
+
+    ``label`` goes anywhere around its point and may be left out, as may ``above``, which stays above it; ``number``
+    stays where it is put, along the edge of a panel; ``vital`` is never left out.
+    """
     note = axes.annotate(
         text,
         (float(place[0]), float(place[1])),
@@ -136,45 +142,60 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, vital: boo
         color=colour,
         fontsize=SMALL,
         ha="center",
-        va="center",
+        va="bottom" if role in ("above", "number") else "center_baseline",
+        annotation_clip=False,
     )
-    note.set_gid("vital" if vital else "label")
+    note.set_gid(role)
 
 
-_AROUND = [(8.0 * step * x, 7.0 * step * y) for step in (1.0, 1.5, 2.1) for x, y in (
-    (1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.3), (0, -1.3))]  # fmt: skip
+_AROUND = [
+    (step * x, step * y)
+    for step in (7.0, 11.0, 16.0)
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1), (1.3, 0), (-1.3, 0), (0, 1.3), (0, -1.3))
+]
+_OFFSETS = {
+    "vital": _AROUND,
+    "label": _AROUND[:16],
+    "above": [(0.0, 2.5), (3.0, 2.5), (-3.0, 2.5)],
+    "number": [(0.0, 3.0)],
+}
+_COVERED = {"vital": np.inf, "label": 12.0, "above": 2.0, "number": np.inf}
+"""Points of curves, 4 pixels apart, that a label may cover."""
 
 
 def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
     figure.draw_without_rendering()
+    order = list(_OFFSETS)
     for axes in figure.axes:
-        notes = [note for note in axes.texts if note.get_gid() in ("label", "vital")]
-        if not notes:
-            continue
-        window = axes.get_window_extent()
-        taken: list[Any] = [
-            other.get_window_extent() for other in axes.texts if other not in notes and other.get_text()
-        ]
-        curves = _inked(axes)
-        for note in sorted(notes, key=lambda one: one.get_gid() != "vital"):
-            _settle(note, taken, curves, window)  # type: ignore[arg-type]
+        notes: list[Any] = sorted(
+            (note for note in axes.texts if note.get_gid() in order), key=lambda note: order.index(str(note.get_gid()))
+        )
+        curves = _inked(axes) if notes else np.empty((0, 2))
+        taken: list[Bbox] = []
+        for note in notes:
+            _settle(note, taken, curves, axes)
 
 
-def _settle(note: Annotation, taken: list[Any], curves: Vector, window: Any) -> None:
+def _settle(note: Annotation, taken: list[Bbox], curves: Vector, axes: Axes) -> None:
+    role, window = str(note.get_gid()), axes.get_window_extent()
+    points = axes.get_figure(root=True).dpi / 72.0  # type: ignore[union-attr]
+    here = note.get_window_extent().padded(1.5 * points)
     best, least = None, np.inf
-    for offset in _AROUND:
-        wide = offset[0] * (1.0 + 0.22 * max(len(note.get_text()) - 2, 0))
-        note.set_position((wide, offset[1]))
-        box = note.get_window_extent().padded(2.0)
-        if any(box.overlaps(other) for other in taken):
-            continue
-        if box.x0 < window.x0 or box.x1 > window.x1 or box.y0 < window.y0 or box.y1 > window.y1:
-            continue
+    for x, y in _OFFSETS[role]:
+        # Sideways offsets are counted from the edge of the text, so that long names stand as near as short ones.
+        offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
+        box = here.translated(offset[0] * points, offset[1] * points)
         inside = (curves[:, 0] > box.x0) & (curves[:, 0] < box.x1) & (curves[:, 1] > box.y0) & (curves[:, 1] < box.y1)
-        covered = float(np.count_nonzero(inside)) + 0.3 * float(np.hypot(*offset)) / 8.0
-        if covered < least:
-            best, least = (note.get_position(), box), covered
+        covered = float(np.count_nonzero(inside)) + 0.04 * float(np.hypot(x, y))
+        out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
+        out = 0.0 if role == "number" else out
+        if out > 0.0 or any(box.overlaps(other) for other in taken):
+            if role != "vital":
+                continue
+            covered += 1e3 * (1.0 + out)
+        if covered < min(least, _COVERED[role]):
+            best, least = (offset, box), covered
     if best is None:
         note.set_visible(False)
         return
@@ -182,13 +203,20 @@ def _settle(note: Annotation, taken: list[Any], curves: Vector, window: Any) -> 
     taken.append(best[1])
 
 
+def joined(pieces: Sequence[Vector]) -> Vector:
+    """Paths (n, 2) as one, with a gap between them."""
+    gap = np.full((1, 2), np.nan)
+    parts = [part for piece in pieces for part in (piece, gap)]
+    return np.concatenate(parts[:-1]) if parts else np.empty((0, 2))
+
+
 def _inked(axes: Axes) -> Vector:
-    """Points of all curves in pixels, close enough together that none passes a label unseen."""
+    """Points of all curves and bars in pixels, close enough together that none passes a label unseen."""
     points = [np.empty((0, 2))]
-    for line in axes.lines:
-        if line.get_transform() != axes.transData:
-            continue
-        path = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()]))
+    outlines = [np.asarray(line.get_transform().transform(line.get_xydata())) for line in axes.lines]
+    for bars in axes.collections:
+        outlines += [np.asarray(bars.get_transform().transform(path.vertices)) for path in bars.get_paths()]
+    for path in outlines:
         path = path[np.isfinite(path).all(axis=1)]
         if len(path) > 1:
             steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
@@ -197,7 +225,7 @@ def _inked(axes: Axes) -> Vector:
     return np.concatenate(points)
 
 
-def legend(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
+def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -> None:
     """One legend under all panels, each name once, where no curve can run into it."""
     found: dict[str, Artist] = {}
     for one in axes:
@@ -205,15 +233,11 @@ def legend(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
             found.setdefault(name, handle)
     if found:
         figure.legend(
-            list(found.values()),
-            list(found),
-            loc="outside lower center",
-            ncols=columns,
-            handlelength=2.2,
-            borderpad=0.2,
-        )
+            list(found.values()), list(found), loc="outside lower center", ncols=columns, handlelength=2.2,
+            borderpad=0.2, columnspacing=1.4,
+        )  # fmt: skip
 
 
-def thinned(count: int, most: int = 30) -> range:
-    """Which of ``count`` numbered things to label."""
+def thinned(count: int, most: int = 60) -> range:
+    """Which of ``count`` numbered things to try a label for; those that find no room are left out by `settle`."""
     return range(0, count, max(1, -(-count // most)))
