@@ -124,7 +124,7 @@ def _schedule(chosen: Plan) -> Section:
 def _budget(chosen: Plan) -> Section:
     verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen))
     agree = "agree" if verified.agree else "DO NOT AGREE"
-    missing = tuple((method.name, method.missing) for method in verified.methods if method.missing)
+    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     blocks: list[Block] = [
         sheet_of("What each imperfection alone leaves, everything else ideal", budget_table(verified)),
         sheet_of("The schedule flown by independent means", methods_table(verified)),

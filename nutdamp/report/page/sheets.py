@@ -79,7 +79,7 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         columns.append((Column("spin change", "rad/s"), lambda plan: _number(plan.spin_change)))
     if any(plan.delta_v is not None for plan in compared.plans):
         columns.append(
-            (Column("|ΔV|", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
+            (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
         )
     if compared.spacecraft.requirement is not None:
         columns.append((Column("requirement", number=False), lambda plan: VERDICT[plan.meets_requirement]))
