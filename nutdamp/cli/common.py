@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 DEFAULT_FILE = "spacecraft.yaml"
 
+FIGURES = ("overview", "motion", "sphere", "history", "timeline")
+"""Pictures that ``--plot`` can draw, the default first."""
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 spacecraft_argument = click.argument("spacecraft", required=False, metavar="[SPACECRAFT]")
@@ -73,6 +76,25 @@ def scheme_options(command: Command) -> Command:
     ):
         wrapped = option(wrapped)
     return cast(Command, wrapped)
+
+
+def plot_options(command: Command) -> Command:
+    """``--plot FILE`` and which picture it is to be."""
+    for option in (
+        click.option(
+            "--figure", type=click.Choice(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."
+        ),
+        click.option("--plot", metavar="FILE", help="Draw the motion (.png, .svg, .pdf; needs the extra plot)."),
+    ):
+        command = option(command)
+    return command
+
+
+def expect_picture(path: str) -> None:
+    """Say at once, not after the work, that a picture cannot be made."""
+    from nutdamp.report import figures
+
+    figures.ending(path)
 
 
 def load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:

@@ -8,8 +8,10 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
+    expect_picture,
     load,
     one_stdout,
+    plot_options,
     quiet_option,
     remarks,
     scheme_options,
@@ -26,6 +28,7 @@ from nutdamp.schemes import CLASSIC, PLANNED, Options
 @scheme_options
 @click.option("--csv", metavar="FILE", help="Write the pulses of the recommended plan, or the one named.")
 @click.option("--json", metavar="FILE", help="Write all plans with their residuals.")
+@plot_options
 @quiet_option
 def command(
     spacecraft: str | None,
@@ -33,6 +36,8 @@ def command(
     options: Options,
     csv: str | None,
     json: str | None,
+    plot: str | None,
+    figure: str,
     quiet: bool,
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
@@ -41,9 +46,12 @@ def command(
     standard output.
     """
     names = tuple(dict.fromkeys(names))
-    if csv is not None and len(names) > 1:
-        raise click.UsageError("--csv writes one schedule: name one --scheme, or none for the recommended one")
-    silent = one_stdout(csv=csv, json=json)
+    for option, path in (("--csv", csv), ("--plot", plot)):
+        if path is not None and len(names) > 1:
+            raise click.UsageError(f"{option} shows one schedule: name one --scheme, or none for the recommended one")
+    silent = one_stdout(csv=csv, json=json, plot=plot)
+    if plot is not None:
+        expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark)
 
@@ -61,8 +69,13 @@ def command(
         from nutdamp.files.pulses_csv import pulses_csv
 
         outputs.append((csv, pulses_csv(chosen.flight)))
-    elif csv is not None:
-        click.echo(f"{csv} was not written: no plan is feasible", err=True)
+    if plot is not None and chosen is not None:
+        from nutdamp.report import figures
+
+        outputs.append((plot, figures.plan_picture(figure, chosen, plot)))
+    for path in (csv, plot):
+        if path is not None and chosen is None:
+            click.echo(f"{path} was not written: no plan is feasible", err=True)
     write_all(outputs)
     if not silent:
         from nutdamp.report.plan_tables import comparison_screen

@@ -6,9 +6,11 @@ import click
 
 from nutdamp.cli.common import (
     Quantity,
+    expect_picture,
     load,
     one_stdout,
     plan_or_read,
+    plot_options,
     quiet_option,
     remarks,
     scheme_options,
@@ -31,7 +33,8 @@ from nutdamp.schemes import NAMES, Options
 )
 @click.option("--csv", metavar="FILE", help="Write the track.")
 @click.option("--json", metavar="FILE", help="Write pulses, residuals and extremes.")
-@click.option("--plot", metavar="FILE", help="Draw pole curve and axis track (.png, .svg, .pdf; needs the extra plot).")
+@plot_options
+@click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option
 def command(
     spacecraft: str | None,
@@ -44,6 +47,8 @@ def command(
     csv: str | None,
     json: str | None,
     plot: str | None,
+    figure: str,
+    drawn: bool,
     quiet: bool,
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, the residuals and the axis track.
@@ -56,6 +61,10 @@ def command(
     if until is not None and until <= 0.0:
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
     silent = one_stdout(csv=csv, json=json, plot=plot)
+    if drawn and silent:
+        raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
+    if plot is not None:
+        expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark)
 
@@ -81,10 +90,14 @@ def command(
     if plot is not None:
         from nutdamp.report import figures
 
-        outputs.append((plot, figures.rendered(figures.overview_figure(chosen, track), plot)))
+        outputs.append((plot, figures.picture(figure, chosen, track, plot)))
     write_all(outputs)
     if not silent:
         from nutdamp.report.simulate_tables import simulation_screen
 
         how = "real pulse widths" if real else "impulse sum (17)"
         show(simulation_screen(chosen, track, residual, flown, how=f"{plan.scheme}, propagated by the {how}"))
+    if drawn:
+        from nutdamp.report.terminal import motion_drawing
+
+        show(motion_drawing(chosen, track))

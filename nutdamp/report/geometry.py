@@ -22,6 +22,9 @@ MOST_ROWS = 30_000
 RIM = 121
 """Points around the rim of a cone."""
 
+LEAST = 1e-9
+"""Degrees or deg/s below which a motion is drawn as a point."""
+
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not told from its axis."""
 
@@ -94,6 +97,25 @@ def on_sky(plane: Vector, directions: Vector) -> Vector:
     return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
 
 
+def pole_path(track: Track) -> Vector:
+    """(n, 2): ω1 and ω2 in deg/s, the pole curve (Magnus 1970 fig. 5)."""
+    return np.asarray(np.degrees(track.rates[:, :2]), dtype=np.float64)
+
+
+def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
+    """(n, 2) each: spin axis and H as angles from H(0) in degrees (Magnus 1970 fig. 6-8)."""
+    plane = sky_plane(flight, track.momentum[0])
+    return on_sky(plane, track.axis), on_sky(plane, track.momentum)
+
+
+def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
+    """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.zeros(2) if centre else 0.5 * (low + high)
+    half = (1.0 + margin) * float(np.abs(points - middle).max())
+    return middle, half if half > LEAST else 1.0
+
+
 class Cones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
@@ -131,6 +153,16 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
     return Cones(
         axis, direction, rotation, attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
     )
+
+
+def body_mark(found: Cones, quaternion: Vector) -> Vector:
+    """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
+    if not len(found.body):
+        return np.full(3, np.nan)
+    in_body = attitude.rotate(quaternion * np.array([1.0, -1.0, -1.0, -1.0]), found.body)
+    azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
+    order = np.argsort(azimuth)
+    return np.array([np.interp(0.0, azimuth[order], found.body[order, part]) for part in range(3)])
 
 
 def around(axis: Vector, start: Vector) -> Vector:

@@ -25,11 +25,15 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def ending(path: str, option: str = "--plot") -> str:
-    """The format of a picture by the ending of its file, png for standard output; raises BadRequest for others."""
+def ending(path: str) -> str:
+    """The format of a picture by the ending of its file, png for standard output.
+
+    Raises BadRequest for other endings, MissingExtra without matplotlib.
+    """
     found = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
     if found not in FORMATS:
-        raise BadRequest(f"{option} {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
     return found
 
 
@@ -58,5 +62,8 @@ def svg(figure: Figure) -> str:
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
     ours = '<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt" '
     text = text.replace("<svg ", ours, 1).replace(INK, "currentColor")
+    # Roles of labels end up as ids, several times over: only ids that something refers to stay.
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+    text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)
     mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)

@@ -41,19 +41,24 @@ def motion_figure(flight: Flight, track: Track) -> Figure:
 
 def title(flight: Flight) -> str:
     """What every sheet is headed with."""
-    body, count = flight.spacecraft, len(flight.schedule)
-    name = body.name if len(body.name) <= LONGEST_NAME else f"{body.name[: LONGEST_NAME - 1].rstrip()}…"
-    start, left = math.degrees(body.nutation), math.degrees(flight.residual.nutation)
+    count = len(flight.schedule)
+    start, left = math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
     if not count:
-        return f"{name}: nutation {start:.3g}°, no pulse"
+        return f"{short_name(flight)}: nutation {start:.3g}°, no pulse"
     kept = f"{left:.3g}°" if left > 1e-6 else "0°"
-    return f"{name}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
+    return f"{short_name(flight)}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
+
+
+def short_name(flight: Flight) -> str:
+    """The name of the spacecraft, cut where it is too long for a heading."""
+    name = flight.spacecraft.name
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), pulses and channels marked."""
     track = geometry.drawn(flight, track)
-    rates = np.degrees(track.rates[:, :2])
+    rates = geometry.pole_path(track)
     size = float(np.hypot(*rates.T).max())
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
@@ -69,8 +74,7 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8)."""
     track = geometry.drawn(flight, track)
-    plane = geometry.sky_plane(flight, track.momentum[0])
-    path, momentum = geometry.on_sky(plane, track.axis), geometry.on_sky(plane, track.momentum)
+    path, momentum = geometry.sky_paths(flight, track)
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
     _path(axes, flight, track, path)
@@ -142,7 +146,7 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
             group.append(channel)
     for group in groups:
         torque = group[0].transverse / abs(group[0].transverse)
-        way = np.array([torque.real, torque.imag]) * (size if size > 1e-6 else 0.7)
+        way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
         axes.plot(*np.outer(way, [1.1, 1.28]), color=GREY, linewidth=1.2)
         style.heads(axes, np.outer([1.1, 1.3], way), [1], GREY)
         names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")

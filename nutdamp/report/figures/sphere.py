@@ -30,6 +30,9 @@ ASIDE = math.radians(65.0)
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
+MARKS = "+os"
+"""Of H, ω and the spin axis in the plane picture."""
+
 STEPS = (1.0, 2.0, 3.0, 5.0)
 
 
@@ -90,63 +93,70 @@ def sphere_figure(flight: Flight, track: Track) -> Figure:
 def sphere(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 and the path of the spin axis, seen from outside."""
     track = geometry.drawn(flight, track)
-    looked = view(flight, track)
-    draw_ground(axes, looked, flight, track)
-    draw_cones(axes, looked, geometry.cones(flight, track.rates[0], track.quaternion[0]))
+    looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_ground(axes, looked, track)
+    draw_path(axes, looked, flight, track)
+    draw_cones(axes, looked, found)
+    for direction, colour, name in _directions(found):
+        style.label(axes, name, looked.seen(direction)[0][0], colour)
+    name_cones(axes)
+    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum]))
     much = looked.magnified
     axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
 
 
-def draw_ground(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
-    """Sphere, path of the spin axis and of H; and room for them."""
-    corners = [np.array([[0.0, 0.0]])]
+def draw_ground(axes: Axes, looked: View, track: Track) -> None:
+    """The sphere, where nothing is magnified, and the path of H."""
     if looked.magnified == 1.0:
         turn = np.linspace(0.0, 2 * math.pi, 181)
-        outline = np.column_stack([np.cos(turn), np.sin(turn)])
-        axes.plot(*outline.T, color=GREY, linewidth=0.7)
+        axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.7)
         for height in (0.0, 0.5, math.sqrt(0.75)):
             radius = math.sqrt(1.0 - height * height)
             ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
             _hidden_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
-        corners.append(outline)
-    path, _ = looked.seen(track.axis)
-    corners.append(path)
+    momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
+    axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+
+
+def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
+    """The path of the spin axis, with the firings in it."""
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
-        colour = MOTION if stretch.pulse is None else PULSE
-        _hidden_line(axes, looked, track.axis[rows], colour, 1.0 if stretch.pulse is None else 1.8)
-    size = np.linalg.norm(track.momentum, axis=1, keepdims=True)
-    momentum, _ = looked.seen(track.momentum / size)
-    axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
-    corners += [momentum, *(looked.seen(rim)[0] for rim in _rims(flight, track) if len(rim))]
-    _frame(axes, np.vstack(corners))
-
-
-def _rims(flight: Flight, track: Track) -> tuple[Vector, Vector]:
-    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
-    return found.body, found.space
+        colour, width = (MOTION, 1.0) if stretch.pulse is None else (PULSE, 1.8)
+        _hidden_line(axes, looked, track.axis[rows], colour, width)
 
 
 def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
-    """Space cone, body cone, and the three axes that lie in one plane."""
-    for rim, colour, name in ((found.space, MOMENTUM, "space cone"), (found.body, MOTION, "body cone")):
+    """Space cone, body cone, and the three directions that lie in one plane."""
+    for rim, colour in ((found.space, MOMENTUM), (found.body, MOTION)):
         if len(rim):
-            _cone(axes, looked, rim, colour, name)
-    for direction, colour, name in (
-        (found.momentum, MOMENTUM, "H"),
-        (found.rotation, INK, "ω"),
-        (found.axis, MOTION, "spin axis"),
-    ):
-        tip = looked.seen(direction)[0][0]
-        style.arrow(axes, np.zeros(2), 1.0 * tip, colour, width=1.2)
-        style.label(axes, name, tip, colour if colour != INK else INK)
+            _cone(axes, looked, rim, colour)
+    for direction, colour, _ in _directions(found):
+        style.arrow(axes, np.zeros(2), looked.seen(direction)[0][0], colour, width=1.2)
 
 
-def _cone(axes: Axes, looked: View, rim: Vector, colour: str, name: str) -> None:
+def name_cones(axes: Axes) -> None:
+    """The two cones for the legend."""
+    for colour, name in ((MOMENTUM, "space cone"), (MOTION, "body cone")):
+        axes.fill([], [], facecolor=colour, alpha=0.3, label=name)
+
+
+def name_directions(axes: Axes) -> None:
+    """The marks of `draw_circles` for the legend."""
+    named = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"), ("D", MOTION, "body axis 1"))
+    for mark, colour, name in named:
+        axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
+
+
+def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
+    return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
+
+
+def _cone(axes: Axes, looked: View, rim: Vector, colour: str) -> None:
     """A cone from the centre to its rim: outline filled, rim drawn."""
     points, _ = looked.seen(rim)
     way = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=0.16, edgecolor="none", label=name)
+    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=0.16, edgecolor="none")
     axes.plot(*points.T, color=colour, linewidth=1.0)
     if abs(way[-1] - way[0]) < math.pi:  # the centre is outside the rim: the cone is seen from its side
         for row in (int(np.argmin(way)), int(np.argmax(way))):
@@ -174,10 +184,14 @@ def _hidden_line(axes: Axes, looked: View, directions: Vector, colour: str, widt
         axes.plot(*np.where(front[:, None], np.nan, points).T, color=colour, linewidth=0.7 * width, linestyle=":")
 
 
-def _frame(axes: Axes, points: Vector) -> None:
-    """Equal scales, no ticks: this picture has no axis to read a number from."""
+def frame(axes: Axes, looked: View, directions: Vector) -> None:
+    """Equal scales, and room for the centre and all ``directions`` (n, 3); no ticks: it has no scale to read."""
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    points = np.vstack([[[0.0, 0.0]], looked.seen(unit)[0]])
+    if looked.magnified == 1.0:
+        points = np.vstack([points, [[-1.0, -1.0], [1.0, 1.0]]])
     low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = 0.5 * (low + high), 0.57 * float((high - low).max())
+    middle, half = 0.5 * (low + high), 0.56 * float((high - low).max())
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_aspect("equal", adjustable="box")
@@ -187,23 +201,25 @@ def _frame(axes: Axes, points: Vector) -> None:
 def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 seen along H(0), true to scale along every radius."""
     plane = geometry.sky_plane(flight, track.momentum[0])
-    shown = draw_circles(axes, plane, geometry.cones(flight, track.rates[0], track.quaternion[0]))
-    style.square(axes, shown, margin=0.14)
+    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_circles(axes, plane, found)
+    for direction, colour, name in _directions(found):
+        style.label(axes, name, geometry.on_sky(plane, direction[None])[0], colour)
+    name_cones(axes)
+    shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
+    style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
     x, y = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title="The same, seen along H")
 
 
-def draw_circles(axes: Axes, plane: Vector, found: Cones) -> Vector:
-    """Rims of the cones with their axes and where they touch, on the sky; returns the points drawn (n, 2)."""
-    points = [np.zeros((1, 2))]
-    for rim, colour, name in ((found.space, MOMENTUM, "space cone"), (found.body, MOTION, "body cone")):
+def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
+    """Rims of the cones with their axes and where they touch, on the sky."""
+    for rim, colour in ((found.space, MOMENTUM), (found.body, MOTION)):
         if len(rim):
             ring = geometry.on_sky(plane, rim)
-            axes.fill(*ring.T, facecolor=colour, alpha=0.16, edgecolor=colour, linewidth=1.0, label=name)
-            points.append(ring)
+            axes.fill(*ring.T, facecolor=colour, alpha=0.16, edgecolor="none")
+            axes.plot(*ring.T, color=colour, linewidth=1.0)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8)
-    for place, mark, colour, name in zip(places, "+os", (MOMENTUM, INK, MOTION), ("H", "ω", "spin axis"), strict=True):
-        axes.plot(*place, mark, color=colour, markersize=4.5 if mark != "+" else 8, markeredgewidth=1.4)
-        style.label(axes, name, place, colour)
-    return np.vstack([*points, places])
+    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
+        axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from nutdamp.errors import MissingExtra
+from nutdamp.report.geometry import room
 from nutdamp.spacecraft import Vector
 
 if TYPE_CHECKING:
@@ -64,6 +66,13 @@ _SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "nutdamp",  # the same flight gives the same file
 }
 
+
+def require() -> None:
+    """Raises MissingExtra where matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise MissingExtra("plot", "a picture")
+
+
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
@@ -73,10 +82,9 @@ def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
 
     @wraps(draw)
     def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        try:
-            from matplotlib import style
-        except ImportError as reason:
-            raise MissingExtra("plot", "a picture") from reason
+        require()
+        from matplotlib import style
+
         with style.context(["default", _SETTINGS]):
             return draw(*args, **kwargs)
 
@@ -115,12 +123,9 @@ def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
             arrow(axes, path[row - 1], path[row], colour, width=0.0, head=9.0)
 
 
-def square(axes: Axes, points: Vector, *, margin: float = 0.1, least: float = 1e-9, centre: bool = False) -> None:
+def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
     """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = np.zeros(2) if centre else 0.5 * (low + high)
-    half = (1.0 + margin) * max(float(np.abs(points - middle).max()), 0.0)
-    half = half if half > least else 1.0
+    middle, half = room(points, margin, centre=centre)
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_aspect("equal", adjustable="box")

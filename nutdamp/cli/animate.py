@@ -1,0 +1,77 @@
+"""``nutdamp animate``: the cones rolling on each other, as a film."""
+
+from __future__ import annotations
+
+import click
+
+from nutdamp.cli.common import (
+    Quantity,
+    load,
+    plan_or_read,
+    quiet_option,
+    remarks,
+    scheme_options,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.cli.progress import progress
+from nutdamp.schemes import NAMES, Options
+
+
+@click.command("animate")
+@spacecraft_argument
+@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to show; default the recommended one.")
+@click.option("--schedule", metavar="FILE", help="Show the pulses of a CSV file, as `plan --csv` writes it.")
+@scheme_options
+@click.option(
+    "-o", "--output", metavar="FILE", required=True, help="The film: .gif, or .mp4 where ffmpeg is installed."
+)
+@click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")
+@click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
+@click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
+@click.option(
+    "--width", type=click.IntRange(320, 3840), default=800, show_default=True, help="Width in pixels; height 0.6 of it."
+)
+@quiet_option
+def command(
+    spacecraft: str | None,
+    scheme: str | None,
+    schedule: str | None,
+    options: Options,
+    output: str,
+    until: float | None,
+    seconds: float | None,
+    fps: int,
+    width: int,
+    quiet: bool,
+) -> None:
+    """Film the body cone rolling on the space cone through the pulses, flown with their real widths.
+
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
+    standard output, as GIF.
+    """
+    if scheme is not None and schedule is not None:
+        raise click.UsageError("name what to show: either --scheme or --schedule")
+    if until is not None and until <= 0.0:
+        raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+    from nutdamp.report.figures import animation
+
+    animation.film_format(output)
+    remark = remarks(quiet)
+    body = load(spacecraft, remark)
+    pulses = plan_or_read(body, scheme, schedule, options, remark).pulses
+
+    from nutdamp import flight
+
+    end = pulses.end + body.inertial_period if until is None else until
+    timed = animation.timing(body, end, fps, seconds)
+    if not timed.smooth:
+        remark(
+            f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
+            f"{timed.turns * animation.SMOOTH / fps:.0f} --seconds would show it, or an earlier --until"
+        )
+    with progress("filming", timed.frames, quiet=quiet) as step:
+        content = animation.film(flight.flown(body, pulses, end), timed, output, width, step)
+    write_all([(output, content)])
+    if output != "-":
+        remark(f"wrote {output}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")

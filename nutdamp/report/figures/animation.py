@@ -1,0 +1,229 @@
+"""The motion as a film: the body cone rolls on the space cone, through the pulses."""
+
+from __future__ import annotations
+
+import io
+import math
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import BadRequest, CannotWrite
+from nutdamp.flight import Flight
+from nutdamp.report import geometry
+from nutdamp.report.figures import history, sphere, style
+from nutdamp.report.figures.motion import short_name
+from nutdamp.report.figures.style import INK, MOTION
+from nutdamp.spacecraft import Spacecraft, Vector
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+
+FORMATS = ("gif", "mp4")
+
+INCHES = 8.0
+"""Width of the sheet that fills a frame: pixels only make it finer."""
+
+SMOOTH = 12.0
+"""Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see it backwards."""
+
+SHORTEST, LONGEST = 6.0, 30.0
+"""Seconds of a film whose length is not given."""
+
+MARKED = math.radians(60.0)
+"""Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
+
+HELD = 0.4
+"""Seconds of film that a firing stays announced, however short it is."""
+
+
+def film_format(path: str) -> str:
+    """The format of a film by the ending of its file, gif for standard output.
+
+    Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
+    """
+    found = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if found not in FORMATS:
+        raise BadRequest(f"--output {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
+    if found == "mp4" and shutil.which("ffmpeg") is None:
+        raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
+    return found
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How ``until`` s of motion become ``frames`` pictures at ``fps`` a second."""
+
+    until: float
+    frames: int
+    fps: int
+    turns: float
+
+    @property
+    def times(self) -> Vector:
+        """Moment of each frame, s."""
+        return np.linspace(0.0, self.until, self.frames)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the eye can follow the nutation."""
+        return self.frames >= 0.5 * SMOOTH * self.turns
+
+    @property
+    def pace(self) -> float:
+        """Seconds of motion in a second of film."""
+        return self.until * self.fps / self.frames
+
+
+def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None) -> Timing:
+    """Frames for ``until`` s of motion; without ``seconds`` as many as the nutation needs to be followed."""
+    turns = float(until / spacecraft.inertial_period)
+    if seconds is None:
+        seconds = min(max(turns * SMOOTH / fps, SHORTEST), LONGEST)
+    return Timing(float(until), max(round(seconds * fps), 2), fps, turns)
+
+
+@style.styled
+def film(
+    flight: Flight, timed: Timing, path: str, width: int = 800, progress: Callable[[int], object] = lambda _: None
+) -> bytes:
+    """The film as the content of a file of ``width`` pixels; ``progress`` is told how many frames are done.
+
+    Raises as `film_format`.
+    """
+    kind = film_format(path)
+    scene = Scene(flight, timed, width)
+    return (_gif if kind == "gif" else _mp4)(scene, timed, progress)
+
+
+def _gif(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> bytes:
+    """One palette for all frames: the colours are few, and what stands still stays the same to the pixel."""
+    from PIL import Image
+
+    pictures: list[Image.Image] = []
+    for number in range(timed.frames):
+        scene.show(number)
+        picture = Image.fromarray(scene.pixels())
+        pictures.append(
+            picture.quantize(palette=pictures[0], dither=Image.Dither.NONE) if pictures else picture.quantize(96)
+        )
+        progress(number + 1)
+    stream = io.BytesIO()
+    # GIF counts in hundredths of a second.
+    pictures[0].save(
+        stream, "GIF", save_all=True, append_images=pictures[1:], duration=10 * round(100 / timed.fps), loop=0
+    )
+    return stream.getvalue()
+
+
+def _mp4(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> bytes:
+    """H.264 as browsers play it."""
+    from matplotlib.animation import FFMpegWriter
+
+    writer = FFMpegWriter(fps=timed.fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "film.mp4"
+        try:
+            with writer.saving(scene.figure, str(target), scene.figure.dpi):
+                for number in range(timed.frames):
+                    scene.show(number)
+                    writer.grab_frame()
+                    progress(number + 1)
+        except subprocess.CalledProcessError as reason:
+            raise CannotWrite("mp4", f"ffmpeg failed with status {reason.returncode}") from reason
+        return target.read_bytes()
+
+
+class Scene:
+    """The figure of the film, and what changes from frame to frame."""
+
+    def __init__(self, flight: Flight, timed: Timing, width: int) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        self.flight, self.timed = flight, timed
+        track = flight.track(timed.frames, timed.until)
+        rows = np.searchsorted(track.t, timed.times, side="right") - 1
+        self.quaternions = track.quaternion[rows]
+        self.cones = [geometry.cones(flight, track.rates[row], track.quaternion[row]) for row in rows]
+        # Even numbers of pixels: video is coded in blocks.
+        self.figure = style.sheet(INCHES, 0.6 * INCHES)
+        self.figure.set_dpi(width // 2 * 2 / INCHES)
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.path = geometry.drawn(flight, track)
+        self.plane = geometry.sky_plane(flight, track.momentum[0])
+        self.looked = sphere.view(flight, self.path)
+        self._changing: list[Artist] = []
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        """Everything that stands still, and room for what moves."""
+        figure, flight = self.figure, self.flight
+        grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
+        self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
+        self.strip = figure.add_subplot(grid[1, :])
+        rims = np.vstack(
+            [rim for one in self.cones for rim in (one.body, one.space, one.axis[None], one.rotation[None])]
+        )
+        sphere.draw_ground(self.space, self.looked, self.path)
+        sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
+        much = self.looked.magnified
+        self.space.set_title("Cones" + (f" (angles × {much:g})" if much != 1.0 else ""))
+        shown = geometry.on_sky(self.plane, np.vstack([rims, self.path.axis]))
+        style.square(self.sky, shown, margin=0.06)
+        x, y = geometry.sky_names(flight)
+        self.sky.set(xlabel=x, ylabel=y, title="Seen along H(0)")
+        history.cone_history(self.strip, flight, self.path)
+        self.strip.set(xlabel="time, s", ylabel="deg")
+        sphere.name_directions(self.sky)
+        style.legend(figure, [self.sky, self.strip], 5)
+        figure.suptitle(" ")
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # from now on nothing may move but the motion
+
+    def show(self, number: int) -> None:
+        """Frame ``number``, from 0."""
+        for artist in self._changing:
+            artist.remove()
+        now, found = float(self.timed.times[number]), self.cones[number]
+        kept = [set(axes.get_children()) for axes in self.figure.axes]
+        sphere.draw_cones(self.space, self.looked, found)
+        sphere.draw_circles(self.sky, self.plane, found)
+        if self.timed.until * abs(self.flight.spacecraft.spin) < MARKED * self.timed.frames:
+            mark = geometry.body_mark(found, self.quaternions[number])[None]
+            self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)
+            self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
+        done = self.path.t <= now
+        self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
+        self.strip.axvline(now, color=INK, linewidth=1.2)
+        self._changing = [
+            artist
+            for axes, before in zip(self.figure.axes, kept, strict=True)
+            for artist in axes.get_children()
+            if artist not in before
+        ]
+        self.figure.suptitle(f"{self._caption(now)}")
+
+    def _caption(self, now: float) -> str:
+        firing = [
+            f"   firing {number}: {pulse.channel}"
+            for number, pulse in enumerate(self.flight.schedule, start=1)
+            if pulse.start <= now <= pulse.end + HELD * self.timed.pace
+        ]
+        return f"{short_name(self.flight)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
+
+    @property
+    def _digits(self) -> int:
+        return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The frame as it stands, (height, width, 3)."""
+        self.canvas.draw()  # type: ignore[no-untyped-call]
+        return np.asarray(self.canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
