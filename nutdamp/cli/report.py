@@ -9,6 +9,7 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import quiet_option, remarks, scheme_options, source, spacecraft_argument, write_all
+from nutdamp.cli.progress import progress
 from nutdamp.schemes import CLASSIC, PLANNED, Options
 
 
@@ -47,10 +48,14 @@ def command(
     from nutdamp.planning import compare
     from nutdamp.report.page.content import Repeat, report_page
 
-    compared = compare(read_spacecraft(text, name), tuple(dict.fromkeys(names)) or CLASSIC, options)
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
-    page = report_page(compared, repeat, pictured=form.pictured)
-    write_all([(output, form.write(page, output))])
+    with progress("reporting", 3, quiet=quiet) as done:
+        compared = compare(read_spacecraft(text, name), tuple(dict.fromkeys(names)) or CLASSIC, options)
+        done(1)
+        page = report_page(compared, repeat, pictured=form.pictured)
+        done(2)
+        content = form.write(page, output)
+    write_all([(output, content)])
     if output != "-":
         remark(f"wrote {output}")
     if compared.recommended is None:

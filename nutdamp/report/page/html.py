@@ -31,17 +31,20 @@ def page_html(page: Page) -> str:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     figures = "".join(map(_figure, page.figures))
     links = "".join(f'<li><a href="#{section.name}">{escape(section.title)}</a></li>' for section in page.sections)
-    return Template(_part("page.html")).substitute(
-        title=escape(page.title),
-        verdict=escape(page.verdict),
-        verdict_class="good" if page.good else "bad",
-        figures=f'<dl class="figures">{figures}</dl>' if figures else "",
-        links=links,
-        sections="\n".join(map(_section, page.sections)),
-        made_by=escape(page.made_by),
-        style=_part("page.css"),
-        script=script,
-        script_digest=digest,
+    return (
+        Template(_part("page.html")).substitute(
+            title=escape(page.title),
+            verdict=escape(page.verdict),
+            verdict_class="good" if page.good else "bad",
+            figures=f'<dl class="figures">{figures}</dl>' if figures else "",
+            links=links,
+            sections="\n".join(map(_section, page.sections)),
+            made_by=escape(page.made_by),
+            style=_part("page.css"),
+            script=script,
+            script_digest=digest,
+        )
+        + "\n"
     )
 
 
