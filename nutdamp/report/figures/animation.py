@@ -151,6 +151,7 @@ class Scene:
         self.flight, self.timed = flight, timed
         track = flight.track(timed.frames, timed.until)
         rows = np.searchsorted(track.t, timed.times, side="right") - 1
+        rows[0] = 0  # before what is fired at once
         self.quaternions = track.quaternion[rows]
         self.cones = [geometry.cones(flight, track.rates[row], track.quaternion[row]) for row in rows]
         # Even numbers of pixels: video is coded in blocks.
@@ -194,13 +195,14 @@ class Scene:
             artist.remove()
         now, found = float(self.timed.times[number]), self.cones[number]
         kept = [set(axes.get_children()) for axes in self.figure.axes]
+        done = self.path.t <= now
         sphere.draw_cones(self.space, self.looked, found)
+        sphere.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
         sphere.draw_circles(self.sky, self.plane, found)
         if self.timed.until * abs(self.flight.spacecraft.spin) < MARKED * self.timed.frames:
             mark = geometry.body_mark(found, self.quaternions[number])[None]
             self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)
             self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
-        done = self.path.t <= now
         self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
         self.strip.axvline(now, color=INK, linewidth=1.2)
         self._changing = [

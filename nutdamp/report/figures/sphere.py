@@ -30,6 +30,9 @@ ASIDE = math.radians(65.0)
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
+SPACE, BODY = 0.35, 0.15
+"""How dense the cones are filled: told apart in grey print too."""
+
 MARKS = "+os"
 """Of H, ω and the spin axis in the plane picture."""
 
@@ -113,7 +116,7 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
         for height in (0.0, 0.5, math.sqrt(0.75)):
             radius = math.sqrt(1.0 - height * height)
             ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
-            _hidden_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
+            draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
     momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
     axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
 
@@ -123,22 +126,22 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
         colour, width = (MOTION, 1.0) if stretch.pulse is None else (PULSE, 1.8)
-        _hidden_line(axes, looked, track.axis[rows], colour, width)
+        draw_line(axes, looked, track.axis[rows], colour, width)
 
 
 def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
     """Space cone, body cone, and the three directions that lie in one plane."""
-    for rim, colour in ((found.space, MOMENTUM), (found.body, MOTION)):
+    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
         if len(rim):
-            _cone(axes, looked, rim, colour)
+            _cone(axes, looked, rim, colour, alpha)
     for direction, colour, _ in _directions(found):
         style.arrow(axes, np.zeros(2), looked.seen(direction)[0][0], colour, width=1.2)
 
 
 def name_cones(axes: Axes) -> None:
     """The two cones for the legend."""
-    for colour, name in ((MOMENTUM, "space cone"), (MOTION, "body cone")):
-        axes.fill([], [], facecolor=colour, alpha=0.3, label=name)
+    for colour, alpha, name in ((MOMENTUM, SPACE, "space cone"), (MOTION, BODY, "body cone")):
+        axes.fill([], [], facecolor=colour, alpha=alpha, label=name)
 
 
 def name_directions(axes: Axes) -> None:
@@ -152,11 +155,11 @@ def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
     return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
 
 
-def _cone(axes: Axes, looked: View, rim: Vector, colour: str) -> None:
+def _cone(axes: Axes, looked: View, rim: Vector, colour: str, alpha: float) -> None:
     """A cone from the centre to its rim: outline filled, rim drawn."""
     points, _ = looked.seen(rim)
     way = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=0.16, edgecolor="none")
+    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=alpha, edgecolor="none")
     axes.plot(*points.T, color=colour, linewidth=1.0)
     if abs(way[-1] - way[0]) < math.pi:  # the centre is outside the rim: the cone is seen from its side
         for row in (int(np.argmin(way)), int(np.argmax(way))):
@@ -175,7 +178,7 @@ def _outline(points: Vector, way: Vector) -> Vector:
     return np.vstack([[0.0, 0.0], outer, [0.0, 0.0]])
 
 
-def _hidden_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
+def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
     """A line on the sphere: where it runs behind it, dotted, or not at all."""
     points, height = looked.seen(directions)
     front = height >= 0.0 if looked.magnified == 1.0 else np.ones(len(height), dtype=bool)
@@ -214,10 +217,10 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
 
 def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
     """Rims of the cones with their axes and where they touch, on the sky."""
-    for rim, colour in ((found.space, MOMENTUM), (found.body, MOTION)):
+    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
         if len(rim):
             ring = geometry.on_sky(plane, rim)
-            axes.fill(*ring.T, facecolor=colour, alpha=0.16, edgecolor="none")
+            axes.fill(*ring.T, facecolor=colour, alpha=alpha, edgecolor="none")
             axes.plot(*ring.T, color=colour, linewidth=1.0)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8)

@@ -150,7 +150,7 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str 
         va="bottom" if role in ("above", "number") else "center_baseline",
         annotation_clip=False,
     )
-    note.set_gid(role)
+    note.set_label(role)
 
 
 _AROUND = [
@@ -174,7 +174,8 @@ def settle(figure: Figure) -> None:
     order = list(_OFFSETS)
     for axes in figure.axes:
         notes: list[Any] = sorted(
-            (note for note in axes.texts if note.get_gid() in order), key=lambda note: order.index(str(note.get_gid()))
+            (note for note in axes.texts if note.get_label() in order),
+            key=lambda note: order.index(str(note.get_label())),
         )
         curves = _inked(axes) if notes else np.empty((0, 2))
         taken: list[Bbox] = []
@@ -183,7 +184,7 @@ def settle(figure: Figure) -> None:
 
 
 def _settle(note: Annotation, taken: list[Bbox], curves: Vector, axes: Axes) -> None:
-    role, window = str(note.get_gid()), axes.get_window_extent()
+    role, window = str(note.get_label()), axes.get_window_extent()
     points = axes.get_figure(root=True).dpi / 72.0  # type: ignore[union-attr]
     here = note.get_window_extent().padded(1.5 * points)
     best, least = None, np.inf
