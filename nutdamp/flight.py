@@ -205,7 +205,7 @@ class Setting:
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
-def _setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
+def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
     """``true``: the principal moments as they are and |H| kept by dissipation; else the linear, symmetric body."""
     inertia, disturbances = spacecraft.inertia, spacecraft.disturbances
     symmetric = (inertia.A, inertia.A, inertia.C)
@@ -229,7 +229,7 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     symmetric one. Disturbances and dissipation (by its linear law) act between the pulses. The last leg reaches at
     least to ``until`` s.
     """
-    setting, state = _setting(spacecraft, true=False), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=False), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
     for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
@@ -269,7 +269,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     Coasts of symmetric bodies left alone are exact arcs, everything else Taylor series at rounding accuracy. The last
     leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
     """
-    setting, state = _setting(spacecraft, true=True), spacecraft.initial
+    setting, state = make_setting(spacecraft, true=True), spacecraft.initial
     pulses = schedule.pulses
     last = max(until, schedule.end)
     edges = sorted({0.0, last, *(pulse.start for pulse in pulses), *(pulse.end for pulse in pulses)})

@@ -173,20 +173,42 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
     if spacecraft.nutation < NO_NUTATION:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
     options = options or schemes.Options()
-    known = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     try:
-        made = schemes.schedule(scheme, known, options)
-        judged = Plan(spacecraft, scheme, made, options=options)
-        left = judged.flown
+        return judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, options), options), options)
     except Infeasible as reason:
         return Plan(spacecraft, scheme, None, str(reason))
+
+
+def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> tuple[Plan, ...]:
+    """Feasible plans by schedules that the scheme weighs against the one that `plan` gives; it may be among them.
+
+    Raises KeyError for a name not in `schemes.NAMES`.
+    """
+    options = options or schemes.Options()
+    try:
+        made = schemes.alternatives(scheme, known(spacecraft, options), options)
+        plans = [judged(spacecraft, scheme, schedule, options) for schedule in made]
+    except Infeasible:
+        return ()
+    return tuple(one for one in plans if one.feasible)
+
+
+def known(spacecraft: Spacecraft, options: schemes.Options) -> Spacecraft:
+    """The spacecraft as the schemes are to know it: with its disturbances only where they are asked for."""
+    return spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
+
+
+def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes.Options) -> Plan:
+    """The plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
+    flown = Plan(spacecraft, scheme, made, options=options)
+    left = flown.flown
     broken = broken_limits(spacecraft, made)
     if broken:
         return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
     if scheme != "none" and left is not None and left.nutation >= spacecraft.nutation:
         angle = math.degrees(left.nutation)
         return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")
-    return judged
+    return flown
 
 
 def unrounded(plan_: Plan) -> Schedule | None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
+from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
 
@@ -68,7 +69,10 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class Thruster:
-    """One thruster: ``torque`` (3,) N m, ``force`` (3,) N or None, ``thrust`` N or None, ``isp`` s or None."""
+    """One thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
+
+    ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
+    """
 
     name: str
     torque: Vector
@@ -77,6 +81,7 @@ class Thruster:
     isp: float | None = None
     min_on_time: float = 0.0
     max_on_time: float = math.inf
+    position: Vector | None = None
 
     @property
     def mass_flow(self) -> float | None:
@@ -159,10 +164,14 @@ class Steerable:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None asks nothing."""
+    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None asks nothing.
+
+    ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
+    """
 
     nutation: float | None = None
     momentum_shift: float | None = None
+    probability: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +234,7 @@ class Spacecraft:
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None.
+    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off.
     """
 
     name: str
@@ -239,6 +248,7 @@ class Spacecraft:
     limits: Limits = field(default_factory=Limits)
     disturbances: tuple[Disturbance, ...] = ()
     dissipation: float | None = None
+    dispersions: Dispersions | None = None
 
     @property
     def growth(self) -> float:

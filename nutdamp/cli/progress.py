@@ -1,21 +1,105 @@
-"""Long work shows itself: a bar on standard error, where that is a terminal."""
+"""What a long run shows while it runs, and how it is stopped."""
 
 from __future__ import annotations
 
+import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+PATIENCE = 1.0
+"""Seconds that pass before a bar appears."""
 
 
 @contextmanager
-def progress(what: str, total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Gives a function to call with how much of ``total`` is done; silent when ``quiet`` or not in a terminal."""
+def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> Iterator[Callable[[int], None]]:
+    """A function to be told now and then how many of ``total`` are done; ``done`` were before the run began.
+
+    It shows a bar with rate and time left on standard error: only on a terminal, only after a second, and it leaves
+    nothing behind.
+    """
+    shown = _Bar(what, total, done)
+    silent = quiet or not sys.stderr.isatty()
+    try:
+        yield (lambda _: None) if silent else shown.update
+    finally:
+        shown.close()
+
+
+@contextmanager
+def working(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Says ``what`` is done while it is done, where nobody can tell how much is left: only on a terminal."""
     if quiet or not sys.stderr.isatty():
-        yield lambda _: None
+        yield
         return
     from rich.console import Console
-    from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda done: bar.update(task, completed=done)
+    with Console(stderr=True).status(what):
+        yield
+
+
+class _Bar:
+    def __init__(self, what: str, total: int, done: int) -> None:
+        self.what, self.total, self.before = what, total, done
+        self.began = time.monotonic()
+        self.bar: Progress | None = None
+        self.task: TaskID | None = None
+
+    def update(self, done: int) -> None:
+        passed = time.monotonic() - self.began
+        if passed < PATIENCE:
+            return
+        if self.bar is None:
+            self._open()
+        assert self.bar is not None
+        assert self.task is not None
+        rate = (done - self.before) / passed
+        self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        self.bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=None),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self.task = self.bar.add_task(self.what, total=self.total, completed=self.before, rate="")
+        self.bar.start()
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+
+@contextmanager
+def stoppable() -> Iterator[Callable[[], bool]]:
+    """A function that tells whether the run was asked to stop, by Ctrl-C or SIGTERM, so that it can end in order.
+
+    A second Ctrl-C interrupts at once.
+    """
+    asked = False
+
+    def ask(number: int, _: FrameType | None) -> None:
+        nonlocal asked
+        if asked and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        asked = True
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import shlex
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import quiet_option, remarks, scheme_options, source, spacecraft_argument, write_all
-from nutdamp.cli.progress import progress
+from nutdamp.cli.disperse import SNIPPET, Count, fly
+from nutdamp.cli.progress import working
 from nutdamp.schemes import CLASSIC, PLANNED, Options
+
+if TYPE_CHECKING:
+    from nutdamp.dispersion.study import Results
+    from nutdamp.planning import Plan
 
 
 @click.command("report")
@@ -25,12 +31,14 @@ from nutdamp.schemes import CLASSIC, PLANNED, Options
     show_default=True,
     help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",
 )
+@click.option("--disperse", type=Count(), help="Fly the recommended schedule with so many dispersed truths.")
 @quiet_option
 def command(
     spacecraft: str | None,
     names: tuple[str, ...],
     options: Options,
     output: str,
+    disperse: int | None,
     quiet: bool,
 ) -> None:
     """Write a report: spacecraft, schemes compared, schedule, pictures, error budget, and how to repeat it.
@@ -44,21 +52,36 @@ def command(
     remark = remarks(quiet)
     text, name = source(spacecraft, remark)
 
+    from nutdamp.errors import BadRequest
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.planning import compare
     from nutdamp.report.page.content import Repeat, report_page
 
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
-    with progress("reporting", 3, quiet=quiet) as done:
-        compared = compare(read_spacecraft(text, name), tuple(dict.fromkeys(names)) or CLASSIC, options)
-        done(1)
-        page = report_page(compared, repeat, pictured=form.pictured)
-        done(2)
+    body = read_spacecraft(text, name)
+    if disperse is not None and body.dispersions is None:
+        raise BadRequest(SNIPPET)
+    with working("planning", quiet=quiet):
+        compared = compare(body, tuple(dict.fromkeys(names)) or CLASSIC, options)
+    chosen = compared.recommended
+    dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
+    with working("writing the page", quiet=quiet):
+        page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed)
         content = form.write(page, output)
     write_all([(output, content)])
     if output != "-":
         remark(f"wrote {output}")
-    if compared.recommended is None:
+    if chosen is None:
         sys.exit(INFEASIBLE)
-    if compared.recommended.meets_requirement is False:
+    if chosen.meets_requirement is False or (dispersed is not None and dispersed.meets_requirement is False):
         sys.exit(REQUIREMENT_MISSED)
+
+
+def _dispersed(chosen: Plan, samples: int, *, quiet: bool) -> Results:
+    """The study of the recommended schedule; interrupted, nothing is written."""
+    from nutdamp.dispersion import study_of
+
+    results = fly(study_of(chosen.spacecraft, chosen.pulses), samples, None, None, None, quiet)
+    if results.done < samples:
+        raise click.Abort
+    return results

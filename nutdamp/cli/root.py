@@ -9,7 +9,7 @@ import click
 from nutdamp import __version__
 from nutdamp.cli.boundary import run
 
-COMMANDS = ("plan", "simulate", "animate", "verify", "report", "check", "explain", "init", "schema")
+COMMANDS = ("plan", "simulate", "animate", "verify", "disperse", "report", "check", "explain", "init", "schema")
 
 
 class Commands(click.Group):

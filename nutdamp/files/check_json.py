@@ -62,6 +62,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
             }
             for found in survey.consequences(spacecraft)
         ],
+        "dispersions": _dispersions_json(spacecraft),
         "two_pulse": {
             "mounting_angle_deg": math.degrees(survey.mounting_angle(spacecraft)),
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
@@ -82,3 +83,13 @@ def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "nutation_rate_inertial_rad_s": found.rates.inertial,
         "dissipation_growth_1_s": spacecraft.growth,
     }
+
+
+def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
+    """What a study could draw, sizes in SI or as factors, and what touches nothing that can fire."""
+    if spacecraft.dispersions is None:
+        return None
+    from nutdamp.dispersion.inputs import reachable  # few files have dispersions
+
+    inputs, unused = reachable(spacecraft)
+    return {"inputs": [entry._asdict() for entry in inputs], "unused": {entry.name: entry.reason for entry in unused}}

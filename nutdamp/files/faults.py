@@ -8,14 +8,17 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterator
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.dispersion_models import by_name
+from nutdamp.files.dispersion_rules import dispersion_findings
+from nutdamp.files.facts import Finding
 from nutdamp.files.models import SpacecraftFile
-from nutdamp.files.rules import Finding, findings
+from nutdamp.files.rules import findings
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 
@@ -23,7 +26,7 @@ from nutdamp.units import shown
 def read_contents(text: str, name: str) -> SpacecraftFile:
     """The checked contents of a spacecraft file; raises `FaultyFile` with all its faults, sorted by place."""
     root, faults = read_tree(text, name)
-    found = [*_spelling(root, SpacecraftFile, ()), *findings(root)]
+    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root)]
     try:
         contents = SpacecraftFile.model_validate(root.plain())
     except ValidationError as error:
@@ -47,14 +50,15 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
     return Fault(name, *place, dotted(path), finding.problem)
 
 
-def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath) -> Iterator[Finding]:
+def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
     """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
 
     A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too;
-    any other unknown key is dropped.
+    any other unknown key is dropped. ``named``: the keys may also be names, of entries of the ``model``.
     """
     fields = model.model_fields if model else {}
-    if fields and isinstance(node.value, dict):
+    named = named and isinstance(node.value, dict) and by_name(node.value)
+    if fields and isinstance(node.value, dict) and not named:
         for key in [key for key in node.value if key not in fields]:
             dropped = node.value.pop(key)
             meant = _meant(key, [field for field in fields if field not in node.value])
@@ -65,11 +69,12 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath) -> Itera
                 cure = "put a space behind the colon"
             yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
     for step, child in node.children():
-        below = _section(fields[step].annotation) if isinstance(step, str) and fields else model
+        annotation = fields[step].annotation if isinstance(step, str) and fields and not named else model
         if child.value is None:
             cure = "give a value, or leave the key out" if isinstance(step, str) else "a value is wanted"
             yield Finding((*path, step), f"empty; {cure}")
-        yield from _spelling(child, below if fields else None, (*path, step))
+        below = _section(annotation) if fields else None
+        yield from _spelling(child, below, (*path, step), _holds_names(annotation))
 
 
 def _meant(key: str, fields: list[str]) -> str | None:
@@ -84,6 +89,11 @@ def _section(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next(filter(None, map(_section, get_args(annotation))), None)
+
+
+def _holds_names(annotation: Any) -> bool:
+    """Whether the type of a field is that of a mapping by names."""
+    return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
 def _type_errors(error: ValidationError) -> Iterator[Finding]:

@@ -6,86 +6,15 @@ What needs more than one key to judge is in `rules`.
 from __future__ import annotations
 
 import datetime
-import math
-import operator
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    Strict,
-)
-from pydantic_core import CoreSchema, core_schema
+from pydantic import AfterValidator, ConfigDict, Field, Strict
+from pydantic_core import core_schema
 
-from nutdamp.units import KINDS, parse, pattern, shown
-
-SMALLEST = 1e-15
-"""Values that must be above zero and are smaller count as zero, in SI: what is divided by them could overflow."""
-
-_BOUNDS = {
-    "minimum": (operator.ge, "of at least"),
-    "exclusiveMinimum": (operator.gt, "above"),
-    "exclusiveMaximum": (operator.lt, "below"),
-}
-_RIGHT_ANGLE = parse("90 deg", "angle")
-
-
-class Quantity:
-    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON Schema, in SI."""
-
-    def __init__(self, kind: str, **bounds: float) -> None:
-        self.kind, self.bounds = kind, bounds
-
-    def check(self, value: object) -> float:
-        """SI value; raises ValueError, which says what would be right."""
-        result = parse(value, self.kind)
-        if not all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items()):
-            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted")
-        if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
-            raise ValueError(
-                f"{shown(value)} is too small to be real; {self.range} is wanted, in SI at least {SMALLEST:g}"
-            )
-        return result
-
-    @property
-    def range(self) -> str:
-        """``an angle of at least 0 and below 90 deg``."""
-        bounds = (
-            f"{_BOUNDS[name][1]} {'90 deg' if limit == _RIGHT_ANGLE else f'{limit:g}'}"
-            for name, limit in self.bounds.items()
-        )
-        return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
-
-    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.check)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
-        number = {"type": "number", **self.bounds}
-        if not KINDS[self.kind].factors:
-            return number
-        return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
-
-
-class AxialShorthand:
-    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
-
-    single = Quantity("torque")
-
-    def check(self, value: object, vector: core_schema.ValidatorFunctionWrapHandler) -> object:
-        """Three components; raises ValueError, which says what would be right."""
-        return vector(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        single = self.single.__get_pydantic_json_schema__(schema, handler)
-        return {"anyOf": [handler(schema), *single["anyOf"]]}
+from nutdamp.files.dispersion_models import DispersionsSection
+from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, Quantity, Section
+from nutdamp.units import shown
 
 
 def _epoch(text: str) -> str:
@@ -106,13 +35,14 @@ Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
 Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
 Rate = Annotated[float, Quantity("rate")]
 Angle = Annotated[float, Quantity("angle")]
-Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
-AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=_RIGHT_ANGLE)]
+Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
+AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)]
 Time = Annotated[float, Quantity("time", minimum=0)]
 PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
 Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
 Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
 Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
+Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
 
 _THREE = Field(min_length=3, max_length=3)
 Rates = Annotated[list[Rate], _THREE]
@@ -131,13 +61,6 @@ Count = Annotated[int, Strict(), Field(ge=1, le=1_000_000)]
 def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
     """JSON Schema for: all of ``keys`` and none of ``without``."""
     return {"required": list(keys), "not": {"anyOf": [{"required": [key]} for key in without]}}
-
-
-class Section(BaseModel):
-    """A mapping of the file: no key that is not named here."""
-
-    # Built once, with the root, when the first file is read.
-    model_config = ConfigDict(extra="forbid", defer_build=True)
 
 
 class InertiaSection(Section):
@@ -224,6 +147,9 @@ class RequirementSection(Section):
     momentum_shift: AcuteAngle | None = Field(
         default=None, description="Largest turn of the angular momentum, rad, above 0 and below 90 deg."
     )
+    probability: Probability | None = Field(
+        default=None, description="How surely dispersed flights must meet it, above 0 and below 1 (or in %)."
+    )
 
 
 class LimitsSection(Section):
@@ -309,6 +235,9 @@ class SpacecraftFile(Section):
     )
     requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
     limits: LimitsSection | None = Field(default=None, description="Limits that every schedule keeps.")
+    dispersions: DispersionsSection | None = Field(
+        default=None, description="How far the truth may be off what the file says."
+    )
 
 
 def json_schema() -> dict[str, Any]:

@@ -9,9 +9,10 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from nutdamp.errors import CannotWrite
 
@@ -20,30 +21,39 @@ STDOUT = "-"
 
 
 def write_whole(path: str, content: str | bytes) -> None:
-    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output.
+    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output. Raises CannotWrite."""
+    with whole_file(path) as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
 
-    The text goes to a temporary file in the same folder, which then takes the place of the old one. What is no
-    plain file (a pipe, /dev/null) is written to directly. Raises CannotWrite.
+
+@contextmanager
+def whole_file(path: str) -> Iterator[IO[bytes]]:
+    """A file to write piece by piece, which takes its place at ``path`` when the block ends well, or never.
+
+    Until then it is a temporary file in the same folder. What is no plain file (a pipe, /dev/null, standard output
+    as ``-``) is written to directly. Raises CannotWrite.
     """
-    data = content.encode() if isinstance(content, str) else content
     try:
         if path == STDOUT:
             sys.stdout.flush()
-            sys.stdout.buffer.write(data)
+            yield sys.stdout.buffer
             sys.stdout.buffer.flush()
             return
         target = Path(path).resolve()
         if target.exists() and not target.is_file() and not target.is_dir():
-            target.write_bytes(data)
+            with target.open("wb") as stream:
+                yield stream
             return
-        _replace(target, data)
+        with _replacing(target) as stream:
+            yield stream
     except BrokenPipeError:
         raise
     except OSError as reason:
         raise CannotWrite(path, reason.strerror or str(reason)) from reason
 
 
-def _replace(target: Path, data: bytes) -> None:
+@contextmanager
+def _replacing(target: Path) -> Iterator[IO[bytes]]:
     if target.is_dir():
         raise IsADirectoryError(0, "it is a directory")
     if target.exists() and not os.access(target, os.W_OK):
@@ -51,7 +61,7 @@ def _replace(target: Path, data: bytes) -> None:
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            yield stream
             stream.flush()
             os.fsync(stream.fileno())
         if target.exists():

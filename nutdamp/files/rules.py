@@ -8,17 +8,17 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.models import SMALLEST
+from nutdamp.files.facts import Facts, Finding
+from nutdamp.files.fields import SMALLEST
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
 from nutdamp.physics import stability
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
-from nutdamp.units import parse, shown
+from nutdamp.units import shown
 
 Vector = NDArray[np.float64]
 
@@ -27,50 +27,6 @@ SYMMETRIC = 1e-9
 
 CANCELLED = 1e-12
 """A sum that is smaller than its terms by this factor is rounding; it counts as zero."""
-
-
-class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at its value."""
-
-    path: KeyPath
-    problem: str
-    at_key: bool = False
-
-
-class Facts:
-    """The values of a tree that can be read."""
-
-    def __init__(self, root: Node) -> None:
-        self.root = root
-
-    def has(self, *path: str | int) -> bool:
-        """Whether something stands at ``path``."""
-        return self.root.get(*path) is not None
-
-    def text(self, *path: str | int) -> str | None:
-        """The text at ``path``."""
-        node = self.root.get(*path)
-        return node.value if node is not None and isinstance(node.value, str) else None
-
-    def number(self, kind: str, *path: str | int) -> float | None:
-        """The quantity at ``path``, SI."""
-        node = self.root.get(*path)
-        try:
-            return None if node is None else parse(node.plain(), kind)
-        except ValueError:
-            return None
-
-    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
-        """The ``size`` quantities at ``path``, SI; None unless all can be read."""
-        if len(self.children(*path)) != size:
-            return None
-        numbers = [self.number(kind, *path, index) for index in range(size)]
-        return None if None in numbers else np.array(numbers, dtype=np.float64)
-
-    def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and what stands there."""
-        node = self.root.get(*path)
-        return [] if node is None else list(node.children())
 
 
 def findings(root: Node) -> Iterator[Finding]:
@@ -121,8 +77,8 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     if "tensor" in keys:
         if len(keys) > 1:
             yield Finding(("inertia", "tensor"), "stands beside A or C; keep either tensor, or A and C", True)
-        tensor = _tensor(facts)
-        fault = None if tensor is None else _tensor_fault(tensor) or _spin_axis_fault(tensor, _spin(facts))
+        tensor = tensor_of(facts)
+        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, _spin(facts))
         if fault is not None:
             yield fault
     elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict):
@@ -136,14 +92,15 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         yield Finding(("inertia", "C"), problem)
 
 
-def _tensor(facts: Facts) -> Vector | None:
+def tensor_of(facts: Facts) -> Vector | None:
+    """The inertia tensor (3, 3) kg m²; None where there is none, or it cannot be read."""
     rows = [facts.vector("inertia", 3, "inertia", "tensor", row) for row in range(3)]
     if len(facts.children("inertia", "tensor")) != 3 or any(row is None for row in rows):
         return None
     return np.array(rows)
 
 
-def _tensor_fault(tensor: Vector) -> Finding | None:
+def tensor_fault(tensor: Vector) -> Finding | None:
     """What makes a 3×3 tensor impossible as an inertia tensor."""
     path: KeyPath = ("inertia", "tensor")
     skew = np.abs(tensor - tensor.T)
@@ -201,8 +158,8 @@ def _motion(facts: Facts) -> Iterator[Finding]:
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
     """The rate about principal axis 3, and where it stands; what rounding leaves of a transverse rate is zero."""
-    omega0, tensor = facts.vector("rate", 3, "omega0"), _tensor(facts)
-    if omega0 is None or (tensor is not None and _tensor_fault(tensor) is not None):
+    omega0, tensor = facts.vector("rate", 3, "omega0"), tensor_of(facts)
+    if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
         return (), None
     if tensor is None:
         return ("omega0", 2), float(omega0[2])
@@ -298,7 +255,7 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             if not isinstance(name, str):
                 continue
             if name not in thrusters:
-                yield Finding((*path, index), f"no thruster is called {shown(name)}; {_instead(name, names)}")
+                yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
             elif (member := ("thrusters", thrusters[name])) in members:
                 yield Finding((*path, index), f"{shown(name)} stands twice in this channel; once is wanted")
             else:
@@ -307,7 +264,7 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             yield from _channel_values(facts, path, members)
 
 
-def _instead(name: str, names: list[str]) -> str:
+def instead(name: str, names: list[str]) -> str:
     """The thruster that was meant, or all there are."""
     few = names[:20]  # to look for the nearest of very many takes long
     close = difflib.get_close_matches(name, few, n=1)

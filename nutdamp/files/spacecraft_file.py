@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.files.dispersion_models import dispersions
 from nutdamp.files.faults import read_contents
 from nutdamp.files.models import (
     AttitudeSection,
@@ -56,6 +57,8 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
+    steerable = _steerable(contents.steerable)
+    torquer = steerable if thrusters else steerable or Steerable()
     return Spacecraft(
         name=contents.name,
         inertia=inertia,
@@ -65,11 +68,12 @@ def read_spacecraft(text: str, name: str) -> Spacecraft:
         channels=tuple(
             Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
         ),
-        steerable=_steerable(contents.steerable),
+        steerable=steerable,
         requirement=_requirement(contents.requirement),
         limits=_limits(contents.limits),
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
+        dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
     )
 
 
@@ -103,6 +107,7 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
 
 def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
     force: Vector | None = None
+    position: Vector | None = None
     if entry.torque is not None:
         torque = np.array(entry.torque)
         thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
@@ -111,7 +116,8 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         assert entry.direction is not None
         assert entry.force is not None
         thrust, force = entry.force, force_vector(entry.direction, entry.force)
-        torque = np.cross(entry.position, force)
+        position = np.array(entry.position)
+        torque = np.cross(position, force)
     return Thruster(
         name=entry.name,
         torque=axes.T @ torque,
@@ -120,6 +126,7 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         isp=entry.isp,
         min_on_time=entry.min_on_time,
         max_on_time=math.inf if entry.max_on_time is None else entry.max_on_time,
+        position=None if position is None else axes.T @ position,
     )
 
 
@@ -154,7 +161,7 @@ def _requirement(section: RequirementSection | None) -> Requirement | None:
     """None also for a requirement that names nothing."""
     if section is None or (section.nutation is None and section.momentum_shift is None):
         return None
-    return Requirement(section.nutation, section.momentum_shift)
+    return Requirement(section.nutation, section.momentum_shift, section.probability)
 
 
 def _limits(section: LimitsSection | None) -> Limits:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -24,6 +24,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
+    if spacecraft.dispersions is not None:
+        parts += [Text(), *_dispersions(spacecraft)]
     return Group(*parts)
 
 
@@ -106,3 +108,26 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
     if idle:
         lines.append(f"Never fired for damping, more axial than transverse: {', '.join(idle)}.")
     return Text("\n".join(lines))
+
+
+def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
+    """How far the truth may be off, and which tolerances touch nothing that can fire."""
+    from nutdamp.dispersion.inputs import reachable  # few files have dispersions
+    from nutdamp.report.dispersion_tables import size_text, unused_table
+
+    inputs, unused = reachable(spacecraft)
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for entry in inputs:
+        names = alike.setdefault((entry.tolerance.replace("_", " "), entry.kind, size_text(entry)), [])
+        by_thruster = getattr(spacecraft.dispersions, entry.tolerance)
+        rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
+        if isinstance(by_thruster, Mapping):
+            names += [name for name in by_thruster if name in (rest, rest[:-2]) and name not in names]
+    table = columns("dispersion", "distribution", "one sigma or bias", "thrusters", text=("distribution", "thrusters"))
+    for (tolerance, kind, size), names in alike.items():
+        table.add_row(tolerance, kind, size, ", ".join(names))
+    yield table
+    if unused:
+        yield Text()
+        yield Text("Dispersions that touch nothing that can fire", style="bold")
+        yield unused_table(unused)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
+    from nutdamp.schemes.model import Model
     from nutdamp.spacecraft import Spacecraft
 
 CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
@@ -48,14 +49,36 @@ def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     """
     if name not in NAMES:
         raise KeyError(name)
-    from nutdamp.schemes import trim
     from nutdamp.schemes.model import model_of
 
     model = model_of(spacecraft)
     scheme = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
-    made = model.translate(cast("Schedule", scheme.schedule(model.body, options)))
+    return _finished(name, model, cast("Schedule", scheme.schedule(model.body, options)), options)
+
+
+def alternatives(name: str, spacecraft: Spacecraft, options: Options) -> list[Schedule]:
+    """Schedules that the scheme ``name`` weighs against the one that `schedule` gives, which may be among them.
+
+    Raises KeyError for a name not in `NAMES`.
+    """
+    if name not in NAMES:
+        raise KeyError(name)
+    scheme = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
+    if not hasattr(scheme, "alternatives"):
+        return []
+    from nutdamp.schemes.model import model_of
+
+    model = model_of(spacecraft)
+    return [_finished(name, model, made, options) for made in scheme.alternatives(model.body, options)]
+
+
+def _finished(name: str, model: Model, made: Schedule, options: Options) -> Schedule:
+    """A schedule for the ``model`` as one for the true spacecraft, trimmed on its motion where that differs."""
+    from nutdamp.schemes import trim
+
+    made = model.translate(made)
     if model.exact or options.coarse or options.literal or not made.pulses:
         return made
     keeps = name == "two-pulse" or (name == "optimal" and not options.free_axis)
     chosen = tuple(range(min(len(made), 4))) if keeps else (-1,)
-    return trim.refine(spacecraft, made, chosen=chosen, momentum=keeps)
+    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -154,29 +155,43 @@ class Candidate(NamedTuple):
     """Impulse over A|ω0|."""
 
 
+def alternatives(spacecraft: Spacecraft, options: Options) -> Iterator[Schedule]:
+    """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer."""
+    if spacecraft.torquer is None and (spacecraft.limits.max_pulses or 2) >= 2:
+        for made, _ in _shortlist(spacecraft, usable(spacecraft), options):
+            yield made
+
+
 def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) -> Schedule:
-    """Fly and trim the most promising candidates; the smallest flown residual wins, exact ones in order."""
-    candidates = sorted(
-        (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
-        key=lambda found: (found.short, found.cost),
-    )
-    if not candidates:
-        raise Infeasible(_nothing_closes(spacecraft, channels))
-    cheapest = candidates[0]
-    short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
-    near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
-    near.sort(key=lambda found: found.end)
-    others = [candidate for candidate in candidates if candidate not in near]
+    """The smallest flown residual of the most promising candidates wins, exact ones in order."""
     best: tuple[float, Schedule] | None = None
-    for candidate in [*near, *others][:SHORTLIST]:
-        made, left = _trimmed(spacecraft, candidate, options.literal)
-        if trim.keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
+    for made, left in _shortlist(spacecraft, channels, options):
+        if best is None or left < CLEARLY * best[0]:
             best = left, made
             if left <= EXACT:
                 break
     if best is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
     return best[1]
+
+
+def _shortlist(spacecraft: Spacecraft, channels: list[Channel], options: Options) -> Iterator[tuple[Schedule, float]]:
+    """The most promising candidates, trimmed, with the residual (rad) that each leaves when flown."""
+    candidates = sorted(
+        (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
+        key=lambda found: (found.short, found.cost),
+    )
+    if not candidates:
+        return
+    cheapest = candidates[0]
+    short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
+    near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
+    near.sort(key=lambda found: found.end)
+    others = [candidate for candidate in candidates if candidate not in near]
+    for candidate in [*near, *others][:SHORTLIST]:
+        made, left = _trimmed(spacecraft, candidate, options.literal)
+        if trim.keeps_limits(spacecraft, made.pulses):
+            yield made, left
 
 
 def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:

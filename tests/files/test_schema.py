@@ -35,7 +35,19 @@ EVERYTHING: dict[str, Any] = {
         {"kind": "constant", "torque": [0, 0, 1]},
     ],
     "dissipation": {"time_constant": "10 min"},
-    "requirement": {"nutation": "0.5 deg", "momentum_shift": "3 mrad"},
+    "requirement": {"nutation": "0.5 deg", "momentum_shift": "3 mrad", "probability": "99.7 %"},
+    "dispersions": {
+        "A": {"normal": "2 %"},
+        "C": {"uniform": "1.6 kg m^2"},
+        "omega0": [{"normal": "0.1 deg/s"}, {"bias": -0.01}, {"normal": "1 %"}],
+        "thrust": {"a": {"normal": "0.3 N"}, "b": {"triangular": "5 %"}},
+        "thrust_per_pulse": {"normal": 0.01},
+        "thrust_direction": {"normal": "0.5 deg"},
+        "position": {"b": {"normal": "5 mm"}},
+        "timing": {"uniform": "5 ms"},
+        "timing_offset": {"bias": "-2 ms"},
+        "attitude": {"normal": "0.2 deg"},
+    },
     "limits": {"horizon": "2 min", "earliest": 5, "gap": 0.5, "tick": "1 ms", "max_pulses": 8, "blackout": [[10, 20]]},
 }
 
@@ -74,6 +86,9 @@ def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
 def test_the_example_and_everything_else_validate() -> None:
     VALIDATOR.validate(read_tree(built_in_example_text(), "example.yaml")[0].plain())
     VALIDATOR.validate(EVERYTHING)
+    VALIDATOR.validate(
+        changed("dispersions", {"omega0": {"normal": 0.1}, "thrust": {"normal": "3 %"}, "A": {"bias": -1}})
+    )
     VALIDATOR.validate({"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}})
 
 
@@ -129,6 +144,18 @@ def test_the_example_and_everything_else_validate() -> None:
         ("limits.max_pulses", 0),
         ("limits.max_pulses", 1.5),
         ("limits.blackout", [10, 20]),
+        ("requirement.probability", 1),
+        ("dispersions.A", "2 %"),
+        ("dispersions.A", {}),
+        ("dispersions.A.bias", "1 %"),
+        ("dispersions.A", {"normal": "2 mm"}),
+        ("dispersions.A", {"sigma": "2 %"}),
+        ("dispersions.A", {"normal": -1}),
+        ("dispersions.omega0", [{"normal": 1}, {"normal": 1}]),
+        ("dispersions.thrust.a", 0.3),
+        ("dispersions.position", {}),
+        ("dispersions.timing", {"normal": "5 %"}),
+        ("dispersions.tming", {"normal": "5 ms"}),
     ],
 )
 def test_slips_do_not_validate(path: str, value: object) -> None:

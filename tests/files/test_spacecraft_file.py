@@ -13,6 +13,7 @@ from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Disturbance, Limits, Spacecraft
+from nutdamp.tolerances import Tolerance
 
 EVERYTHING = """\
 name: Sounder-1
@@ -324,7 +325,14 @@ def uncommented(text: str, *keys: str) -> str:
 
 def test_what_the_example_shows_in_comments_works() -> None:
     text = uncommented(
-        built_in_example_text(), "attitude", "channels", "steerable", "limits", "disturbances", "dissipation"
+        built_in_example_text(),
+        "attitude",
+        "channels",
+        "steerable",
+        "limits",
+        "disturbances",
+        "dissipation",
+        "dispersions",
     )
     craft = read(text.replace("  # - {", "  - {"))
     assert craft.attitude is not None
@@ -338,6 +346,9 @@ def test_what_the_example_shows_in_comments_works() -> None:
         ("drag", 0.0),
     ]
     assert (craft.spin_drift, craft.dissipation) == (-0.001 / 80, 600.0)
+    assert craft.dispersions is not None
+    assert craft.dispersions.thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"}
+    assert craft.dispersions.timing_offset == Tolerance("bias", 0.002)
     others = re.sub(r"^(state|inertia): .*\n", "", built_in_example_text(), flags=re.MULTILINE)
     craft = read(uncommented(others, "inertia", "omega0"))
     assert craft.nutation == pytest.approx(math.radians(5), rel=0.05)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp import __version__
 from nutdamp.planning import Comparison, Plan, unrounded
@@ -19,14 +19,18 @@ from nutdamp.report.page.document import (
     Prose,
     Remarks,
     Section,
+    blocks_of,
     sheet_of,
 )
-from nutdamp.report.page.pictures import pictures_of
+from nutdamp.report.page.pictures import dispersion_picture_of, pictures_of
 from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.report.text import degrees, mass, moment, quantity
 from nutdamp.report.verify_tables import budget_table, conservation, methods_table
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
+
+if TYPE_CHECKING:  # few reports disperse
+    from nutdamp.dispersion.study import Results
 
 
 class Repeat(NamedTuple):
@@ -42,8 +46,12 @@ def report_page(
     repeat: Repeat,
     *,
     pictured: bool,
+    dispersed: Results | None = None,
 ) -> Page:
-    """The page; ``pictured``: with pictures of the recommended schedule. Raises MissingExtra without matplotlib."""
+    """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
+
+    ``dispersed``: the recommended schedule flown with dispersed truths.
+    """
     body, chosen = compared.spacecraft, compared.recommended
     sections = [_spacecraft(body), _schemes(compared)]
     if chosen is not None:
@@ -51,6 +59,8 @@ def report_page(
         if pictured:
             sections.append(Section("pictures", "Pictures", pictures_of(chosen)))
         sections.append(_budget(chosen))
+        if dispersed is not None:
+            sections.append(_dispersion(chosen, dispersed, pictured=pictured))
     good = chosen is not None and chosen.meets_requirement is not False
     return Page(
         title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
@@ -133,6 +143,16 @@ def _budget(chosen: Plan) -> Section:
     if missing:
         blocks.append(Remarks(missing))
     return Section("budget", "Error budget", tuple(blocks))
+
+
+def _dispersion(chosen: Plan, dispersed: Results, *, pictured: bool) -> Section:
+    from nutdamp.report.dispersion_tables import dispersion_screen
+
+    blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
+    blocks += [Prose(f"Note: {remark}.") for remark in dispersed.study.remarks]
+    if pictured:
+        blocks.append(dispersion_picture_of(dispersed, chosen.scheme))
+    return Section("dispersion", "Dispersion", tuple(blocks))
 
 
 def _repeat(repeat: Repeat) -> Section:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -20,12 +21,16 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A table with one row for each thing compared; the first column names it. ``mark`` is the row to stand out."""
+    """A table with one row for each thing compared; the first column names it.
+
+    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit.
+    """
 
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
+    sortable: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +104,17 @@ class Page:
 
 
 def sheet_of(title: str, table: Table) -> Sheet:
-    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
+    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
+
+    Where the first column has no heading, each row is a quantity of its own unit.
+    """
     columns = []
     for column in table.columns:
         name, _, unit = plain(column.header).partition("\n")
         columns.append(Column(name, unit, column.justify == "right"))
-    return Sheet(title, tuple(columns), _rows(table))
+    first = columns[0]
+    headed = (first._replace(name=first.name or "quantity"), *columns[1:])
+    return Sheet(title, headed, _rows(table), sortable=bool(first.name))
 
 
 def facts_of(title: str, table: Table) -> Facts:
@@ -116,6 +126,22 @@ def facts_of(title: str, table: Table) -> Facts:
         else:
             rows[-1] = (rows[-1][0], f"{rows[-1][1]}; {value}")
     return Facts(title, tuple(rows))
+
+
+def blocks_of(title: str, screen: Group) -> Iterator[Block]:
+    """What a screen shows, block by block: a line straight above a table is its title, else ``title`` is."""
+    above = ""
+    for part in screen.renderables:
+        if isinstance(part, Table):
+            made = sheet_of if part.show_header else facts_of
+            yield made(above or title, part)
+            above = ""
+            continue
+        if above:
+            yield Prose(above)
+        above = plain(part)
+    if above:
+        yield Prose(above)
 
 
 def _rows(table: Table) -> tuple[tuple[str, ...], ...]:

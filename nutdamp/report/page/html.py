@@ -95,6 +95,7 @@ def _box(title: str, content: str, kind: str = "wide") -> str:
 def sheet_html(sheet: Sheet) -> str:
     """A table whose columns the script of the page lets sort; without the script it is a plain table."""
     heads = "".join(map(_head, sheet.columns))
+    kind = "sheet sortable" if sheet.sortable else "sheet"
     rows = []
     for index, row in enumerate(sheet.rows):
         cells = "".join(
@@ -103,7 +104,7 @@ def sheet_html(sheet: Sheet) -> str:
         )
         rows.append(f'<tr class="mark">{cells}</tr>' if index == sheet.mark else f"<tr>{cells}</tr>")
     return (
-        f'<table class="sheet"><caption><span>{escape(sheet.title)}</span></caption>'
+        f'<table class="{kind}"><caption><span>{escape(sheet.title)}</span></caption>'
         f"<thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 

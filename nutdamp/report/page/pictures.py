@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from nutdamp import flight
 from nutdamp.planning import Plan
 from nutdamp.report import figures
 from nutdamp.report.page.document import Picture
+
+if TYPE_CHECKING:
+    from nutdamp.dispersion.study import Results
 
 SAMPLES = 1000
 """Rows of the track; the figures draw a finer one where they need it."""
@@ -40,3 +45,15 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
             (figures.timeline_figure(flown), "Which channel fires, when and for how long.", "Timeline of the firings")
         )
     return tuple(Picture(figures.svg(figure), caption, described) for figure, caption, described in drawn)
+
+
+def dispersion_picture_of(dispersed: Results, scheme: str) -> Picture:
+    """How the cases of a study are distributed; raises MissingExtra."""
+    from nutdamp.report.dispersion_figure import dispersion_figure
+
+    return Picture(
+        figures.svg(dispersion_figure(dispersed, scheme=scheme)),
+        "How many cases leave how much nutation, and how far H has moved, with what is required. "
+        "Right: the share of cases beyond.",
+        "Histograms and distribution functions of nutation and shift of H",
+    )

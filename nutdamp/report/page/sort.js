@@ -1,6 +1,6 @@
 "use strict";
-// Lets every table of class "sheet" be sorted by the buttons that this puts into its headings.
-for (const table of document.querySelectorAll("table.sheet")) {
+// Lets every table of class "sortable" be sorted by the buttons that this puts into its headings.
+for (const table of document.querySelectorAll("table.sortable")) {
   const body = table.tBodies[0];
   const heads = Array.from(table.tHead.rows[0].cells);
   if (body.rows.length < 2) continue;

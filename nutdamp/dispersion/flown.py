@@ -1,0 +1,101 @@
+"""Truths flown through real pulse widths, with the true tensor and the disturbances, many at once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import flight
+from nutdamp.dispersion.kernel import Ends, carried
+from nutdamp.dispersion.truth import Model, Triple, Truth, rotated
+from nutdamp.physics import many
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RealWidths:
+    """Flies truths of ``model`` by Euler's equations, see `nutdamp.physics.many`.
+
+    Disturbances and dissipation act as the estimate has them, whatever the truth's moments are.
+    """
+
+    model: Model
+
+    @cached_property
+    def _setting(self) -> flight.Setting:
+        return flight.make_setting(self.model.spacecraft, true=True)
+
+    def __call__(self, truth: Truth) -> Ends:
+        """How the cases of ``truth`` end. Raises Infeasible for motions too long to be integrated."""
+        parts = (*truth.moments, *truth.omega0, *truth.starts, *(part for pulse in truth.impulses for part in pulse))
+        count = max(np.size(part) for part in parts)
+        moments, rates = _whole(truth.moments, count), _whole(truth.omega0, count)
+        pulses = many.Pulses(
+            _whole(truth.starts, count),
+            np.array(self.model.on_times),
+            np.array([_whole(impulse, count) for impulse in truth.impulses]).reshape(-1, 3, count),
+        )
+        upright = np.zeros((4, count))
+        upright[0] = 1.0  # the true body axes at t = 0 are where everything is seen from
+        setting = self._setting
+        bodies = many.Bodies(moments, setting.constant, setting.forcing)
+        settled, turned = many.fly(bodies, rates, upright, pulses)
+        momentum = _triple(moments * settled)
+        after = carried(tuple(turned), momentum)
+        sense = math.copysign(1.0, self.model.spacecraft.spin)
+        return Ends(
+            momentum=momentum,
+            before=_triple(moments * rates),
+            after=after,
+            pointed=rotated(after, truth.tilt),
+            spin_change=settled[2] - rates[2],
+            propellant=truth.propellant,
+            nutation=None if truth.moments[0] is truth.moments[1] else largest_nutation(moments, momentum, sense),
+        )
+
+
+def largest_nutation(moments: Array, momentum: Triple, sense: float) -> Array:
+    """Largest angle (n,) in rad between H and the spin axis on the torque-free motions through ``momentum``.
+
+    ``moments`` (3, n) kg m². What u1 (1/I1 - 1/I3) + u2 (1/I2 - 1/I3) is, u the squared components of H, stays
+    (2T - H²/I3), as do the other two sums of its kind: so the components where one of H1, H2 vanishes follow without
+    differences of large numbers. Motions about another axis than the third go one by one, as in `flight`.
+    """
+    u1, u2, u3 = (part * part for part in momentum)
+    first, second, third = 1.0 / moments
+    across = u1 * (first - third) + u2 * (second - third)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Where H2 = 0 there are H1 and H3, and where H1 = 0 there are H2 and H3.
+        ends = [
+            (across / (first - third), u3 + u2 * (first - second) / (first - third)),
+            (across / (second - third), u3 + u1 * (second - first) / (second - third)),
+        ]
+        angles = [np.arctan2(np.sqrt(transverse), np.sqrt(axial)) for transverse, axial in ends]
+        largest = np.maximum(*angles)
+        plain = (first - third) * (second - third) > 0.0
+        for transverse, axial in ends:
+            plain &= (transverse >= 0.0) & (axial > 0.0)
+    plain &= sense * momentum[2] > 0.0
+    for case in np.flatnonzero(~plain):
+        first_, second_, third_ = (float(moment) for moment in moments[:, case])
+        body = np.array([part[case] for part in momentum])
+        largest[case] = flight.largest_nutation((first_, second_, third_), body, sense)
+    return np.asarray(largest)
+
+
+def _whole(parts: tuple[object, ...], count: int) -> Array:
+    """Numbers and arrays as rows of one array, (k, n)."""
+    rows = np.empty((len(parts), count))
+    for row, part in zip(rows, parts, strict=True):
+        row[:] = part  # type: ignore[call-overload]
+    return rows
+
+
+def _triple(rows: Array) -> Triple:
+    first, second, third = rows
+    return first, second, third

@@ -1,0 +1,192 @@
+"""Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
+
+Every drawn quantity is one `Input` with a name of its own. A tolerance that cannot touch the outcome is not dropped
+in silence: it becomes an `Unused` with its reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from nutdamp.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft import Spacecraft, Thruster
+from nutdamp.tolerances import Tolerance
+
+SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
+"""Standard deviation of each kind for a size of one."""
+
+KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
+
+
+SCHEDULE_IDLE = "the schedule does not fire"
+
+
+class Input(NamedTuple):
+    """One drawn quantity: truth = ``nominal`` + draw, in ``unit``.
+
+    ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
+    `nutdamp.tolerances.KINDS`, in ``unit`` (a bare number for factors).
+    """
+
+    name: str
+    tolerance: str
+    kind: str
+    size: float
+    nominal: float
+    unit: str
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation, in ``unit``; zero for a bias."""
+        return abs(self.size) * SPREAD[self.kind]
+
+
+class Unused(NamedTuple):
+    """A tolerance of the file that touches nothing, and why."""
+
+    name: str
+    reason: str
+
+
+class Inputs(NamedTuple):
+    """What a study draws, in a fixed order, and what it leaves."""
+
+    drawn: tuple[Input, ...]
+    unused: tuple[Unused, ...]
+
+
+def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
+    """The inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
+    drawn: list[Input] = []
+    unused: list[Unused] = []
+    for entry in _entries(spacecraft, schedule):
+        if isinstance(entry, Unused):
+            unused.append(entry)
+        elif entry.size == 0.0:
+            unused.append(Unused(entry.name, _no_size(entry)))
+        else:
+            drawn.append(entry)
+    return Inputs(tuple(drawn), tuple(unused))
+
+
+def reachable(spacecraft: Spacecraft) -> Inputs:
+    """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
+
+    What each pulse draws stands there once.
+    """
+    pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
+    if spacecraft.torquer is not None:
+        pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
+    drawn, unused = list_inputs(spacecraft, Schedule(tuple(pulses)))
+    once = (entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1"))
+    return Inputs(
+        tuple(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once),
+        tuple(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in unused),
+    )
+
+
+def _no_size(entry: Input) -> str:
+    if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
+        return "a share of a value that is zero"
+    return "its size is zero"
+
+
+def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unused]:
+    asked = spacecraft.dispersions
+    if asked is None:
+        return
+    moments = (("A", spacecraft.inertia.A, asked.A), ("C", spacecraft.inertia.C, asked.C))
+    rates = spacecraft.inertia.axes @ spacecraft.omega0
+    for name, nominal, tolerance in moments:
+        if tolerance is not None:
+            yield _input(name, name, tolerance, nominal, "kg m²")
+    for number, (tolerance, rate) in enumerate(zip(asked.omega0, rates.tolist(), strict=True), start=1):
+        if tolerance is not None:
+            yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")
+    members = fired(spacecraft, schedule)
+    for name, tolerance in asked.thrust.items():
+        yield _thrust(name, tolerance, members)
+    for name, tolerance in asked.thrust_direction.items():
+        yield from _direction(name, tolerance, members)
+    for name, tolerance in asked.position.items():
+        yield from _position(name, tolerance, members)
+    pulses = range(1, len(schedule) + 1)
+    if asked.thrust_per_pulse is not None:
+        named = [f"thrust pulse {number}" for number in pulses]
+        yield from _of_pulses("thrust_per_pulse", named, asked.thrust_per_pulse, 1.0, "")
+    if asked.timing is not None:
+        yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], asked.timing, 0.0, "s")
+    if asked.timing_offset is not None:
+        yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), asked.timing_offset, 0.0, "s")
+    if asked.attitude is not None:
+        for axis in "xy":
+            yield _input(f"attitude {axis}", "attitude", asked.attitude, 0.0, "rad")
+
+
+def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:
+    """Sizes of relative tolerances become absolute; a factor (nominal one) stays what it is."""
+    size = tolerance.size * (nominal if tolerance.relative else 1.0)
+    return Input(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
+
+
+def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
+    """The thrusters that the schedule fires, by name; the steerable torquer has None."""
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    members: dict[str, Thruster | None] = {}
+    for pulse in schedule:
+        if pulse.channel in channels:
+            members |= {thruster.name: thruster for thruster in channels[pulse.channel].thrusters}
+        elif pulse.channel == STEERABLE and spacecraft.torquer is not None:
+            members[STEERABLE] = None
+    return members
+
+
+def _idle(name: str) -> str:
+    who = "the steerable torquer" if name == STEERABLE else name
+    return f"{SCHEDULE_IDLE} {who}"
+
+
+def _thrust(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:
+    if name not in members:
+        return Unused(f"thrust {name}", _idle(name))
+    return Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
+
+
+def _direction(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Iterator[Input | Unused]:
+    if name not in members:
+        yield Unused(f"direction {name}", _idle(name))
+        return
+    thruster = members[name]
+    if thruster is None:
+        yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
+    elif thruster.force is None or thruster.position is None:
+        yield Unused(f"direction {name}", KNOWN_BY_TORQUE)
+    else:
+        for axis in "ab":
+            yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
+
+
+def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Iterator[Input | Unused]:
+    if name not in members:
+        yield Unused(f"position {name}", _idle(name))
+        return
+    thruster = members[name]
+    if thruster is None:
+        yield Unused(f"position {name}", "a steerable torquer gives a torque, wherever it sits")
+    elif thruster.force is None:
+        yield Unused(f"position {name}", KNOWN_BY_TORQUE)
+    else:
+        for axis in "xyz":
+            yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
+
+
+def _of_pulses(
+    key: str, names: Iterable[str], tolerance: Tolerance, nominal: float, unit: str
+) -> Iterator[Input | Unused]:
+    named = list(names)
+    if not named:
+        yield Unused(key.replace("_", " "), "the schedule has no pulses")
+    for name in named:
+        yield Input(name, key, tolerance.kind, tolerance.size, nominal, unit)

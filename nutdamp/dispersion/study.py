@@ -1,0 +1,359 @@
+"""Running a study: blocks of cases over threads, in rounds, so that it can be watched, stopped and taken up again."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.dispersion.draws import BLOCK, Draws, Source
+from nutdamp.dispersion.kernel import ClosedForm, Ends
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
+from nutdamp.dispersion.sensitivity import FirstOrder, first_order, sampled_shares
+from nutdamp.dispersion.statistics import (
+    EXACT_CASES,
+    Distribution,
+    Exact,
+    Sketch,
+    Worst,
+    binomial_interval,
+)
+from nutdamp.dispersion.truth import Model, Truth
+from nutdamp.errors import BadRequest
+
+Array = NDArray[np.float64]
+Fly = Callable[[Truth], Ends]
+
+CHUNK = 8_192
+"""Cases that the kernel works on at once, so that they stay in the cache."""
+
+STRIDE = 1_024
+"""Cases that are always flown together; chunks are multiples of it."""
+
+ROUND = 64 * BLOCK
+"""Cases between two looks at the results."""
+
+EARLY = 2 * BLOCK
+"""The first cases, whose outcome is kept whole for `sampled_shares`."""
+
+KEPT_WORST = 1_000
+"""Worst cases that are kept."""
+
+PROBABILITY = 0.997
+"""How surely a requirement must be met where the file does not say."""
+
+CONFIDENCE = 0.95
+"""Of the interval about the fraction that meets it."""
+
+LONG_PULSE = 0.5
+"""rad that the body turns within a pulse, beyond which H moves noticeably otherwise than by an impulse (1 %)."""
+
+Collect = Callable[[int, Array], None]
+"""Takes the number (from 0) of the first of some cases, and their outputs (5, n), in order."""
+
+
+def threads_here() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is studied: truths of ``model`` drawn from ``seed``, flown by ``fly`` (closed form by default).
+
+    Cases count from 0 here; people see them count from 1.
+    """
+
+    model: Model
+    seed: int = 1
+    fly: Fly | None = None
+    flown: bool = False
+
+    @property
+    def flies(self) -> Fly:
+        """What flies a truth."""
+        return self.fly or self._closed_form
+
+    @cached_property
+    def _closed_form(self) -> ClosedForm:
+        return ClosedForm(self.model)
+
+    @cached_property
+    def first_order(self) -> FirstOrder:
+        """Sensitivities by the closed form."""
+        return first_order(self.model)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the impulse sum leaves out of this spacecraft."""
+        body = self.model.spacecraft
+        left = [
+            *["disturbances"] * bool(body.disturbances),
+            *["dissipation"] * (body.dissipation is not None),
+            *["I1 ≠ I2 (their mean is flown)"] * (not body.inertia.symmetric),
+        ]
+        if self.flown:
+            return ()
+        notes = [f"the impulse sum (17) knows nothing of {' and '.join(left)}; --flown does"] if left else []
+        longest = max((pulse.on_time for pulse in self.model.schedule), default=0.0)
+        turned = abs(body.spin) * longest
+        if turned > LONG_PULSE:
+            notes.append(
+                f"the body turns by up to {math.degrees(turned):.0f}° during a pulse: the impulse sum (17) has the "
+                f"nutation right, but the shift of H only roughly; --flown has both"
+            )
+        return tuple(notes)
+
+    def source(self) -> Source:
+        """Draws for one thread."""
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical)
+
+    def draws_of(self, case: int) -> dict[str, float]:
+        """Deviations of one case (from 0), by input."""
+        draws, _ = self.source().block(case // BLOCK)
+        return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
+
+    def outputs_of(self, draws: Draws) -> Array:
+        """The outputs (5,) of one case with these deviations; none: of the estimate itself."""
+        out = np.empty((len(OUTPUTS), 1))
+        truth = self.model.truth({name: np.atleast_1d(draw) for name, draw in draws.items()})
+        measure(self.model, self.flies(truth), out)
+        return out[:, 0]
+
+    def severity(self, values: Array) -> Array:
+        """How bad cases are: by what the requirement asks, relative to it; without one by the nutation left."""
+        asked = self.model.spacecraft.requirement
+        limits = () if asked is None else ((0, asked.nutation), (1, asked.momentum_shift))
+        ratios = [values[row] / limit for row, limit in limits if limit is not None]
+        return values[0] if not ratios else np.asarray(np.max(ratios, axis=0))
+
+    @property
+    def fingerprint(self) -> str:
+        """Tells whether kept results belong to this study: everything that the numbers depend on, but their count."""
+        body, schedule = self.model.spacecraft, self.model.schedule
+        parts: list[Any] = [
+            self.seed,
+            self.flown,
+            body.inertia.moments,
+            body.inertia.axes,
+            body.omega0,
+            body.dispersions,
+        ]
+        parts += [body.requirement, body.disturbances, body.dissipation, body.channels, body.steerable]
+        parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
+        with np.printoptions(precision=17, floatmode="unique"):
+            return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+@dataclass(eq=False)
+class Results:
+    """What has been found of a study so far: the cases from 0 to ``done``.
+
+    ``values`` (5, capacity) are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the
+    outcome of the first cases.
+    """
+
+    study: Study
+    asked: int
+    done: int = 0
+    redrawn: int = 0
+    met: int = 0
+    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    values: Array | None = None
+    sketches: list[Sketch] | None = None
+    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
+
+    def __post_init__(self) -> None:
+        if self.values is None and self.sketches is None:
+            if self.asked <= EXACT_CASES:
+                self.values = np.empty((len(OUTPUTS), self.asked))
+            else:
+                self.sketches = [Sketch() for _ in OUTPUTS]
+
+    @property
+    def exact(self) -> bool:
+        """Whether percentiles are exact."""
+        return self.sketches is None
+
+    def distribution(self, output: str) -> Distribution | None:
+        """The distribution of an output; None where it is not known (propellant)."""
+        row = OUTPUTS.index(output)
+        if self.sketches is not None:
+            found: Distribution = self.sketches[row]
+            return None if math.isinf(found.minimum) or math.isnan(found.minimum) else found
+        assert self.values is not None
+        values = self.values[row, : self.done]
+        return None if not len(values) or math.isnan(values[0]) else Exact(values)
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Fraction of cases within the requirement; None without one."""
+        return None if self.study.model.spacecraft.requirement is None or not self.done else self.met / self.done
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Exact interval about `met_fraction`."""
+        return binomial_interval(self.met, self.done, CONFIDENCE)
+
+    @property
+    def probability(self) -> float:
+        """How surely the requirement must be met."""
+        asked = self.study.model.spacecraft.requirement
+        return PROBABILITY if asked is None or asked.probability is None else asked.probability
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether as many cases as asked are within the requirement; None without one."""
+        fraction = self.met_fraction
+        return None if fraction is None else fraction >= self.probability
+
+    @cached_property
+    def shares(self) -> dict[str, dict[str, float]]:
+        """`sampled_shares` of the first cases; call it when all is done."""
+        count = min(self.done, EARLY)
+        source, random = self.study.source(), [e.name for e in self.study.model.inputs.drawn if e.kind != "bias"]
+        rows: dict[str, list[Array]] = {name: [] for name in random}
+        for block in range(math.ceil(count / BLOCK)):
+            draws, _ = source.block(block)
+            for name in random:
+                rows[name].append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
+        return sampled_shares({name: np.concatenate(parts) for name, parts in rows.items()}, self.early[:, :count])
+
+    def take(self, first: int, values: Array) -> None:
+        """Count the cases from ``first`` on, outputs (5, n)."""
+        severity = self.study.severity(values)
+        self.met += int(np.count_nonzero(severity <= 1.0))
+        self.worst.add(first, severity)
+        for sketch, row in zip(self.sketches or (), values, strict=False):
+            sketch.add(row)
+        self.done = first + values.shape[1]
+
+    def extended(self, asked: int) -> Results:
+        """The same, with room for ``asked`` cases; raises BadRequest where that is fewer than are done."""
+        if asked < self.done:
+            raise BadRequest(f"{self.done} cases are done already: ask for as many, or leave out what is resumed")
+        more = Results(
+            self.study, asked, self.done, self.redrawn, self.met, self.worst, sketches=self.sketches, early=self.early
+        )
+        if self.values is not None and more.values is not None:
+            more.values[:, : self.done] = self.values[:, : self.done]
+        elif self.values is not None and more.sketches is not None:
+            for sketch, row in zip(more.sketches, self.values, strict=True):
+                sketch.add(row[: self.done])
+        return more
+
+
+def run(
+    results: Results,
+    *,
+    threads: int = 1,
+    chunk: int = CHUNK,
+    watch: Callable[[int], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+    collect: Collect | None = None,
+) -> Results:
+    """Fly the cases that ``results`` asks for and does not have; returns ``results``.
+
+    ``watch`` is told now and then how many are done. When ``stopped`` says so, the cases done so far, always the first
+    ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.
+    """
+    if collect is not None and results.done:
+        if results.values is None:
+            raise BadRequest(f"cases of an earlier run are kept singly only up to {EXACT_CASES}")
+        collect(0, results.values[:, : results.done])
+    while results.done < results.asked and not stopped():
+        first = results.done
+        last = min(results.asked, first - first % ROUND + ROUND)
+        out = np.empty((len(OUTPUTS), last - first)) if results.values is None else results.values[:, first:last]
+        done, redrawn = _Round(results, first, last, out, chunk).fly(threads, watch, stopped)
+        if done == 0:
+            break
+        results.redrawn += redrawn
+        results.take(first, out[:, :done])
+        if collect is not None:
+            collect(first, out[:, :done])
+        watch(results.done)
+    return results
+
+
+class _Round:
+    """Some cases of a study, flown by several threads that take one block after the other."""
+
+    def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
+        self.results, self.first, self.last, self.out = results, first, last, out
+        self.chunk = max(chunk // STRIDE, 1) * STRIDE
+        self.blocks = range(first // BLOCK, math.ceil(last / BLOCK))
+        self.taken = 0
+        self.finished = 0
+        self.redrawn = 0
+        self.failures: list[BaseException] = []
+        self.lock = threading.Lock()
+
+    def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
+        """How many cases were flown, always the first ones, and how many draws were made again."""
+        workers = [threading.Thread(target=self._work, args=(stopped,)) for _ in range(min(threads, len(self.blocks)))]
+        for worker in workers:
+            worker.start()
+        try:
+            for worker in workers:
+                while worker.is_alive():
+                    worker.join(0.1)
+                    if worker.is_alive():
+                        watch(min(self.first + self.finished * BLOCK, self.last))
+        except BaseException:
+            self.taken = len(self.blocks)  # nothing more is begun
+            for worker in workers:
+                worker.join()
+            raise
+        if self.failures:
+            raise self.failures[0]
+        return min(
+            self.last, self.blocks[0] * BLOCK + self.finished * BLOCK
+        ) - self.first if self.finished else 0, self.redrawn
+
+    def _work(self, stopped: Callable[[], bool]) -> None:
+        try:
+            source = self.results.study.source()
+            while not stopped():
+                with self.lock:
+                    if self.taken >= len(self.blocks):
+                        return
+                    block = self.blocks[self.taken]
+                    self.taken += 1
+                redrawn = self._block(source, block)
+                with self.lock:
+                    self.finished += 1
+                    self.redrawn += redrawn
+        except BaseException as failure:  # handed to the thread that waits
+            with self.lock:
+                self.failures.append(failure)
+                self.taken = len(self.blocks)
+
+    def _block(self, source: Source, block: int) -> int:
+        """Fly the part of a block that belongs to this round; returns how often its cases were drawn again."""
+        study, early = self.results.study, self.results.early
+        draws, redrawn = source.block(block)
+        begin, end = max(self.first, block * BLOCK), min(self.last, (block + 1) * BLOCK)
+        # Whole strides are flown, even where fewer cases are wanted: what flies them may let one depend on its stride.
+        for low in range(begin - begin % STRIDE, end, self.chunk):
+            high = min(low + self.chunk, end + -end % STRIDE)
+            rows = slice(low - block * BLOCK, high - block * BLOCK)
+            ends = study.flies(study.model.truth({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
+            wanted = slice(max(low, begin), min(high, end))
+            inner = slice(wanted.start - low, wanted.stop - low)
+            outputs = np.empty((len(OUTPUTS), high - low))
+            measure(study.model, ends, outputs)
+            self.out[:, wanted.start - self.first : wanted.stop - self.first] = outputs[:, inner]
+            if low < EARLY:
+                outcome = np.empty((ROWS, high - low))
+                vectors(study.model, ends, outcome)
+                early[:, wanted] = outcome[:, inner]
+        return int(np.count_nonzero((redrawn >= begin - block * BLOCK) & (redrawn < end - block * BLOCK)))

@@ -1,0 +1,113 @@
+"""What ``disperse --json`` gives."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from nutdamp import __version__
+from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.statistics import Array
+from nutdamp.dispersion.study import CONFIDENCE, Results, Study
+from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.samples_csv import OUTPUT_COLUMNS
+
+PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
+
+
+def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
+    """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
+
+    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is what one
+    sigma of an input alone (or all of a bias) does to the nutation.
+    """
+    study = results.study
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(study.model.spacecraft),
+        "scheme": scheme,
+        "samples": results.done,
+        "asked": results.asked,
+        "interrupted": results.done < results.asked,
+        "seed": study.seed,
+        "flown": study.flown,
+        "redrawn": results.redrawn,
+        "exact_percentiles": results.exact,
+        "percentiles": {
+            column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
+        },
+        "requirement": _requirement(results),
+        "shares": _shares(results),
+        "unused": [entry.name for entry in study.model.inputs.unused],
+        "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
+        "worst": [
+            case_json(study, int(case), study.draws_of(int(case))) for case in results.worst.cases[:worst].tolist()
+        ],
+    }
+
+
+def _percentiles(results: Results, output: str) -> dict[str, float | None]:
+    names = [*(f"{percent:g}" for percent in PERCENTS), "max"]
+    found = results.distribution(output)
+    if found is None:
+        return dict.fromkeys(["nominal", "min", *names])
+    nominal = results.study.outputs_of({})[OUTPUTS.index(output)]
+    values = [*found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
+    every = {"nominal": float(nominal), "min": found.minimum, **dict(zip(names, values, strict=True))}
+    return {name: _shown(output, value) for name, value in every.items()}
+
+
+def _shown(output: str, value: float) -> float:
+    return math.degrees(value) if output in OUTPUTS[:3] else value
+
+
+def _requirement(results: Results) -> dict[str, Any] | None:
+    if results.met_fraction is None:
+        return None
+    low, high = results.interval
+    return {
+        "met_fraction": results.met_fraction,
+        "low": low,
+        "high": high,
+        "confidence": CONFIDENCE,
+        "probability": results.probability,
+        "met": results.meets_requirement,
+    }
+
+
+def _shares(results: Results) -> list[dict[str, Any]]:
+    analytic, sampled = results.study.first_order, results.shares
+    shares = {name: analytic.shares(name).tolist() for name in OUTPUTS}
+    effects = np.degrees(analytic.effects("nutation")).tolist()
+    rows = []
+    for index, entry in enumerate(analytic.inputs):
+        both = {
+            name: {"analytic": shares[name][index], "sampled": sampled.get(entry.name, {}).get(name, 0.0)}
+            for name in OUTPUTS
+        }
+        rows.append(
+            {
+                "input": entry.name,
+                **both["nutation"],
+                "tolerance": entry.tolerance,
+                "sigma": entry.sigma,
+                "effect_deg": effects[index],
+                **{name: both[name] for name in OUTPUTS[1:]},
+            }
+        )
+    return rows
+
+
+def case_json(study: Study, case: int, draws: dict[str, float], outputs: Array | None = None) -> dict[str, Any]:
+    """One case (from 0): the true value of each input, in SI, and the outputs."""
+    values = study.outputs_of(draws) if outputs is None else outputs
+    return {
+        "case": case + 1,
+        "inputs": {entry.name: entry.nominal + draws[entry.name] for entry in study.model.inputs.drawn},
+        **{
+            column: _shown(name, float(value))
+            for name, column, value in zip(OUTPUTS, OUTPUT_COLUMNS, values, strict=True)
+        },
+    }

@@ -1,0 +1,202 @@
+"""The keys below ``dispersions`` in a spacecraft file, and what they say as `Dispersions`.
+
+The sizes of tolerances stay as they are written here: `dispersion_rules` finds what is wrong with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, WrapValidator
+from pydantic_core import CoreSchema, core_schema
+
+from nutdamp.files.fields import Section
+from nutdamp.schedule import STEERABLE
+from nutdamp.spacecraft import Steerable, Thruster
+from nutdamp.tolerances import KINDS, Dispersions, Tolerance
+from nutdamp.units import parse, pattern
+
+QUANTITIES = {
+    "A": "inertia",
+    "C": "inertia",
+    "omega0": "rate",
+    "thrust": "force",
+    "thrust_per_pulse": "ratio",
+    "thrust_direction": "angle",
+    "position": "length",
+    "timing": "time",
+    "timing_offset": "time",
+    "attitude": "angle",
+}
+"""The keys of dispersions with the kind of quantity that they hold."""
+
+RELATIVE = ("inertia", "rate", "force", "ratio")
+"""The kinds of quantity that may be dispersed by a percentage of the nominal value."""
+
+BY_THRUSTER = ("thrust", "thrust_direction", "position")
+"""The keys that hold one tolerance for all thrusters, or one by name."""
+
+ALL = ""
+"""Stands for all thrusters, where the file gives one tolerance for them; no thruster has such a name."""
+
+
+def size_of(value: object, kind: str) -> tuple[float, bool]:
+    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and whether it is a fraction.
+
+    Raises ValueError, which says what would be right.
+    """
+    if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
+        return parse(value, "ratio"), True
+    try:
+        return parse(value, kind), kind == "ratio"
+    except ValueError as wrong:
+        hint = ", or in % of the nominal value" if kind in RELATIVE and kind != "ratio" else ""
+        raise ValueError(f"{wrong}{hint}") from None
+
+
+def by_name(value: Mapping[str, object]) -> bool:
+    """Whether a mapping holds tolerances by thruster, and is not itself one."""
+    return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
+
+
+class ToleranceSection(Section):
+    """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
+
+    normal: Any = None
+    uniform: Any = None
+    triangular: Any = None
+    bias: Any = None
+
+    def tolerance(self, key: str) -> Tolerance:
+        """The checked tolerance, which stands at ``key`` of the dispersions."""
+        kind = next(kind for kind in KINDS if getattr(self, kind) is not None)
+        size, relative = size_of(getattr(self, kind), QUANTITIES[key])
+        return Tolerance(kind, size, relative)
+
+
+def _three_alike(value: object, several: core_schema.ValidatorFunctionWrapHandler) -> object:
+    """A single tolerance stands for all three rates."""
+    return [ToleranceSection.model_validate(value)] * 3 if isinstance(value, dict) else several(value)
+
+
+def _all_alike(value: object, several: core_schema.ValidatorFunctionWrapHandler) -> object:
+    """A single tolerance stands for all thrusters."""
+    single = isinstance(value, dict) and not by_name(value)
+    return {ALL: ToleranceSection.model_validate(value)} if single else several(value)
+
+
+class Shown:
+    """Annotation of what stands at ``key``: its JSON Schema, with the units of its quantity."""
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
+        single = _json_schema(QUANTITIES[self.key])
+        if self.key == "omega0":
+            return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
+        if self.key in BY_THRUSTER:
+            return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
+        return single
+
+
+def _json_schema(kind: str) -> dict[str, Any]:
+    """JSON Schema of a tolerance of ``kind``."""
+    kinds = dict.fromkeys([kind, *["ratio"] * (kind in RELATIVE)])
+    texts = [{"type": "string", "pattern": pattern(one)} for one in kinds]
+    spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
+    return {
+        "type": "object",
+        "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
+        "additionalProperties": False,
+        "minProperties": 1,
+        "maxProperties": 1,
+    }
+
+
+_Three = Annotated[list[ToleranceSection], Field(min_length=3, max_length=3), WrapValidator(_three_alike)]
+_ByThruster = Annotated[dict[str, ToleranceSection], WrapValidator(_all_alike)]
+
+
+class DispersionsSection(Section):
+    """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
+
+    A: Annotated[ToleranceSection, Shown("A")] | None = Field(
+        default=None, description="Of the transverse moment of inertia, kg m² or %."
+    )
+    C: Annotated[ToleranceSection, Shown("C")] | None = Field(
+        default=None, description="Of the moment of inertia about the spin axis, kg m² or %."
+    )
+    omega0: Annotated[_Three, Shown("omega0")] | None = Field(
+        default=None, description="Of each body rate at t = 0, rad/s or %; or a list of three."
+    )
+    thrust: Annotated[_ByThruster, Shown("thrust")] | None = Field(
+        default=None, description="Of each thruster, the same in all its pulses, % or N; or by name."
+    )
+    thrust_per_pulse: Annotated[ToleranceSection, Shown("thrust_per_pulse")] | None = Field(
+        default=None, description="Of the thrust, in each pulse anew, %."
+    )
+    thrust_direction: Annotated[_ByThruster, Shown("thrust_direction")] | None = Field(
+        default=None, description="Tilt of each force about two axes across it, rad; or by name."
+    )
+    position: Annotated[_ByThruster, Shown("position")] | None = Field(
+        default=None, description="Of each thruster's position, each component, m; or by name."
+    )
+    timing: Annotated[ToleranceSection, Shown("timing")] | None = Field(
+        default=None, description="Shift of each pulse, s."
+    )
+    timing_offset: Annotated[ToleranceSection, Shown("timing_offset")] | None = Field(
+        default=None, description="One shift of the whole schedule, s."
+    )
+    attitude: Annotated[ToleranceSection, Shown("attitude")] | None = Field(
+        default=None, description="Of the direction of the spin axis at t = 0, about two axes across it, rad."
+    )
+
+
+def dispersions(
+    section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
+) -> Dispersions | None:
+    """The tolerances of a checked file; None where it has none. A thrust in N becomes a fraction of the thruster's.
+
+    ``torquer`` is the steerable one, also where an ideal one is assumed.
+    """
+    if section is None:
+        return None
+    thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
+    if torquer is not None:
+        thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
+
+    def one(key: str) -> Tolerance | None:
+        entry: ToleranceSection | None = getattr(section, key)
+        return None if entry is None else entry.tolerance(key)
+
+    def each(key: str) -> dict[str, Tolerance]:
+        entries: dict[str, ToleranceSection] = getattr(section, key) or {}
+        found = {name: entry.tolerance(key) for name, entry in entries.items()}
+        return dict.fromkeys(thrusts, found[ALL]) if ALL in found else found
+
+    def fraction(name: str, tolerance: Tolerance) -> Tolerance:
+        thrust = thrusts[name]
+        if tolerance.relative or thrust is None:
+            return tolerance
+        return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
+
+    rates = [None if entry is None else entry.tolerance("omega0") for entry in section.omega0 or (None, None, None)]
+    return Dispersions(
+        A=one("A"),
+        C=one("C"),
+        omega0=(rates[0], rates[1], rates[2]),
+        thrust={name: fraction(name, tolerance) for name, tolerance in each("thrust").items()},
+        thrust_per_pulse=one("thrust_per_pulse"),
+        thrust_direction=each("thrust_direction"),
+        position=each("position"),
+        timing=one("timing"),
+        timing_offset=one("timing_offset"),
+        attitude=one("attitude"),
+    )
+
+
+def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:
+    """Thrust in N behind a torque (N m) on a lever arm (m); None where one of them is not known."""
+    return None if torque is None or lever_arm is None else torque / lever_arm

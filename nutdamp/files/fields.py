@@ -1,0 +1,82 @@
+"""What the models of a spacecraft file are made of: quantities with units and bounds, mappings with known keys."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from nutdamp.units import KINDS, parse, pattern, shown
+
+SMALLEST = 1e-15
+"""Values that must be above zero and are smaller count as zero, in SI: what is divided by them could overflow."""
+
+_BOUNDS = {
+    "minimum": (operator.ge, "of at least"),
+    "exclusiveMinimum": (operator.gt, "above"),
+    "exclusiveMaximum": (operator.lt, "below"),
+}
+RIGHT_ANGLE = parse("90 deg", "angle")
+
+
+class Quantity:
+    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON Schema, in SI."""
+
+    def __init__(self, kind: str, **bounds: float) -> None:
+        self.kind, self.bounds = kind, bounds
+
+    def check(self, value: object) -> float:
+        """SI value; raises ValueError, which says what would be right."""
+        result = parse(value, self.kind)
+        if not all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items()):
+            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted")
+        if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
+            raise ValueError(
+                f"{shown(value)} is too small to be real; {self.range} is wanted, in SI at least {SMALLEST:g}"
+            )
+        return result
+
+    @property
+    def range(self) -> str:
+        """``an angle of at least 0 and below 90 deg``."""
+        bounds = (
+            f"{_BOUNDS[name][1]} {'90 deg' if limit == RIGHT_ANGLE else f'{limit:g}'}"
+            for name, limit in self.bounds.items()
+        )
+        return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
+        number = {"type": "number", **self.bounds}
+        if not KINDS[self.kind].factors:
+            return number
+        return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
+
+
+class AxialShorthand:
+    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
+
+    single = Quantity("torque")
+
+    def check(self, value: object, vector: core_schema.ValidatorFunctionWrapHandler) -> object:
+        """Three components; raises ValueError, which says what would be right."""
+        return vector(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        single = self.single.__get_pydantic_json_schema__(schema, handler)
+        return {"anyOf": [handler(schema), *single["anyOf"]]}
+
+
+class Section(BaseModel):
+    """A mapping of the file: no key that is not named here."""
+
+    # Built once, with the root, when the first file is read.
+    model_config = ConfigDict(extra="forbid", defer_build=True)

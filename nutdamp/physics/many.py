@@ -1,0 +1,355 @@
+"""Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
+
+Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
+between two edges is a torque-free arc in closed form where the body is symmetric and left alone; else a Taylor series,
+as in `rigid`, of an order and a number of steps common to a block of cases that stays in the cache.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics.rigid import FLAT, LONGEST, NOTHING, Forcing
+
+Array = NDArray[np.float64]
+
+BLOCK = 2048
+"""Cases that are flown together: many enough to hide the calls, few enough that their series stay in the cache."""
+
+LARGEST_ORDER = 30
+"""Of the series; what has not converged by then is done again in shorter steps."""
+
+STRIDE = 2.5
+"""Radians of one step, at most; there the work per radian is least."""
+
+REMAINDER = 1e-15
+"""Size of the last terms kept, relative to the scale of rates and quaternion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """What flies: principal ``moments`` (3, n) kg m²; ``constant`` torque (3,) N m and ``forcing`` act on all."""
+
+    moments: Array
+    constant: Array
+    forcing: Forcing = NOTHING
+
+    @property
+    def free(self) -> bool:
+        """Whether a coast is a torque-free arc of a symmetric body for every case."""
+        alone = not self.constant.any() and self.forcing == NOTHING
+        return alone and bool(np.array_equal(self.moments[0], self.moments[1]))
+
+    def some(self, cases: Any) -> Bodies:
+        """Those of ``cases`` (an index of arrays)."""
+        return Bodies(self.moments[:, cases], self.constant, self.forcing)
+
+
+@dataclass(frozen=True, slots=True)
+class Pulses:
+    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
+
+    An on-time of 0 is an ideal impulse.
+    """
+
+    starts: Array
+    on_times: Array
+    impulses: Array
+
+    def some(self, cases: Any) -> Pulses:
+        """Those of ``cases`` (an index of arrays)."""
+        return Pulses(self.starts[:, cases], self.on_times, self.impulses[:, :, cases])
+
+    @property
+    def edges(self) -> Array:
+        """Starts and ends in turn, (2k, n) s."""
+        return np.stack([self.starts, self.starts + self.on_times[:, None]], axis=1).reshape(-1, self.starts.shape[1])
+
+    @property
+    def jumps(self) -> tuple[Array, Array]:
+        """What changes at each of the edges, (2k, 3, n) each: the torque in N m, and the momentum in N m s."""
+        ideal = self.on_times == 0.0
+        torque = self.impulses / np.where(ideal, 1.0, self.on_times)[:, None, None]
+        torque[ideal] = 0.0
+        kick = np.where(ideal[:, None, None], self.impulses, 0.0)
+        shape = (-1, *self.impulses.shape[1:])
+        return np.stack([torque, -torque], axis=1).reshape(shape), np.stack([kick, 0.0 * kick], axis=1).reshape(shape)
+
+
+def fly(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> tuple[Array, Array]:
+    """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
+
+    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0. Exact to some 1e-13 rad for each hundred radians flown. Pulses
+    may overlap and come in any order, in each case its own. A case that dissipation drives into flat spin stays there.
+    Raises Infeasible for motions over more than `rigid.LONGEST` rad.
+    """
+    count = rates.shape[1]
+    rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
+    for begin in range(0, count, BLOCK):
+        cases = slice(begin, min(begin + BLOCK, count))
+        _fly_block(bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases))
+    return rates, quaternion
+
+
+def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> None:
+    """Fly one block, in place."""
+    edges = pulses.edges
+    if not len(edges):
+        return
+    usual = np.argsort(edges.mean(axis=1), kind="stable")
+    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
+    if sorted_alike.all():
+        _fly_alike(bodies, rates, quaternion, pulses, usual)
+        return
+    for cases, alike in ((np.flatnonzero(sorted_alike), True), (np.flatnonzero(~sorted_alike), False)):
+        if len(cases):
+            flown, turned = rates[:, cases], quaternion[:, cases]
+            chosen = bodies.some(cases), flown, turned, pulses.some(cases)
+            if alike:
+                _fly_alike(*chosen, usual)
+            else:
+                _fly_each(*chosen)
+            rates[:, cases], quaternion[:, cases] = flown, turned
+
+
+def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, order: NDArray[np.intp]) -> None:
+    """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
+    edges, (turns, kicks) = pulses.edges, pulses.jumps
+    now = np.zeros(rates.shape[1])
+    on: set[int] = set()
+    for edge in order.tolist():
+        torque = np.sum(turns[sorted(on)], axis=0) if on else None
+        _advance(bodies, rates, quaternion, now, edges[edge] - now, torque)
+        now = edges[edge]
+        number, ends = divmod(edge, 2)
+        if pulses.on_times[number] == 0.0:
+            rates += kicks[edge] / bodies.moments
+        elif ends:
+            on.remove(edge - 1)
+        else:
+            on.add(edge)
+
+
+def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> None:
+    """Fly cases whose edges come in orders of their own, in place."""
+    edges = pulses.edges
+    order = np.argsort(edges, axis=0, kind="stable")
+    edges = np.take_along_axis(edges, order, axis=0)
+    turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
+    now = np.zeros(rates.shape[1])
+    torque = np.zeros_like(rates)
+    for edge, turn, kick in zip(edges, turns, kicks, strict=True):
+        _advance(bodies, rates, quaternion, now, edge - now, torque)
+        now = edge
+        torque = torque + turn
+        rates += kick / bodies.moments
+
+
+def _advance(
+    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, torque: Array | None
+) -> None:
+    """Move on by ``duration`` (n,) s from ``now`` under a ``torque`` (3, n) N m, in place; None is no torque."""
+    if not duration.any():
+        return
+    if torque is None and bodies.free:
+        _arc(bodies.moments, rates, quaternion, duration)
+        return
+    acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
+    _integrate(bodies, rates, quaternion, now, duration, acceleration)
+
+
+def cos_sin(angle: Array) -> tuple[Array, Array]:
+    """Cosine and sine by the tangent of the half-angle: as exact as numpy's, and several times as fast."""
+    half = np.tan(0.5 * angle)
+    scale = 1.0 / (1.0 + half * half)
+    return 2.0 * scale - 1.0, 2.0 * half * scale
+
+
+def _arc(moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
+    """The exact torque-free arc of symmetric bodies, in place; see `attitude.arc`.
+
+    R(t) = R(0) Rot(H(0)/A t) Rot3(aω3 t), with H in body axes: the body turns about H at |H|/A and about its own axis
+    at aω3.
+    """
+    A, _, C = moments
+    x, y = rates[0], rates[1]
+    axial = C / A * rates[2]
+    size = np.sqrt(x * x + y * y + axial * axial)
+    cosine, sine = cos_sin(0.5 * size * duration)
+    sine /= np.where(size > 0.0, size, 1.0)
+    turned = _product(quaternion, (cosine, sine * x, sine * y, sine * axial))
+    angle = (1.0 - C / A) * rates[2] * duration
+    cosine, sine = cos_sin(0.5 * angle)
+    p, a, b, c = turned
+    quaternion[0], quaternion[3] = p * cosine - c * sine, c * cosine + p * sine
+    quaternion[1], quaternion[2] = a * cosine + b * sine, b * cosine - a * sine
+    quaternion /= np.sqrt(np.sum(quaternion * quaternion, axis=0))
+    # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
+    cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+    rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
+
+
+def _product(left: Sequence[Array] | Array, right: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
+    """Product of quaternions given by components, see `attitude.multiply`."""
+    p, a, b, c = left
+    w, x, y, z = right
+    return (
+        p * w - a * x - b * y - c * z,
+        p * x + a * w + b * z - c * y,
+        p * y - a * z + b * w + c * x,
+        p * z + a * y - b * x + c * w,
+    )
+
+
+def _integrate(
+    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, acceleration: Array
+) -> None:
+    """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place."""
+    forcing, moments = bodies.forcing, bodies.moments
+    strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
+    strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
+    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    pace = np.sqrt(np.sum(rates * rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
+    span = float(np.max(pace * duration))
+    if span > LONGEST:
+        raise Infeasible(
+            f"the motion of a dispersed case runs over {span:.2g} rad, too many to be integrated; shorten the time, "
+            f"or look for a torque or rate that is too large"
+        )
+    steps = max(1, math.ceil(span / STRIDE))
+    for number in range(steps):
+        _step(bodies, rates, quaternion, now + duration * (number / steps), duration / steps, acceleration)
+
+
+def _step(
+    bodies: Bodies, rates: Array, quaternion: Array, now: Array, step: Array, acceleration: Array, halvings: int = 12
+) -> None:
+    """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
+    forcing = bodies.forcing
+    if forcing.growth > 0.0 and forcing.keep_momentum:
+        momentum = rates * bodies.moments
+        flat = np.abs(momentum[2]) < FLAT * np.sqrt(np.sum(momentum * momentum, axis=0))
+        step = np.where(flat, 0.0, step)
+    series = _Series(bodies, rates, quaternion, now, step, acceleration)
+    if series.converges():
+        rates[:], quaternion[:] = series.end()
+        return
+    if halvings == 0:
+        raise Infeasible("the motion of a dispersed case changes too fast to be integrated")
+    for begin in (0.0, 0.5):
+        _step(bodies, rates, quaternion, now + begin * step, 0.5 * step, acceleration, halvings - 1)
+
+
+class _Series:
+    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block.
+
+    ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products that Euler's equations need are one product
+    of two slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `rigid`.
+    """
+
+    def __init__(
+        self, bodies: Bodies, rates: Array, quaternion: Array, now: Array, step: Array, acceleration: Array
+    ) -> None:
+        first, second, third = moments = bodies.moments
+        count = len(step)
+        self.step, self.acceleration, self.moments = step, acceleration, moments
+        self.coupling = np.stack([(second - third) / first, (third - first) / second, (first - second) / third])
+        self.coupled = bool(self.coupling[2].any())
+        self.rates = np.empty((LARGEST_ORDER + 1, 5, count))
+        self.turns = np.empty((LARGEST_ORDER + 1, 4, count))
+        self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
+        self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in bodies.forcing.turning]
+        self.sink = None if bodies.forcing.growth == 0.0 else _Sink(bodies, count)
+        self.order = 0
+
+    def converges(self) -> bool:
+        """Take in as many orders as it needs; whether that is no more than there may be."""
+        scale = REMAINDER * max(1.0, float(np.max(np.abs(self.rates[0] * self.step))))
+        while self.order < LARGEST_ORDER:
+            self._next()
+            if self.order >= 4 and all(self._size(order) < scale for order in (self.order, self.order - 1)):
+                return True
+        return False
+
+    def end(self) -> tuple[Array, Array]:
+        """Rates (3, n) and unit quaternions (4, n) at the end of the step."""
+        rates = self.rates[: self.order + 1, :3].sum(axis=0)
+        quaternion = self.turns[: self.order + 1].sum(axis=0)
+        return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
+
+    def _size(self, order: int) -> float:
+        """Size of the terms of one order."""
+        turned = self.rates[order, :3] * self.step
+        return max(float(np.max(np.abs(turned))), float(np.max(np.abs(self.turns[order]))))
+
+    def _next(self) -> None:
+        """The next order: products of series are sums over the orders so far."""
+        k, rates, turns = self.order, self.rates, self.turns
+        scale = self.step / (k + 1)
+        following = rates[k + 1, :3]
+        parts = 3 if self.coupled else 2
+        products = np.einsum("kcn,kcn->cn", rates[: k + 1, 1 : 1 + parts], rates[k::-1, 2 : 2 + parts])
+        np.multiply(self.coupling[:parts], products, out=following[:parts])
+        following[parts:] = 0.0
+        if k == 0:
+            following += self.acceleration
+        for index, (size, turn) in enumerate(self.turning):
+            following[0] += size.real / self.moments[0]
+            following[1] += size.imag / self.moments[1]
+            self.turning[index] = (size * turn / (k + 1), turn)
+        speeds = rates[:, :3]
+        if self.sink is not None:
+            following += self.sink.acceleration(rates, k) / self.moments
+            speeds = rates[: k + 1, :3] + self.sink.slip[: k + 1]
+        following *= scale
+        rates[k + 1, 3:] = following[:2]
+        by_first, by_second, by_third = (
+            np.einsum("kcn,kn->cn", turns[: k + 1], speeds[k::-1, axis]) for axis in range(3)
+        )
+        half = 0.5 * scale
+        turns[k + 1, 0] = half * -(by_first[1] + by_second[2] + by_third[3])
+        turns[k + 1, 1] = half * (by_first[0] + by_third[2] - by_second[3])
+        turns[k + 1, 2] = half * (by_second[0] + by_first[3] - by_third[1])
+        turns[k + 1, 3] = half * (by_third[0] + by_second[1] - by_first[2])
+        self.order = k + 1
+
+
+class _Sink:
+    """Energy dissipation as series, see `rigid._Sink`: what it does to H, and how the body slips against it.
+
+    Vectors hold their components as 1, 2, 3, 1, 2, so that a cross product is two products of slices.
+    """
+
+    def __init__(self, bodies: Bodies, count: int) -> None:
+        self.moments, self.forcing = bodies.moments, bodies.forcing
+        self.momentum = np.zeros((LARGEST_ORDER, 5, count))
+        self.drive = np.zeros((LARGEST_ORDER, 5, count))  # D
+        self.slip = np.zeros((LARGEST_ORDER, 3, count))  # D × H/|H|²
+        self.lost = np.zeros((LARGEST_ORDER, count))  # (H1² + H2²)/H3
+        self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
+
+    def acceleration(self, rates: Array, k: int) -> Array:
+        """Coefficient k of D, (3, n) N m; makes that of ``slip`` on the way."""
+        momentum, drive = self.momentum, self.drive
+        momentum[k, :3] = rates[k, :3] * self.moments
+        momentum[k, 3:] = momentum[k, :2]
+        squared = np.einsum("kcn,kcn->cn", momentum[: k + 1, :3], momentum[k::-1, :3])
+        drive[k, :2] = self.forcing.growth * momentum[k, :2]
+        if self.forcing.keep_momentum:
+            before = np.einsum("kn,kn->n", momentum[1 : k + 1, 2], self.lost[:k][::-1])
+            self.lost[k] = (squared[0] + squared[1] - before) / momentum[0, 2]
+            drive[k, 2] = -self.forcing.growth * self.lost[k]
+        drive[k, 3:] = drive[k, :2]
+        self.squares[k] = squared.sum(axis=0)
+        crossed = np.einsum("kcn,kcn->cn", drive[: k + 1, 1:4], momentum[k::-1, 2:5])
+        crossed -= np.einsum("kcn,kcn->cn", drive[: k + 1, 2:5], momentum[k::-1, 1:4])
+        before = np.einsum("kn,kcn->cn", self.squares[1 : k + 1], self.slip[:k][::-1])
+        self.slip[k] = (crossed - before) / self.squares[0]
+        return np.asarray(drive[k, :3])

@@ -1,0 +1,211 @@
+"""Running studies: the same numbers whatever threads, chunks, interruptions; what is counted and kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import dispersed
+import numpy as np
+import pytest
+
+from nutdamp.dispersion import study as study_module
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.draws import BLOCK
+from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.study import Results, Study, run
+from nutdamp.dispersion.truth import Model
+from nutdamp.errors import BadRequest, CannotRead
+from nutdamp.files.study_file import load_results, save_results
+from nutdamp.spacecraft import Requirement
+from nutdamp.tolerances import Dispersions, Tolerance
+
+MANY = 3 * BLOCK + 1_234
+
+
+def a_study(**changes: object) -> Study:
+    model = dispersed.with_jets(scale=0.2)
+    given: dict[str, object] = {"requirement": Requirement(0.0712, 0.0269, 0.85), **changes}
+    body = replace(model.spacecraft, **given)  # type: ignore[arg-type]
+    return study_of(body, model.schedule, seed=5)
+
+
+@pytest.fixture(scope="module")
+def plain() -> Results:
+    return run(Results(a_study(), MANY))
+
+
+def same(first: Results, second: Results) -> None:
+    assert (first.done, first.redrawn, first.met) == (second.done, second.redrawn, second.met)
+    assert first.values is not None
+    assert second.values is not None
+    assert np.array_equal(first.values[:, : first.done], second.values[:, : second.done])
+    assert first.worst.cases.tolist() == second.worst.cases.tolist()
+    assert first.shares == second.shares
+
+
+@pytest.mark.parametrize(("threads", "chunk"), [(2, 8192), (1, 1024), (3, 5000), (1, BLOCK)])
+def test_threads_and_chunks_change_nothing(plain: Results, threads: int, chunk: int) -> None:
+    same(plain, run(Results(a_study(), MANY), threads=threads, chunk=chunk))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_flown_cases_do_not_depend_on_threads_chunks_or_interruptions(threads: int) -> None:
+    model = dispersed.with_jets(moments=(120.0, 110.0, 80.0))
+
+    def flown() -> Study:
+        return study_of(model.spacecraft, model.schedule, flown=True)
+
+    whole = run(Results(flown(), 3_000))
+    parts = run(Results(flown(), 1_500), threads=threads, chunk=1024)
+    same(whole, run(parts.extended(3_000), threads=threads, chunk=2048))
+
+
+def stop_after(calls: int):  # type: ignore[no-untyped-def]
+    left = iter(range(calls))
+    return lambda: next(left, None) is None
+
+
+def test_a_stopped_run_keeps_the_first_cases_and_goes_on_from_a_file(plain: Results, tmp_path: Path) -> None:
+    path = str(tmp_path / "study.npz")
+    stopped = run(Results(a_study(), MANY), stopped=stop_after(4))
+    assert 0 < stopped.done < MANY
+    assert stopped.done % BLOCK == 0
+    save_results(path, stopped)
+    same(plain, run(load_results(path, a_study(), MANY)))
+
+
+def test_a_study_can_be_extended(plain: Results, tmp_path: Path) -> None:
+    path = str(tmp_path / "study.npz")
+    save_results(path, run(Results(a_study(), 1_000)))
+    same(plain, run(load_results(path, a_study(), MANY), threads=2))
+    with pytest.raises(BadRequest, match="1000 cases are done already"):
+        load_results(path, a_study(), 999)
+
+
+def test_only_the_same_study_is_taken_up(tmp_path: Path) -> None:
+    path = str(tmp_path / "study.npz")
+    save_results(path, run(Results(a_study(), 100)))
+    asked = a_study().model.spacecraft.dispersions
+    assert asked is not None
+    others = [
+        replace(a_study(), seed=6),
+        a_study(omega0=a_study().model.spacecraft.omega0 * (1.0 + 1e-15)),
+        a_study(dispersions=replace(asked, A=Tolerance("normal", 0.1))),
+        a_study(requirement=None),
+    ]
+    for other in others:
+        with pytest.raises(BadRequest, match="another study"):
+            load_results(path, other, 200)
+    assert load_results(path, a_study(), 200).done == 100
+
+
+@pytest.mark.parametrize("content", [b"", b"not a study", b"PK\x03\x04 broken"])
+def test_what_is_no_study_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "study.npz"
+    path.write_bytes(content)
+    with pytest.raises(CannotRead, match="no file that --resume has written"):
+        load_results(str(path), a_study(), 10)
+
+
+def test_beyond_what_is_kept_singly_all_is_counted(
+    plain: Results, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As if 10,000 were the most: percentiles to 0.1 %, the same counts, resumed or not, in one file or the other."""
+    monkeypatch.setattr(study_module, "EXACT_CASES", 10_000)
+    counted = run(Results(a_study(), MANY), threads=2)
+    assert counted.values is None
+    assert not counted.exact
+    assert (counted.met, counted.redrawn) == (plain.met, plain.redrawn)
+    assert counted.worst.cases.tolist() == plain.worst.cases.tolist()
+    at = np.array([0.5, 0.9, 0.95, 0.99, 0.997, 1.0])
+    for output in OUTPUTS:
+        rough, exact = counted.distribution(output), plain.distribution(output)
+        assert rough is not None
+        assert exact is not None
+        assert rough.quantiles(at) == pytest.approx(exact.quantiles(at), rel=1e-3)
+    path = str(tmp_path / "study.npz")
+    for early in (run(Results(a_study(), 9_000)), run(Results(a_study(), MANY), stopped=stop_after(4))):
+        save_results(path, early)
+        resumed = run(load_results(path, a_study(), MANY))
+        assert resumed.sketches is not None
+        assert counted.sketches is not None
+        for one, other in zip(resumed.sketches, counted.sketches, strict=True):
+            assert np.array_equal(one.counts, other.counts)
+    assert load_results(path, a_study(), 9_999_999).sketches is not None
+
+
+def test_a_case_is_the_same_alone(plain: Results) -> None:
+    study = plain.study
+    assert plain.values is not None
+    for case in (0, BLOCK - 1, BLOCK, MANY - 1, int(plain.worst.cases[0])):
+        assert study.outputs_of(study.draws_of(case)) == pytest.approx(plain.values[:, case], rel=1e-14, abs=1e-16)
+
+
+def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
+    assert plain.values is not None
+    severity = np.maximum(plain.values[0] / 0.0712, plain.values[1] / 0.0269)
+    assert plain.worst.cases[0] == np.argmax(severity)
+    assert plain.met == np.count_nonzero(severity <= 1.0)
+    assert plain.met_fraction == plain.met / MANY
+    low, high = plain.interval
+    assert low < plain.met_fraction < high
+    assert plain.meets_requirement is (plain.met_fraction >= 0.85)
+    free = run(Results(a_study(requirement=None), 1_000))
+    assert free.met_fraction is None
+    assert free.meets_requirement is None
+    assert free.values is not None
+    assert free.worst.cases[0] == np.argmax(free.values[0])
+
+
+def test_unphysical_draws_are_counted() -> None:
+    body = replace(
+        dispersed.with_jets(moments=(100.0, 100.0, 190.0)).spacecraft,
+        dispersions=Dispersions(C=Tolerance("normal", 0.05, True)),
+    )
+    study = study_of(body, dispersed.with_jets().schedule)
+    results = run(Results(study, 20_000), threads=2)
+    # C > 200 = 2A lies 10/9.5 sigmas off: 14.6 % are drawn again, of those as many again.
+    assert results.redrawn == pytest.approx(20_000 * 0.1463 / (1 - 0.1463), rel=0.05)
+
+
+def test_watching_and_collecting(plain: Results) -> None:
+    seen: list[int] = []
+    collected: list[tuple[int, int]] = []
+    run(
+        Results(a_study(), MANY),
+        watch=seen.append,
+        collect=lambda first, values: collected.append((first, values.shape[1])),
+    )
+    assert seen[-1] == MANY
+    assert seen == sorted(seen)
+    assert collected == [(0, MANY)]
+
+
+def test_a_failure_in_a_thread_is_a_failure_of_the_run() -> None:
+    def fail(_: object) -> None:
+        raise ZeroDivisionError("in the middle")
+
+    with pytest.raises(ZeroDivisionError, match="in the middle"):
+        run(Results(replace(a_study(), fly=fail), MANY), threads=2)  # type: ignore[arg-type]
+
+
+def test_a_study_of_biases_alone_has_one_outcome() -> None:
+    body = replace(dispersed.with_jets().spacecraft, dispersions=Dispersions(A=Tolerance("bias", 0.01, True)))
+    results = run(Results(study_of(body, dispersed.with_jets().schedule), 2_000))
+    found = results.distribution("nutation")
+    assert found is not None
+    assert found.minimum == found.maximum
+
+
+def test_without_dispersions_there_is_no_study() -> None:
+    model = dispersed.with_jets()
+    with pytest.raises(BadRequest, match="no dispersions"):
+        study_of(replace(model.spacecraft, dispersions=None), model.schedule)
+
+
+def test_propellant_that_is_not_known_stays_unknown() -> None:
+    model = dispersed.with_jets()
+    pulses = tuple(replace(pulse, propellant=None) for pulse in model.schedule)
+    results = run(Results(Study(Model(model.spacecraft, type(model.schedule)(pulses))), 10))
+    assert results.distribution("propellant") is None
