@@ -22,6 +22,9 @@ FAINT = "dim"
 """Style of what gives way to every curve."""
 
 
+FRAME = 2
+"""Characters between the numbers and the dots."""
+
 MOST_DOTS = 200_000
 """Points along one curve at most."""
 
@@ -121,12 +124,28 @@ def ticks(low: float, high: float, most: int) -> list[float]:
     return [count * step + 0.0 for count in range(first, last + 1)]
 
 
+def fitted(width: int, middle: Vector, half: float) -> Panel:
+    """The panel that with its frame and its numbers is ``width`` characters wide."""
+    for margin in range(1, width):
+        panel = Panel(width - margin - FRAME, middle, half)
+        if margin >= max(len(text) for text in _upright(panel).values()):
+            return panel
+    raise ValueError(f"no room for a panel in {width} characters")
+
+
+def _upright(panel: Panel) -> dict[int, str]:
+    """Numbers of the upright scale by the line they stand on."""
+    low, high = float(panel.middle[1]) - panel.half, float(panel.middle[1]) + panel.half
+    left = float(panel.middle[0]) - panel.half
+    return {panel.cell(left, value)[0]: f"{value:.4g}" for value in ticks(low, high, max(panel.rows // 3, 2))}
+
+
 def framed(panel: Panel, title: str, x: str, y: str) -> list[Text]:
     """The panel with its title, its two scales and what they measure; all lines equally wide."""
-    (left, low), (right, high) = panel.middle - panel.half, panel.middle + panel.half
-    upright = {panel.cell(left, value)[0]: f"{value:.4g}" for value in ticks(low, high, max(panel.rows // 3, 2))}
+    (left, low), (right, _) = panel.middle - panel.half, panel.middle + panel.half
+    upright = _upright(panel)
     margin = max(len(text) for text in upright.values())
-    width = margin + 2 + panel.columns
+    width = margin + FRAME + panel.columns
     lines = [Text(title.center(width), "bold"), Text(y.ljust(width), FAINT)]
     for row, line in enumerate(panel.lines()):
         named = upright.get(row, "")
@@ -134,7 +153,7 @@ def framed(panel: Panel, title: str, x: str, y: str) -> list[Text]:
     rule, names = ["─"] * panel.columns, [" "] * width
     for value in ticks(left, right, max(panel.columns // 9, 2)):
         column, text = panel.cell(value, low)[1], f"{value:.4g}"
-        begins = min(max(column + margin + 2 - len(text) // 2, 0), width - len(text))
+        begins = min(max(column + margin + FRAME - len(text) // 2, 0), width - len(text))
         if all(sign == " " for sign in names[max(begins - 1, 0) : begins + len(text) + 1]):
             names[begins : begins + len(text)] = text
             rule[column] = "┬"

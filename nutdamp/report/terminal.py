@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -10,7 +11,7 @@ from rich.text import Text
 
 from nutdamp.flight import Flight
 from nutdamp.report import geometry
-from nutdamp.report.braille import FAINT, Panel, framed
+from nutdamp.report.braille import FAINT, Panel, fitted, framed
 from nutdamp.spacecraft import Vector
 from nutdamp.track import Track
 
@@ -19,8 +20,8 @@ PATH, PULSE, MOMENTUM = "cyan", "bold red", "green"
 SIDE_BY_SIDE = 76
 """Characters from which both panels stand in one row."""
 
-WIDEST, GAP, SCALE = 70, 2, 9
-"""Characters of one panel at most, between the two, and for the numbers of the upright scale."""
+WIDEST, LEAST, GAP = 70, 30, 2
+"""Characters of one panel at most and at least, and between the two."""
 
 
 def motion_drawing(flight: Flight, track: Track) -> Drawing:
@@ -38,31 +39,31 @@ class Drawing:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = options.max_width
         beside = width >= SIDE_BY_SIDE
-        columns = max(min((width - GAP) // 2 if beside else width, WIDEST) - SCALE, 10)
-        left, right = self._pole_curve(columns), self._axis_track(columns)
+        each = max(min((width - GAP) // 2 if beside else width, WIDEST), LEAST)
+        left, right = self.pole_curve(each), self.axis_track(each)
         yield Text()
         if beside:
-            widest = max(len(line) for line in left)
-            for one, other in zip(left, right, strict=True):
-                one.pad_right(widest + GAP - len(one))
-                yield one + other
+            for one, other in zip_longest(left, right, fillvalue=Text(" " * each)):
+                yield one + Text(" " * GAP) + other
         else:
             yield from (*left, Text(), *right)
         pulses = "   digits: pulse" if len(self.flight.schedule) else ""
         yield Text(f"o t = 0   x end   + H at the start and after each pulse{pulses}", FAINT)
 
-    def _pole_curve(self, columns: int) -> list[Text]:
+    def pole_curve(self, width: int) -> list[Text]:
+        """The rotation vector in the body, as lines of ``width`` characters."""
         points = geometry.pole_path(self.track)
-        panel = Panel(columns, *geometry.room(points, 0.1, centre=True))
+        panel = fitted(width, *geometry.room(points, 0.1, centre=True))
         self._path(panel, points)
         body = self.flight.spacecraft
         told = "" if body.inertia.aligned else ", principal axes"
         told += ", spin about -3" if body.spin < 0.0 else ""
         return framed(panel, "Pole curve", f"ω1, deg/s{told}", "ω2, deg/s")
 
-    def _axis_track(self, columns: int) -> list[Text]:
+    def axis_track(self, width: int) -> list[Text]:
+        """The spin axis in space and where H jumps, as lines of ``width`` characters."""
         points, momentum = geometry.sky_paths(self.flight, self.track)
-        panel = Panel(columns, *geometry.room(np.vstack([points, momentum]), 0.1))
+        panel = fitted(width, *geometry.room(np.vstack([points, momentum]), 0.1))
         firings = [stretch for stretch in geometry.stretches(self.flight, self.track) if stretch.pulse is not None]
         for row in (0, *(stretch.last for stretch in firings)):
             panel.mark(momentum[row], "+", MOMENTUM, at=True)

@@ -31,6 +31,9 @@ FORMATS = ("gif", "mp4")
 INCHES = 8.0
 """Width of the sheet that fills a frame: pixels only make it finer."""
 
+LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
+"""Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
+
 SMOOTH = 12.0
 """Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see it backwards."""
 
@@ -109,12 +112,13 @@ def _gif(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> byte
     from PIL import Image
 
     pictures: list[Image.Image] = []
+    palette = Image.new("P", (1, 1))
     for number in range(timed.frames):
         scene.show(number)
-        picture = Image.fromarray(scene.pixels())
-        pictures.append(
-            picture.quantize(palette=pictures[0], dither=Image.Dither.NONE) if pictures else picture.quantize(96)
-        )
+        pixels = LEVELS[scene.pixels()]
+        if number == 0:
+            palette.putpalette(_commonest(pixels).tobytes())
+        pictures.append(Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE))
         progress(number + 1)
     stream = io.BytesIO()
     # GIF counts in hundredths of a second.
@@ -122,6 +126,13 @@ def _gif(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> byte
         stream, "GIF", save_all=True, append_images=pictures[1:], duration=10 * round(100 / timed.fps), loop=0
     )
     return stream.getvalue()
+
+
+def _commonest(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The colours (256, 3) that cover most of a picture."""
+    colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
+    most = colours[np.argsort(-counts, kind="stable")[:256]]
+    return np.vstack([most, np.repeat(most[:1], 256 - len(most), axis=0)])
 
 
 def _mp4(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> bytes:
@@ -211,9 +222,10 @@ class Scene:
             for artist in axes.get_children()
             if artist not in before
         ]
-        self.figure.suptitle(f"{self._caption(now)}")
+        self.figure.suptitle(f"{self.caption(now)}")
 
-    def _caption(self, now: float) -> str:
+    def caption(self, now: float) -> str:
+        """What stands above the frame: name, time, and what fires or just did."""
         firing = [
             f"   firing {number}: {pulse.channel}"
             for number, pulse in enumerate(self.flight.schedule, start=1)

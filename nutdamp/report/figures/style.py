@@ -150,7 +150,7 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str 
         va="bottom" if role in ("above", "number") else "center_baseline",
         annotation_clip=False,
     )
-    note.set_label(role)
+    note.set_label(f"_{role}")  # begins so that no legend shows it
 
 
 _AROUND = [
@@ -159,12 +159,12 @@ _AROUND = [
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1), (1.3, 0), (-1.3, 0), (0, 1.3), (0, -1.3))
 ]
 _OFFSETS = {
-    "vital": _AROUND,
-    "label": _AROUND[:16],
-    "above": [(0.0, 2.5), (3.0, 2.5), (-3.0, 2.5)],
-    "number": [(0.0, 3.0)],
+    "_vital": _AROUND,
+    "_label": _AROUND[:16],
+    "_above": [(0.0, 2.5), (3.0, 2.5), (-3.0, 2.5)],
+    "_number": [(0.0, 3.0)],
 }
-_COVERED = {"vital": np.inf, "label": 12.0, "above": 2.0, "number": np.inf}
+_COVERED = {"_vital": np.inf, "_label": 12.0, "_above": 2.0, "_number": np.inf}
 """Points of curves, 4 pixels apart, that a label may cover."""
 
 
@@ -195,9 +195,9 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, axes: Axes) -> 
         inside = (curves[:, 0] > box.x0) & (curves[:, 0] < box.x1) & (curves[:, 1] > box.y0) & (curves[:, 1] < box.y1)
         covered = float(np.count_nonzero(inside)) + 0.04 * float(np.hypot(x, y))
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
-        out = 0.0 if role == "number" else out
+        out = 0.0 if role == "_number" else out
         if out > 0.0 or any(box.overlaps(other) for other in taken):
-            if role != "vital":
+            if role != "_vital":
                 continue
             covered += 1e3 * (1.0 + out)
         if covered < min(least, _COVERED[role]):
