@@ -78,10 +78,10 @@ def command(
 
 
 def _dispersed(chosen: Plan, samples: int, *, quiet: bool) -> Results:
-    """The study of the recommended schedule; interrupted, nothing is written."""
+    """The recommended schedule in many truths, flown as the rest of the report; interrupted, nothing is written."""
     from nutdamp.dispersion import study_of
 
-    results = fly(study_of(chosen.spacecraft, chosen.pulses), samples, None, None, None, quiet)
+    results = fly(study_of(chosen.spacecraft, chosen.pulses, flown=True), samples, None, None, None, quiet)
     if results.done < samples:
         raise click.Abort
     return results

@@ -83,6 +83,8 @@ def test_the_page_is_written_whatever_the_verdict(
         (("missing.yaml",), 1, "cannot read missing.yaml"),
         (("--scheme", "three-pulse"), 2, "three-pulse"),
         (("--on-time", "0"), 2, "above zero"),
+        (("--disperse", "100"), 2, "has no dispersions"),
+        (("--disperse", "-1"), 2, "number of cases"),
     ],
 )
 def test_what_cannot_be_leaves_nothing(
@@ -93,6 +95,17 @@ def test_what_cannot_be_leaves_nothing(
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
+    text = IDEAL + "requirement: {nutation: 0.2 deg}\ndispersions: {omega0: {normal: 1 deg/s}}\n"
+    (tmp_path / "craft.yaml").write_text(text)
+    done = run("report", "craft.yaml", "--scheme", "two-pulse", "-o", "report.md", "--disperse", "1e3")
+    assert done.returncode == 4
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "of 1,000 cases meet the requirement; 99.7 % are asked." in report.splitlines()[2]
+    assert report.splitlines()[2].startswith("⚠️")
+    assert "NOT met" in report
 
 
 def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:

@@ -8,9 +8,12 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from markup import Node, parsed
 
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.study import Results, run
 from nutdamp.files.plan_json import comparison_json
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.planning import Comparison, compare
@@ -59,7 +62,7 @@ def nasty() -> str:
 def sheet(tree: Node, section: str, place: int = 0) -> tuple[list[str], list[list[Node]]]:
     """Headings and rows of a table of a section."""
     (found,) = (node for node in tree.all("section") if node.attributes["id"] == section)
-    table = [node for node in found.all("table") if node.attributes["class"] == "sheet"][place]
+    table = [node for node in found.all("table") if "sheet" in node.attributes["class"].split()][place]
     rows = [[cell for cell in row if cell.tag in ("th", "td")] for row in table.all("tr")]
     return [cell.text for cell in rows[0]], rows[1:]
 
@@ -218,3 +221,41 @@ def test_markdown_holds_the_same_tables_and_nothing_of_html() -> None:
         widths = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
         assert len(widths) == 1
         assert re.fullmatch(r"\|( (:---|---:) \|)+", table.splitlines()[1])
+
+
+DISPERSED = """name: Wide
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+steerable: {torque: 20 N m}
+requirement: {nutation: 0.5 deg, probability: 90 %}
+dispersions: {A: {normal: SIGMA}}
+"""
+
+
+@pytest.mark.parametrize(("sigma", "good"), [("0.1 %", True), ("5 %", False)])
+def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
+    found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))
+    assert found.recommended is not None
+    assert found.recommended.meets_requirement
+    results = Results(study_of(found.spacecraft, found.recommended.pulses, flown=True), 1000)
+    run(results, threads=1)
+    made = report_page(found, Repeat("", "", ""), pictured=True, dispersed=results)
+    assert made.good == good
+    assert results.met_fraction is not None
+    said = f"{100 * results.met_fraction:.4g} % of 1,000 cases meet the requirement; 90 % are asked."
+    assert made.verdict.endswith(said)
+    tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+    heads, rows = sheet(tree, "dispersion")
+    assert heads[:2] == ["quantity", "nominal"]
+    shown = dict(zip(heads, (cell.text for cell in rows[0]), strict=True))
+    assert shown["quantity"] == "nutation, deg"
+    distribution = results.distribution("nutation")
+    assert distribution is not None
+    assert float(shown["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
+    assert float(shown["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
+    (section,) = (node for node in tree.all("section") if node.attributes["id"] == "dispersion")
+    tables = [node.attributes["class"] for node in section.all("table")]
+    assert tables[0] == "sheet"  # each row has a unit of its own: nothing to sort
+    assert "sheet sortable" in tables
+    assert section.all("svg")
+    assert "A" in {row[0].text for row in sheet(tree, "dispersion", 1)[1]}

@@ -62,9 +62,11 @@ def report_page(
         if dispersed is not None:
             sections.append(_dispersion(chosen, dispersed, pictured=pictured))
     good = chosen is not None and chosen.meets_requirement is not False
+    if dispersed is not None and dispersed.meets_requirement is False:
+        good = False
     return Page(
         title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
-        verdict=_verdict(compared),
+        verdict=_verdict(compared, dispersed),
         good=good,
         figures=() if chosen is None else tuple(_figures(chosen)),
         sections=(*sections, _repeat(repeat)),
@@ -72,11 +74,15 @@ def report_page(
     )
 
 
-def _verdict(compared: Comparison) -> str:
+def _verdict(compared: Comparison, dispersed: Results | None) -> str:
     chosen = compared.recommended
     if chosen is None:
         return f"No recommendation: {compared.reason}."
-    return f"Recommended: {chosen.scheme} – {compared.reason}."
+    verdict = f"Recommended: {chosen.scheme} – {compared.reason}."
+    if dispersed is None or dispersed.met_fraction is None:
+        return verdict
+    met, asked = (f"{100.0 * share:.4g} %" for share in (dispersed.met_fraction, dispersed.probability))
+    return f"{verdict} With dispersions {met} of {dispersed.done:,} cases meet the requirement; {asked} are asked."
 
 
 def _figures(chosen: Plan) -> Iterator[Figure]:
