@@ -1,0 +1,158 @@
+"""Pictures by command: plan --plot, simulate --plot and --show, animate; as processes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from process import Run
+
+IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+
+
+def left(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
+    done = run("plan", "--plot", f"motion.{ending}")
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / f"motion.{ending}").read_bytes().startswith(magic)
+    assert left(tmp_path) == [f"motion.{ending}"]
+
+
+def test_another_figure_can_be_chosen(run: Run, tmp_path: Path) -> None:
+    for figure in ("sphere", "timeline"):
+        assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 0
+    assert len({path.read_bytes() for path in tmp_path.iterdir()}) == 2
+    assert run("plan", "--plot", "a.png", "--figure", "globe").returncode == 2
+
+
+def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> None:
+    """four-pulse for the built-in example: the same picture as that scheme alone, and not that of another."""
+    run("plan", "--plot", "recommended.png", "--figure", "timeline")
+    run("plan", "--scheme", "four-pulse", "--plot", "four.png", "--figure", "timeline")
+    run("plan", "--scheme", "two-pulse", "--plot", "two.png", "--figure", "timeline")
+    recommended, four, two = ((tmp_path / f"{name}.png").read_bytes() for name in ("recommended", "four", "two"))
+    assert recommended == four
+    assert recommended != two
+
+
+def test_standard_output_takes_the_picture_alone(run: Run) -> None:
+    environment = {**os.environ, "COLUMNS": "80"}
+    command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--plot", "-", "--figure", "timeline"]
+    done = subprocess.run(command, env=environment, capture_output=True, check=False, timeout=120)
+    assert done.returncode == 0
+    assert done.stdout.startswith(b"\x89PNG")
+    assert done.stdout.endswith(b"IEND\xaeB`\x82")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("plan", "--plot", "a.jpg"), ".png, .svg, .pdf"),
+        (("plan", "--plot", "a"), ".png, .svg, .pdf"),
+        (("plan", "--scheme", "one-pulse", "--scheme", "two-pulse", "--plot", "a.png"), "name one --scheme"),
+        (("plan", "--plot", "-", "--csv", "-"), "cannot both go to standard output"),
+        (("simulate", "--scheme", "none", "--show", "--csv", "-"), "--show draws on standard output"),
+        (("animate",), "--output"),
+        (("animate", "-o", "a.webm"), ".gif, .mp4"),
+        (("animate", "-o", "a.gif", "--until", "-1 s"), "after t = 0"),
+        (("animate", "-o", "a.gif", "--seconds", "0"), "--seconds"),
+        (("animate", "-o", "a.gif", "--fps", "0"), "--fps"),
+        (("animate", "-o", "a.gif", "--width", "10"), "--width"),
+        (("animate", "-o", "a.gif", "--scheme", "none", "--schedule", "a.csv"), "either --scheme or --schedule"),
+    ],
+)
+def test_bad_command_lines_are_exit_2_and_write_nothing(
+    run: Run, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize("arguments", [("plan", "--plot"), ("animate", "--seconds", "0.2", "--fps", "5", "-o")])
+def test_an_unwritable_place_is_exit_1(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    done = run(*arguments, "missing/film.gif" if arguments[0] == "animate" else "missing/a.png")
+    assert done.returncode == 1
+    assert "cannot write missing/" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert left(tmp_path) == []
+
+
+def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "ideal.yaml").write_text(IDEAL)
+    done = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "a.png")
+    assert done.returncode == 3
+    assert "a.png was not written" in done.stderr
+    film = run("animate", "ideal.yaml", "--scheme", "four-pulse", "-o", "a.gif")
+    assert film.returncode == 3
+    assert left(tmp_path) == ["ideal.yaml"]
+
+
+def without(package: str, tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run with an installation that lacks ``package``."""
+    blocked = (
+        f"import sys; sys.modules[{package!r}] = None; from nutdamp.cli import main; sys.argv[0] = 'nutdamp'; main()"
+    )
+    command = [sys.executable, "-c", blocked, *arguments]
+    return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("plan", "--plot", "a.png"), ("simulate", "--scheme", "none", "--plot", "a.svg"), ("animate", "-o", "a.gif")],
+)
+def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    done = without("matplotlib", tmp_path, *arguments)
+    assert done.returncode == 1
+    assert "pip install 'nutdamp[plot]'" in done.stderr
+    assert done.stdout == ""
+    assert left(tmp_path) == []
+
+
+def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:
+    done = without("matplotlib", tmp_path, "simulate", "--scheme", "two-pulse", "--show")
+    assert done.returncode == 0
+    assert "Axis track" in done.stdout
+
+
+@pytest.mark.parametrize("columns", [80, 140])
+def test_show_draws_below_the_tables(run: Run, columns: int) -> None:
+    plain = run("simulate", "--scheme", "two-pulse", columns=columns).stdout
+    shown = run("simulate", "--scheme", "two-pulse", "--show", columns=columns).stdout
+    assert shown.startswith(plain)
+    drawn = shown.removeprefix(plain).splitlines()
+    assert all(len(line) <= columns for line in drawn)
+    assert max(len(line.rstrip()) for line in drawn) > 0.9 * columns
+    assert any("⠁" <= sign <= "⣿" for line in drawn for sign in line)
+    assert "\x1b" not in shown
+
+
+def test_a_film_is_written_whole(run: Run, tmp_path: Path) -> None:
+    done = run(
+        "animate", "--scheme", "two-pulse", "-o", "film.gif", "--seconds", "0.5", "--fps", "10", "--width", "320"
+    )
+    assert done.returncode == 0
+    assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF89a")
+    assert left(tmp_path) == ["film.gif"]
+    assert "wrote film.gif: 5 frames" in done.stderr
+    assert "frames show a nutation turn" in done.stderr  # 5 of them for 3.5 turns
+    assert done.stdout == ""
+
+
+def test_a_film_of_a_schedule_file(run: Run, tmp_path: Path) -> None:
+    run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv")
+    done = run("animate", "--schedule", "pulses.csv", "-q", "-o", "a.gif", "--seconds", "0.2", "--fps", "10")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert (tmp_path / "a.gif").exists()

@@ -1,0 +1,26 @@
+"""Makes two-pulse.png, the picture in the README: the built-in example with its scheme two-pulse.
+
+    python tests/golden/make_picture.py
+
+The same as `nutdamp simulate --scheme two-pulse --flown --plot two-pulse.png --figure motion` in an empty folder.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nutdamp import planning
+from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.report import figures
+
+FILE = Path(__file__).with_name("two-pulse.png")
+
+
+def main() -> None:
+    """Draw it."""
+    body = read_spacecraft(built_in_example_text(), "example.yaml")
+    FILE.write_bytes(figures.plan_picture("motion", planning.plan(body, "two-pulse"), str(FILE)))
+
+
+if __name__ == "__main__":
+    main()
