@@ -35,6 +35,8 @@ from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track, in_axes
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from nutdamp.report.page.document import Block
 
 __all__ = [
@@ -157,6 +159,18 @@ class Flight:
         from nutdamp.files.track_csv import track_csv
 
         write_whole(fspath(path), track_csv(self.sampled, self.core.spacecraft.inertia))
+
+    def figure(self, name: str = "overview") -> Figure:
+        """A matplotlib figure: ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``.
+
+        Raises BadRequest for other names, MissingExtra without matplotlib.
+        """
+        from nutdamp.report import figures
+
+        try:
+            return figures.named(name, self.core, self.sampled)
+        except KeyError:
+            raise BadRequest(f"there is no figure {name!r}") from None
 
     @property
     def _summary(self) -> str:

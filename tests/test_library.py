@@ -127,6 +127,12 @@ def test_the_track_is_in_the_axes_of_the_file() -> None:
     assert flight.to_numpy()["omega_1_rad_s"] == pytest.approx(track.rates[:, 0], abs=0.0)
 
 
+def test_a_flight_draws_itself(craft: nutdamp.Spacecraft) -> None:
+    flight = nutdamp.plan(craft, "two-pulse").fly()
+    assert len(flight.figure("motion").axes) == 2
+    assert len(flight.figure("timeline").axes) == 1
+
+
 def test_a_written_schedule_is_read_as_a_plan(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
     plan = nutdamp.plan(craft, "four-pulse")
     plan.to_csv(tmp_path / "pulses.csv")
@@ -166,6 +172,7 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(craft: nutdamp.Spacec
         (errors.BadRequest, lambda: nutdamp.plan(craft, "optimal", nutdamp.Options(least="time"))),
         (errors.BadRequest, lambda: plan.fly(until=-1.0)),
         (errors.BadRequest, lambda: plan.fly(samples=1)),
+        (errors.BadRequest, lambda: plan.fly().figure("portrait")),
         (errors.Infeasible, infeasible.fly),
         (errors.Infeasible, lambda: infeasible.to_csv(tmp_path / "pulses.csv")),
         (errors.CannotWrite, lambda: plan.to_csv(tmp_path / "no" / "pulses.csv")),

@@ -128,8 +128,6 @@ def command(
 
         check_picture(plot)
     results = fly(study, samples, threads, csv, resume, quiet)
-    if not results.done:
-        raise click.Abort
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:
         from nutdamp.files.dispersion_json import dispersion_json
@@ -182,6 +180,8 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume
                 saved = time.monotonic()
 
         run(results, threads=threads or threads_here(), watch=watch, stopped=stopped, collect=collect)
+        if not results.done:
+            raise click.Abort  # so that no file is written
         if resume is not None:
             save_results(resume, results)
     return results

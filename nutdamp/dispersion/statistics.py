@@ -23,6 +23,9 @@ SHARPNESS = 10
 OCTAVES = 64
 """The sketch tells sizes from 2^-64 to 2^64 apart; what is smaller counts as zero."""
 
+PORTION = 16_384
+"""Values that are counted at once, so that they stay in the cache."""
+
 _SIZES = 2 * OCTAVES << SHARPNESS
 _SHIFT = 52 - SHARPNESS
 _LOWEST = (1023 - OCTAVES) << SHARPNESS
@@ -87,14 +90,19 @@ class Sketch:
 
     def add(self, values: Array) -> None:
         """Count more ``values`` (n,)."""
-        if len(values):
-            bins = (np.abs(values).view(np.int64) >> _SHIFT) - _LOWEST
+        for begin in range(0, len(values), PORTION):
+            part = values[begin : begin + PORTION]
+            bins = (np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST
             np.clip(bins, 0, _SIZES - 1, out=bins)
-            # Negative values lie below the middle, mirrored, so that bins ascend with the value.
-            bins = np.where(values < 0.0, _SIZES - 1 - bins, _SIZES + bins)
-            self.counts += np.bincount(bins, minlength=2 * _SIZES)
-            self.minimum = min(self.minimum, float(values.min()))
-            self.maximum = max(self.maximum, float(values.max()))
+            least, most = float(part.min()), float(part.max())
+            if least < 0.0:
+                # Negative values lie below the middle, mirrored, so that bins ascend with the value.
+                np.copyto(bins, -1 - bins, where=part < 0.0)
+            bins += _SIZES
+            lowest = int(bins.min())
+            found = np.bincount(bins - lowest)  # values lie close together: few bins to count
+            self.counts[lowest : lowest + len(found)] += found
+            self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
 
     def merge(self, other: Sketch) -> None:
         """Count all that ``other`` has counted."""

@@ -28,6 +28,7 @@ from nutdamp.dispersion.statistics import (
 )
 from nutdamp.dispersion.truth import Model, Truth
 from nutdamp.errors import BadRequest
+from nutdamp.physics import many
 
 Array = NDArray[np.float64]
 Fly = Callable[[Truth], Ends]
@@ -35,8 +36,8 @@ Fly = Callable[[Truth], Ends]
 CHUNK = 8_192
 """Cases that the kernel works on at once, so that they stay in the cache."""
 
-STRIDE = 1_024
-"""Cases that are always flown together; chunks are multiples of it."""
+STRIDE = many.BLOCK
+"""Cases that are always flown together, as real widths need it; chunks are multiples of it."""
 
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""

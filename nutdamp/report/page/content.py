@@ -68,7 +68,7 @@ def report_page(
         title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
         verdict=_verdict(compared, dispersed),
         good=good,
-        figures=() if chosen is None else tuple(_figures(chosen)),
+        figures=() if chosen is None else tuple(_figures(chosen, dispersed)),
         sections=(*sections, _repeat(repeat)),
         made_by=f"Made by nutdamp {__version__}.",
     )
@@ -85,7 +85,7 @@ def _verdict(compared: Comparison, dispersed: Results | None) -> str:
     return f"{verdict} With dispersions {met} of {dispersed.done:,} cases meet the requirement; {asked} are asked."
 
 
-def _figures(chosen: Plan) -> Iterator[Figure]:
+def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
     """The numbers to read first."""
     body, left, pulses = chosen.spacecraft, chosen.flown, chosen.pulses
     assert left is not None
@@ -97,7 +97,9 @@ def _figures(chosen: Plan) -> Iterator[Figure]:
     else:
         yield Figure("propellant", mass(pulses.propellant))
     if chosen.meets_requirement is not None:
-        yield Figure("requirement", VERDICT[chosen.meets_requirement])
+        verdict = VERDICT[chosen.meets_requirement]
+        cases = None if dispersed is None else dispersed.met_fraction
+        yield Figure("requirement", verdict if cases is None else f"{verdict}, by {100.0 * cases:.4g} % of cases")
 
 
 def _spacecraft(body: Spacecraft) -> Section:

@@ -1,0 +1,316 @@
+"""``nutdamp disperse`` as a process."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from process import Run
+
+FILE = """\
+name: Dispersed
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+steerable: {torque: 60 N m, isp: 220 s, lever_arm: 1 m}
+limits: {earliest: 1 s}
+requirement: {nutation: 0.6 deg, momentum_shift: 0.4 deg, probability: 60 %}
+dispersions:
+  A: {normal: 1 %}
+  C: {normal: 1 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  thrust_per_pulse: {normal: 1 %}
+  thrust_direction: {normal: 0.5 deg}
+  timing: {uniform: 5 ms}
+  timing_offset: {bias: 2 ms}
+  position: {normal: 5 mm}
+  attitude: {normal: 0.2 deg}
+"""
+PERCENTS = ("50", "90", "95", "99", "99.7")
+COLUMNS = ("nutation_deg", "momentum_shift_deg", "axis_error_deg", "spin_change_rad_s", "propellant_kg")
+
+
+@pytest.fixture
+def body(tmp_path: Path) -> Path:
+    path = tmp_path / "body.yaml"
+    path.write_text(FILE)
+    return path
+
+
+def changed(body: Path, old: str, new: str) -> None:
+    text = body.read_text()
+    assert old in text
+    body.write_text(text.replace(old, new))
+
+
+def test_the_json_is_that_of_the_contract(run: Run, body: Path) -> None:
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "5000", "--seed", "7", "--json", "-")
+    assert done.returncode == 0
+    data: dict[str, Any] = json.loads(done.stdout)
+    assert (data["scheme"], data["samples"], data["seed"], data["redrawn"]) == ("two-pulse", 5000, 7, 0)
+    for column in COLUMNS:
+        assert {*PERCENTS, "max"} <= set(data["percentiles"][column])
+    nutation = data["percentiles"]["nutation_deg"]
+    assert sorted(nutation[percent] for percent in PERCENTS) == [nutation[percent] for percent in PERCENTS]
+    asked = data["requirement"]
+    assert asked["low"] < asked["met_fraction"] < asked["high"]
+    assert asked["confidence"] == 0.95
+    assert sum(share["analytic"] for share in data["shares"]) == pytest.approx(1.0)
+    assert {share["input"] for share in data["shares"]} > {"A", "C", "omega0_1", "thrust steerable", "timing pulse 2"}
+    assert all(0.0 <= share["sampled"] <= 1.0 for share in data["shares"])
+    assert data["unused"] == ["position steerable"]
+    assert len(data["worst"]) == 5
+
+
+def test_the_csv_has_every_case_and_gives_the_same_percentiles(run: Run, body: Path, tmp_path: Path) -> None:
+    done = run(
+        "disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "20000", "--csv", "s.csv", "--json", "s.json"
+    )
+    assert done.returncode == 0
+    data = json.loads((tmp_path / "s.json").read_text())
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "s.csv").read_text(), newline="")))
+    assert [row["case"] for row in rows] == [str(case) for case in range(1, 20_001)]
+    for column in COLUMNS:
+        values = np.array([float(row[column]) for row in rows])
+        found = [data["percentiles"][column][percent] for percent in PERCENTS]
+        assert found == pytest.approx(np.percentile(values, [float(percent) for percent in PERCENTS]), rel=1e-12)
+    inputs = {name: np.array([float(row[name]) for row in rows]) for name in ("A_kgm2", "thrust_pulse_1_factor")}
+    assert inputs["A_kgm2"].mean() == pytest.approx(120.0, rel=1e-3)
+    assert inputs["A_kgm2"].std() == pytest.approx(1.2, rel=0.02)
+    assert inputs["thrust_pulse_1_factor"].std() == pytest.approx(0.01, rel=0.02)
+    assert {row["timing_offset_s"] for row in rows} == {"0.002"}
+    good = sum(float(row["nutation_deg"]) <= 0.6 and float(row["momentum_shift_deg"]) <= 0.4 for row in rows)
+    assert data["requirement"]["met_fraction"] == good / 20_000
+    worst = data["worst"][0]
+    assert float(rows[worst["case"] - 1]["nutation_deg"]) == pytest.approx(worst["nutation_deg"], rel=1e-12)
+    assert float(rows[worst["case"] - 1]["A_kgm2"]) == pytest.approx(worst["inputs"]["A"], rel=1e-12)
+
+
+def test_a_worst_case_can_be_run_again(run: Run, body: Path) -> None:
+    arguments = ("disperse", "body.yaml", "--scheme", "two-pulse", "--seed", "3")
+    worst = json.loads(run(*arguments, "--samples", "40000", "--json", "-").stdout)["worst"][1]
+    again = json.loads(run(*arguments, "--case", str(worst["case"]), "--json", "-").stdout)
+    assert again.pop("inputs") == pytest.approx(worst.pop("inputs"), rel=1e-12)
+    assert {name: again[name] for name in worst} == pytest.approx(worst, rel=1e-12)
+    shown = run(*arguments, "--case", str(worst["case"]))
+    assert shown.returncode == 0
+    assert f"case {worst['case']}" in shown.stdout
+    for text in ("thrust pulse 2", "attitude y", "by impulses (17)", "flown, real widths", "in sigmas"):
+        assert text in shown.stdout
+
+
+@pytest.mark.parametrize("columns", [80, 140])
+def test_the_screen_says_what_dominates_and_what_is_unused(run: Run, body: Path, columns: int) -> None:
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "2000", columns=columns)
+    assert done.returncode == 0
+    for text in ("99.7 %", "Requirement", "95 % interval", "The nutation:", "dominate", "Worst cases", "--case"):
+        assert text in done.stdout
+    assert "position steerable" in done.stdout
+    assert "wherever it sits" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= columns
+    assert "…" not in done.stdout
+
+
+def test_threads_and_flown_runs_agree(run: Run, body: Path) -> None:
+    arguments = ("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "40000", "--json", "-")
+    one, two = (run(*arguments, "--threads", threads).stdout for threads in ("1", "2"))
+    assert one == two
+    flown = json.loads(run(*arguments[:-3], "3000", "--flown", "--json", "-").stdout)
+    summed = json.loads(run(*arguments[:-3], "3000", "--json", "-").stdout)
+    assert flown["flown"]
+    # On ω a pulse is its effective impulse; on the shift of H short pulses nearly are.
+    for percent in PERCENTS:
+        for column, close in (("nutation_deg", 1e-6), ("momentum_shift_deg", 0.05)):
+            expected = summed["percentiles"][column][percent]
+            assert flown["percentiles"][column][percent] == pytest.approx(expected, rel=close)
+
+
+def test_a_requirement_that_is_missed_is_status_4(run: Run, body: Path) -> None:
+    changed(body, "probability: 60 %", "probability: 99.99 %")
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "2000")
+    assert done.returncode == 4
+    assert "NOT met" in done.stdout
+    changed(body, "requirement:", "# requirement:")
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "2000", "--json", "r.json")
+    assert done.returncode == 0
+    assert "no requirement" in done.stdout
+    assert json.loads((body.parent / "r.json").read_text())["requirement"] is None
+
+
+def test_few_good_cases_show_little(run: Run, body: Path) -> None:
+    changed(body, "nutation: 0.6 deg, momentum_shift: 0.4 deg, probability: 60 %", "nutation: 9 deg")
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "50")
+    assert done.returncode == 0
+    assert "by 99.7 %" in done.stdout
+    assert "It takes at least 1,228" in " ".join(done.stdout.split())
+
+
+def test_a_schedule_file_is_dispersed(run: Run, body: Path) -> None:
+    assert run("plan", "body.yaml", "--scheme", "one-pulse", "--csv", "p.csv").returncode in (0, 4)
+    done = run("disperse", "body.yaml", "--schedule", "p.csv", "--samples", "100", "--json", "-")
+    assert json.loads(done.stdout)["scheme"] == "p.csv"
+
+
+def test_without_a_scheme_the_recommended_one_is_dispersed(run: Run, body: Path) -> None:
+    planned = json.loads(run("plan", "body.yaml", "--json", "-").stdout)["recommended"]
+    assert json.loads(run("disperse", "body.yaml", "--samples", "9", "--json", "-").stdout)["scheme"] == planned
+
+
+@pytest.mark.parametrize("ending", ["png", "svg"])
+def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
+    pytest.importorskip("matplotlib")
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "1000", "--plot", f"h.{ending}")
+    assert done.returncode == 0
+    start = (tmp_path / f"h.{ending}").read_bytes()[:8]
+    assert start.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[ending])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--samples", "0"), "0 is not a number of cases"),
+        (("--samples", "-5"), "-5 is not a number of cases"),
+        (("--samples", "1.5"), "1.5 is not a number of cases"),
+        (("--samples", "many"), "many is not a number of cases"),
+        (("--case", "0"), "0 is not a number of cases"),
+        (("--threads", "0"), "--threads"),
+        (("--seed", "-1"), "--seed"),
+        (("--scheme", "two-pulse", "--schedule", "x.csv"), "either --scheme or --schedule"),
+        (("--case", "3", "--csv", "x.csv"), "--case shows a single case"),
+        (("--csv", "-", "--json", "-"), "both go to standard output"),
+        (("--samples", "10", "--plot", "x.jpg"), "the ending says the format"),
+    ],
+)
+def test_broken_command_lines(run: Run, body: Path, arguments: tuple[str, ...], said: str) -> None:
+    done = run("disperse", "body.yaml", *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not done.stdout
+    assert "Traceback" not in done.stderr
+    assert sorted(path.name for path in body.parent.iterdir()) == ["body.yaml"]
+
+
+def test_a_file_without_dispersions_is_told_what_to_add(run: Run, body: Path) -> None:
+    body.write_text(FILE[: FILE.index("dispersions:")])
+    done = run("disperse", "body.yaml")
+    assert done.returncode == 2
+    assert "has no dispersions" in done.stderr
+    snippet = done.stderr[done.stderr.index("dispersions:\n") :]
+    body.write_text(body.read_text() + snippet)
+    assert run("disperse", "body.yaml", "--samples", "10", "-q").returncode in (0, 4)
+
+
+def test_dispersions_that_are_impossible_are_refused(run: Run, body: Path) -> None:
+    changed(body, "C: {normal: 1 %}", "C: {bias: 250 %}")
+    done = run("disperse", "body.yaml", "--samples", "10")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_told(run: Run, body: Path) -> None:
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "20000", "--csv", "/dev/full")
+    assert done.returncode == 1
+    assert "cannot write /dev/full: No space left" in done.stderr
+    assert not done.stdout
+
+
+def test_more_rows_than_the_disk_holds_are_refused_at_once(run: Run, body: Path) -> None:
+    done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "1e12", "--csv", "big.csv")
+    assert done.returncode == 1
+    assert "cannot write big.csv" in done.stderr
+    assert "GB are free" in done.stderr
+    assert [path.name for path in body.parent.iterdir()] == ["body.yaml"]
+
+
+def interrupted(body: Path, number: signal.Signals, *arguments: str, wait: str) -> tuple[int, str, str]:
+    """Start a long run, end it by a signal some time after a file whose name contains ``wait`` is there."""
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONUTF8": "1"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "nutdamp", "disperse", "body.yaml", "--scheme", "two-pulse", *arguments],
+        cwd=body.parent,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    limit = time.monotonic() + 60.0
+    while time.monotonic() < limit and process.poll() is None:
+        if any(wait in path.name and path.stat().st_size > 0 for path in body.parent.iterdir()):
+            time.sleep(1.5)
+            break
+        time.sleep(0.05)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: signal.Signals) -> None:
+    """The first cases are written, whole; and they are those of a run that asked for no more."""
+    files = ("--csv", "s.csv", "--json", "s.json", "--resume", "kept.npz")
+    status, out, err = interrupted(body, number, "--flown", "--samples", "1e8", *files, wait=".s.csv.")
+    assert status == 130
+    assert "interrupted: " in err
+    assert "Traceback" not in err
+    assert "Requirement" in out
+    assert sorted(path.name for path in body.parent.iterdir()) == ["body.yaml", "kept.npz", "s.csv", "s.json"]
+    data = json.loads((body.parent / "s.json").read_text())
+    count = data["samples"]
+    assert data["interrupted"]
+    assert 0 < count < 1e8
+    rows = (body.parent / "s.csv").read_text().splitlines()
+    assert len(rows) == count + 1
+    assert rows[-1].startswith(f"{count},")
+    arguments = (
+        "disperse",
+        "body.yaml",
+        "--scheme",
+        "two-pulse",
+        "--flown",
+        "--samples",
+        str(count + 700),
+        "--json",
+        "-",
+    )
+    resumed = json.loads(run(*arguments, "--resume", "kept.npz").stdout)
+    whole = json.loads(run(*arguments).stdout)
+    for key in ("samples", "redrawn", "requirement", "shares", "worst"):
+        assert resumed[key] == whole[key]
+
+
+def test_a_finished_study_is_resumed_and_extended(run: Run, body: Path) -> None:
+    arguments = (
+        "disperse",
+        "body.yaml",
+        "--scheme",
+        "two-pulse",
+        "--csv",
+        "s.csv",
+        "--json",
+        "-",
+        "--resume",
+        "kept.npz",
+    )
+    first = json.loads(run(*arguments, "--samples", "1000").stdout)
+    assert json.loads(run(*arguments, "--samples", "1000").stdout) == first
+    more = json.loads(run(*arguments, "--samples", "30000").stdout)
+    rows = (body.parent / "s.csv").read_text()
+    assert more == json.loads(run(*arguments[:-2], "--samples", "30000").stdout)
+    assert rows == (body.parent / "s.csv").read_text()
+    fewer = run(*arguments, "--samples", "10")
+    assert fewer.returncode == 2
+    assert "30000 cases are done already" in fewer.stderr
+    other = run(*arguments, "--samples", "40000", "--seed", "9")
+    assert other.returncode == 2
+    assert "another study" in other.stderr
