@@ -48,7 +48,7 @@ def command(
     names = tuple(dict.fromkeys(names))
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:
-            raise click.UsageError(f"{option} shows one schedule: name one --scheme, or none for the recommended one")
+            raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
     silent = one_stdout(csv=csv, json=json, plot=plot)
     if plot is not None:
         expect_picture(plot)

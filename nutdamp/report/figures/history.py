@@ -135,7 +135,7 @@ def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
     how = f"{pulse.on_time:.3g} s" if pulse.on_time else f"{pulse.magnitude:.3g} N m s"
     if pulse.channel == STEERABLE:
         torque = flight.spacecraft.inertia.axes @ pulse.impulse
-        how += f" at {math.degrees(math.atan2(torque[1], torque[0])):.0f}°"
+        how += f" at {round(math.degrees(math.atan2(torque[1], torque[0]))) % 360}°"
     return f"{number + 1}: {how}"
 
 

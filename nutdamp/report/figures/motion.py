@@ -51,7 +51,7 @@ def title(flight: Flight) -> str:
 
 def short_name(flight: Flight) -> str:
     """The name of the spacecraft, cut where it is too long for a heading."""
-    name = flight.spacecraft.name
+    name = " ".join(flight.spacecraft.name.split())
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 

@@ -30,7 +30,7 @@ ASIDE = math.radians(65.0)
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
-SPACE, BODY = 0.35, 0.15
+SPACE, BODY = 0.28, 0.15
 """How dense the cones are filled: told apart in grey print too."""
 
 MARKS = "+os"
@@ -100,8 +100,8 @@ def sphere(axes: Axes, flight: Flight, track: Track) -> None:
     draw_ground(axes, looked, track)
     draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, found)
-    for direction, colour, name in _directions(found):
-        style.label(axes, name, looked.seen(direction)[0][0], colour)
+    for direction, _, name in _directions(found):
+        style.label(axes, name, looked.seen(direction)[0][0])
     name_cones(axes)
     frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum]))
     much = looked.magnified
@@ -135,7 +135,9 @@ def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
         if len(rim):
             _cone(axes, looked, rim, colour, alpha)
     for direction, colour, _ in _directions(found):
-        style.arrow(axes, np.zeros(2), looked.seen(direction)[0][0], colour, width=1.2)
+        tip = looked.seen(direction)[0][0]
+        axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
+        style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
 
 def name_cones(axes: Axes) -> None:
@@ -206,8 +208,8 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     plane = geometry.sky_plane(flight, track.momentum[0])
     found = geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_circles(axes, plane, found)
-    for direction, colour, name in _directions(found):
-        style.label(axes, name, geometry.on_sky(plane, direction[None])[0], colour)
+    for direction, _, name in _directions(found):
+        style.label(axes, name, geometry.on_sky(plane, direction[None])[0])
     name_cones(axes)
     shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
     style.square(axes, geometry.on_sky(plane, shown), margin=0.14)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
 from importlib.util import find_spec
@@ -85,7 +86,8 @@ def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
         require()
         from matplotlib import style
 
-        with style.context(["default", _SETTINGS]):
+        with style.context(["default", _SETTINGS]), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing from")  # a name in another script is drawn as boxes
             return draw(*args, **kwargs)
 
     return drawn
@@ -98,29 +100,20 @@ def sheet(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), dpi=200, layout="constrained")
 
 
-def arrow(axes: Axes, start: Vector, end: Vector, colour: str, *, width: float = LINE, head: float = 9.0) -> None:
-    """An arrow between two points of the data."""
-    axes.annotate(
-        "",
-        (float(end[0]), float(end[1])),
-        (float(start[0]), float(start[1])),
-        arrowprops={
-            "arrowstyle": "-|>",
-            "color": colour,
-            "linewidth": width,
-            "mutation_scale": head,
-            "shrinkA": 0.0,
-            "shrinkB": 0.0,
-        },
-        annotation_clip=False,
-    )
-
-
 def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
     """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
+    look = {
+        "arrowstyle": "-|>",
+        "color": colour,
+        "linewidth": 0.0,
+        "mutation_scale": 9.0,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+    }
     for row in places:
         if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
-            arrow(axes, path[row - 1], path[row], colour, width=0.0, head=9.0)
+            (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
+            axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
 
 
 def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
@@ -180,12 +173,12 @@ def settle(figure: Figure) -> None:
         curves = _inked(axes) if notes else np.empty((0, 2))
         taken: list[Bbox] = []
         for note in notes:
-            _settle(note, taken, curves, axes)
+            _settle(note, taken, curves, axes.get_window_extent(), figure.dpi / 72.0)
 
 
-def _settle(note: Annotation, taken: list[Bbox], curves: Vector, axes: Axes) -> None:
-    role, window = str(note.get_label()), axes.get_window_extent()
-    points = axes.get_figure(root=True).dpi / 72.0  # type: ignore[union-attr]
+def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> None:
+    """One label; ``window`` is that of its panel, ``points`` how many pixels a point is."""
+    role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
     best, least = None, np.inf
     for x, y in _OFFSETS[role]:
