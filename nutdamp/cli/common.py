@@ -21,6 +21,16 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion", "sphere", "history", "timeline")
 """Pictures that ``--plot`` can draw, the default first."""
 
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far the truth may be off. For example:
+
+dispersions:
+  A: {normal: 2 %}
+  C: {normal: 2 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  timing: {uniform: 5 ms}"""
+"""What is said of a file that should have dispersions."""
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 spacecraft_argument = click.argument("spacecraft", required=False, metavar="[SPACECRAFT]")
@@ -145,6 +155,14 @@ def plan_or_read(
     for text in plan.remarks:
         remark(text)
     return plan
+
+
+def require_dispersions(body: Spacecraft) -> None:
+    """Raises BadRequest, which shows what to write, for a spacecraft without dispersions."""
+    from nutdamp.errors import BadRequest
+
+    if body.dispersions is None:
+        raise BadRequest(DISPERSIONS)
 
 
 def remarks(quiet: bool) -> Callable[[str], None]:

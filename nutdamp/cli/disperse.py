@@ -16,6 +16,7 @@ from nutdamp.cli.common import (
     plan_or_read,
     quiet_option,
     remarks,
+    require_dispersions,
     scheme_options,
     show,
     spacecraft_argument,
@@ -28,15 +29,6 @@ if TYPE_CHECKING:
 
 SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
-
-SNIPPET = """the spacecraft file has no dispersions: it does not say how far the truth may be off. For example:
-
-dispersions:
-  A: {normal: 2 %}
-  C: {normal: 2 %}
-  omega0: {normal: 0.1 deg/s}
-  thrust: {normal: 3 %}
-  timing: {uniform: 5 ms}"""
 
 
 class Count(click.ParamType["int"]):
@@ -105,14 +97,13 @@ def command(
         raise click.UsageError("name what to disperse: either --scheme or --schedule")
     if case is not None and (csv or plot or resume):
         raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
+    if resume == "-":
+        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
     silent = one_stdout(csv=csv, json=json, plot=plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark)
 
-    from nutdamp.errors import BadRequest
-
-    if body.dispersions is None:
-        raise BadRequest(SNIPPET)
+    require_dispersions(body)
     plan = plan_or_read(body, scheme, schedule, options, remark)
 
     from nutdamp.dispersion import study_of

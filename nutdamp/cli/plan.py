@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,6 +15,7 @@ from nutdamp.cli.common import (
     plot_options,
     quiet_option,
     remarks,
+    require_dispersions,
     scheme_options,
     show,
     spacecraft_argument,
@@ -21,11 +23,18 @@ from nutdamp.cli.common import (
 )
 from nutdamp.schemes import CLASSIC, PLANNED, Options
 
+if TYPE_CHECKING:
+    from nutdamp.planning import Comparison
+    from nutdamp.robust import RobustComparison
+
 
 @click.command("plan")
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan this one only; repeatable.")
 @scheme_options
+@click.option(
+    "--robust", is_flag=True, help="Pick among the schemes and their variants by what dispersed truths leave (99.7 %)."
+)
 @click.option("--csv", metavar="FILE", help="Write the pulses of the recommended plan, or the one named.")
 @click.option("--json", metavar="FILE", help="Write all plans with their residuals.")
 @plot_options
@@ -34,6 +43,7 @@ def command(
     spacecraft: str | None,
     names: tuple[str, ...],
     options: Options,
+    robust: bool,
     csv: str | None,
     json: str | None,
     plot: str | None,
@@ -55,16 +65,30 @@ def command(
     remark = remarks(quiet)
     body = load(spacecraft, remark)
 
+    if robust:
+        require_dispersions(body)
+
     from nutdamp.planning import compare
 
     compared = compare(body, names or CLASSIC, options)
-    chosen = compared.recommended
+    dispersed = _disperse(compared, options, quiet) if robust else None
+    if dispersed is None:
+        chosen = compared.recommended
+        met = None if chosen is None else chosen.meets_requirement
+    else:
+        chosen = None if dispersed.chosen is None else dispersed.chosen.plan
+        met = dispersed.meets_requirement
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.plan_json import comparison_json
 
-        outputs.append((json, json_text(comparison_json(compared))))
+        data = comparison_json(compared)
+        if dispersed is not None:
+            from nutdamp.files.robust_json import robust_json
+
+            data["robust"] = robust_json(dispersed)
+        outputs.append((json, json_text(data)))
     if csv is not None and chosen is not None:
         from nutdamp.files.pulses_csv import pulses_csv
 
@@ -77,11 +101,25 @@ def command(
         if path is not None and chosen is None:
             click.echo(f"{path} was not written: no plan is feasible", err=True)
     write_all(outputs)
-    if not silent:
+    if not silent and dispersed is not None:
+        from nutdamp.report.robust_tables import robust_screen
+
+        show(robust_screen(dispersed))
+    elif not silent:
         from nutdamp.report.plan_tables import comparison_screen
 
         show(comparison_screen(compared))
     if chosen is None:
         sys.exit(INFEASIBLE)
-    if chosen.meets_requirement is False:
+    if met is False:
         sys.exit(REQUIREMENT_MISSED)
+
+
+def _disperse(compared: Comparison, options: Options, quiet: bool) -> RobustComparison:
+    """Let dispersed truths fly the plans and their variants, with a bar."""
+    from nutdamp import robust
+    from nutdamp.cli.progress import progress
+
+    plans = robust.variants(compared, options)
+    with progress("dispersing", len(plans), quiet=quiet) as told:
+        return robust.compare(compared, plans, told)

@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
-from nutdamp.cli.common import quiet_option, remarks, scheme_options, source, spacecraft_argument, write_all
-from nutdamp.cli.disperse import SNIPPET, Count, fly
+from nutdamp.cli.common import (
+    quiet_option,
+    remarks,
+    require_dispersions,
+    scheme_options,
+    source,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.cli.disperse import Count, fly
 from nutdamp.cli.progress import working
 from nutdamp.schemes import CLASSIC, PLANNED, Options
 
@@ -52,15 +60,14 @@ def command(
     remark = remarks(quiet)
     text, name = source(spacecraft, remark)
 
-    from nutdamp.errors import BadRequest
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.planning import compare
     from nutdamp.report.page.content import Repeat, report_page
 
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
     body = read_spacecraft(text, name)
-    if disperse is not None and body.dispersions is None:
-        raise BadRequest(SNIPPET)
+    if disperse is not None:
+        require_dispersions(body)
     with working("planning", quiet=quiet):
         compared = compare(body, tuple(dict.fromkeys(names)) or CLASSIC, options)
     chosen = compared.recommended

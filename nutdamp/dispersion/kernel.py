@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.truth import TINY, Cases, Model, Triple, Truth, cos_sin, plus, rotated, times
+from nutdamp.dispersion.truth import TINY, Cases, Model, Triple, Truth, plus, rotated, times
+from nutdamp.physics.many import cos_sin
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import flight
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
@@ -55,7 +56,10 @@ CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
 
 LONG_PULSE = 0.5
-"""rad that the body turns within a pulse, beyond which H moves noticeably otherwise than by an impulse (1 %)."""
+"""rad that the body turns within a pulse, beyond which H moves by 1 % less than by an impulse, sinc(ω3τ/2)."""
+
+ROUGH = 0.002
+"""deg that H may be moved otherwise than flown without a remark."""
 
 Collect = Callable[[int, Array], None]
 """Takes the number (from 0) of the first of some cases, and their outputs (5, n), in order."""
@@ -105,12 +109,15 @@ class Study:
             return ()
         notes = [f"the impulse sum (17) knows nothing of {' and '.join(left)}; --flown does"] if left else []
         longest = max((pulse.on_time for pulse in self.model.schedule), default=0.0)
-        turned = abs(body.spin) * longest
-        if turned > LONG_PULSE:
-            notes.append(
-                f"the body turns by up to {math.degrees(turned):.0f}° during a pulse: the impulse sum (17) has the "
-                f"nutation right, but the shift of H only roughly; --flown has both"
-            )
+        if abs(body.spin) * longest > LONG_PULSE:
+            summed = math.degrees(self.outputs_of({})[1])
+            real = math.degrees(flight.flown(body, self.model.schedule).residual.momentum_shift)
+            if abs(summed - real) > ROUGH:
+                notes.append(
+                    f"the pulses, up to {longest:.3g} s, are long for this spin: on the nutation the impulse sum (17) "
+                    f"is right all the same, but it moves H by {summed:.3g}° where the plan flown does by {real:.3g}°; "
+                    f"--flown has both"
+                )
         return tuple(notes)
 
     def source(self) -> Source:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.inputs import Inputs, list_inputs
 from nutdamp.physics import attitude
+from nutdamp.physics.many import cos_sin
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Thruster, Vector
 
@@ -34,14 +35,6 @@ DISC = 1e-12
 
 ROUNDING = 1e-9
 """A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
-
-
-def cos_sin(angle: Cases) -> tuple[Cases, Cases]:
-    """Cosine and sine by the tangent of the half-angle, several times as fast as `numpy.cos` and as exact."""
-    half = np.tan(0.5 * angle)
-    square = half * half
-    scale = 1.0 / (1.0 + square)
-    return (1.0 - square) * scale, 2.0 * half * scale
 
 
 def plus(first: Cases, second: Cases) -> Cases:

@@ -28,6 +28,9 @@ MOST_ROWS = 12
 
 TINY = 1e-300
 
+ROUNDING = 1e-12
+"""rad; what varies by less does not vary."""
+
 BUDGETED = (("nutation", "nutation"), ("momentum_shift", "shift of H"))
 
 
@@ -37,7 +40,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Group:
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     parts += [Text(), *_requirement(results), Text(), *_budget(results)]
-    if worst:
+    if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
     if unused:
@@ -48,7 +51,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Group:
 def _title(results: Results, scheme: str) -> Text:
     study = results.study
     how = "real widths and true tensor" if study.flown else "the impulse sum (17)"
-    drawn = f"{results.done:,} truths, seed {study.seed}"
+    drawn = f"{results.done:,} truth{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
     return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, flown by {how}, {drawn}")
@@ -72,8 +75,10 @@ def _percentiles(results: Results) -> Table:
 
 def _beside(value: float, largest: float) -> str:
     """A number with the decimals that show four digits of the ``largest`` beside it."""
-    if largest == 0.0 or not 1e-5 <= largest < 1e6:
-        return f"{value:.2e}" if value else "0"
+    if largest < 1e-9:
+        return "0"  # but for rounding
+    if not 1e-5 <= largest < 1e6:
+        return f"{value:.2e}"
     return f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
 
 
@@ -126,7 +131,10 @@ def _budget(results: Results) -> list[RenderableType]:
     rest = listed[len(named) :]
     if rest:
         table.add_row(Text(f"{len(rest)} others", style="dim"), "", *cells(rest))
-    remainder = [1.0 - math.fsum(found[output] for found in sampled.values()) for output, _ in BUDGETED]
+    remainder = [
+        1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
+        for output, _ in BUDGETED
+    ]
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
     table.add_row(Text("together", style="dim"), "", *texts)
     count = min(results.done, EARLY)

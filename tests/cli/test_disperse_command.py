@@ -187,6 +187,7 @@ def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
         (("--seed", "-1"), "--seed"),
         (("--scheme", "two-pulse", "--schedule", "x.csv"), "either --scheme or --schedule"),
         (("--case", "3", "--csv", "x.csv"), "--case shows a single case"),
+        (("--resume", "-"), "standard output cannot be read again"),
         (("--csv", "-", "--json", "-"), "both go to standard output"),
         (("--samples", "10", "--plot", "x.jpg"), "the ending says the format"),
     ],

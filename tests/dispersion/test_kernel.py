@@ -17,8 +17,9 @@ from nutdamp.dispersion.kernel import ClosedForm, nodes_for
 from nutdamp.dispersion.outputs import OUTPUTS, measure
 from nutdamp.dispersion.single import realised
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model, cos_sin
+from nutdamp.dispersion.truth import Model
 from nutdamp.physics import rates
+from nutdamp.physics.many import cos_sin
 from nutdamp.schedule import Schedule, steerable_pulse
 from nutdamp.spacecraft import Steerable
 from nutdamp.tolerances import Dispersions, Tolerance

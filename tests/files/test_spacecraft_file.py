@@ -332,7 +332,6 @@ def test_what_the_example_shows_in_comments_works() -> None:
         "limits",
         "disturbances",
         "dissipation",
-        "dispersions",
     )
     craft = read(text.replace("  # - {", "  - {"))
     assert craft.attitude is not None

@@ -275,3 +275,20 @@ def test_pulses_oppose_omega_together() -> None:
         along = transverse(pulse.impulse) / transverse(rates)
         assert along.real < 0.0
         assert abs(along.imag) < 1e-12 * abs(along)
+
+
+def test_the_schedules_weighed_keep_the_limits_and_hold_the_one_taken() -> None:
+    spacecraft = spinner(channels=cross(8.0, max_on_time=2.0))
+    weighed = planning.alternatives(spacecraft, "two-pulse")
+    assert len(weighed) > 2
+    for plan in weighed:
+        assert violations(spacecraft, plan.pulses) == []
+        assert len(plan.pulses) == 2
+        assert left(plan).nutation < spacecraft.nutation
+    taken = feasible(spacecraft).pulses
+    assert any(np.allclose([pulse.t for pulse in plan.pulses], [pulse.t for pulse in taken]) for plan in weighed)
+
+
+def test_a_steerable_torquer_leaves_nothing_to_weigh() -> None:
+    assert planning.alternatives(spinner(), "two-pulse") == ()
+    assert planning.alternatives(spinner(channels=cross(8.0)), "one-pulse") == ()

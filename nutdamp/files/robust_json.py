@@ -1,0 +1,49 @@
+"""What ``plan --robust --json`` adds to the plans."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp.files.plan_json import plan_json
+from nutdamp.robust import Candidate, RobustComparison
+
+
+def robust_json(found: RobustComparison) -> dict[str, Any]:
+    """The candidates from the best down, the one to fly with its pulses, and what it costs against the usual one."""
+    chosen, usual = found.chosen, found.usual
+    return {
+        "probability": found.probability,
+        "samples": found.samples,
+        "seed": found.seed,
+        "flown": found.flown,
+        "candidates": [_candidate(one) for one in found.candidates],
+        "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
+        "reason": found.reason,
+        "meets_requirement": found.meets_requirement,
+        "against": None if usual is None else _candidate(usual),
+        "cost": None
+        if found.cost is None
+        else {
+            "propellant_kg": found.cost.propellant,
+            "total_impulse_Nms": found.cost.impulse,
+            "end_s": found.cost.end,
+            "nutation_deg": math.degrees(found.cost.nutation),
+        },
+    }
+
+
+def _candidate(one: Candidate) -> dict[str, Any]:
+    plan, pulses = one.plan, one.plan.pulses
+    return {
+        "scheme": plan.scheme,
+        "variant": one.variant,
+        "pulses": len(pulses),
+        "end_s": pulses.end,
+        "total_impulse_Nms": pulses.total_impulse,
+        "propellant_kg": pulses.propellant,
+        "nominal_nutation_deg": None if plan.flown is None else math.degrees(plan.flown.nutation),
+        "nutation_deg": math.degrees(one.nutation),
+        "momentum_shift_deg": math.degrees(one.momentum_shift),
+        "met_fraction": one.met,
+    }

@@ -1,0 +1,57 @@
+"""The bar of long runs, and how they are stopped."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+
+import pytest
+
+from nutdamp.cli import progress as module
+from nutdamp.cli.progress import progress, stoppable
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float, *, quiet: bool = False) -> str:
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(module, "PATIENCE", patience)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress("flying", 1_000, quiet=quiet, done=100) as tell:
+        for done in (200, 500, 900):
+            tell(done)
+    return stream.getvalue()
+
+
+def test_a_long_run_shows_share_rate_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = shown(monkeypatch, Terminal(), 0.0)
+    assert "flying" in text
+    assert "90%" in text
+    assert "/s" in text
+    assert "0:00:" in text
+
+
+def test_a_short_run_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert shown(monkeypatch, Terminal(), 60.0) == ""
+
+
+def test_only_a_terminal_is_shown_a_bar_and_only_where_it_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert shown(monkeypatch, io.StringIO(), 0.0) == ""
+    assert shown(monkeypatch, Terminal(), 0.0, quiet=True) == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_is_asked_to_stop_and_a_second_ctrl_c_interrupts(number: signal.Signals) -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with stoppable() as stopped:
+        assert not stopped()
+        os.kill(os.getpid(), number)
+        assert stopped()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
