@@ -83,7 +83,6 @@ def test_the_page_is_written_whatever_the_verdict(
         (("missing.yaml",), 1, "cannot read missing.yaml"),
         (("--scheme", "three-pulse"), 2, "three-pulse"),
         (("--on-time", "0"), 2, "above zero"),
-        (("--disperse", "100"), 2, "has no dispersions"),
         (("--disperse", "-1"), 2, "number of cases"),
     ],
 )
@@ -106,6 +105,14 @@ def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
     assert "of 1,000 cases meet the requirement; 99.7 % are asked." in report.splitlines()[2]
     assert report.splitlines()[2].startswith("⚠️")
     assert "NOT met" in report
+
+
+def test_what_is_not_dispersed_says_what_to_write(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "craft.yaml").write_text(IDEAL)
+    done = run("report", "craft.yaml", "--disperse", "100")
+    assert done.returncode == 2
+    assert "has no dispersions" in done.stderr
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
