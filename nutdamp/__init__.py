@@ -1,6 +1,66 @@
 """Nutation-damping planner for spinning spacecraft.
 
 One stream runs through the package: spacecraft file -> Spacecraft -> scheme -> Schedule -> flight -> report.
+As a library it is these few names, of which `nutdamp.library` tells more; each is loaded on first use.
 """
 
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nutdamp import errors
+    from nutdamp.errors import NutdampError
+    from nutdamp.library import (
+        Comparison,
+        Flight,
+        Options,
+        Plan,
+        Residual,
+        Spacecraft,
+        Track,
+        compare,
+        example,
+        load,
+        load_schedule,
+        plan,
+        read,
+    )
+
+__all__ = [
+    "Comparison",
+    "Flight",
+    "NutdampError",
+    "Options",
+    "Plan",
+    "Residual",
+    "Spacecraft",
+    "Track",
+    "__version__",
+    "compare",
+    "errors",
+    "example",
+    "load",
+    "load_schedule",
+    "plan",
+    "read",
+]
+
 __version__ = "0.1.0"
+
+
+if not TYPE_CHECKING:  # or else a type checker would believe in any name
+
+    def __getattr__(name: str) -> Any:
+        """Load a public name when it is first asked for: the command line, too, begins here, and must begin fast."""
+        if name not in __all__:
+            raise AttributeError(f"module 'nutdamp' has no attribute {name!r}")
+        from importlib import import_module
+
+        if name == "errors":
+            return import_module("nutdamp.errors")
+        value = getattr(import_module("nutdamp.errors" if name == "NutdampError" else "nutdamp.library"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

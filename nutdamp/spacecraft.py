@@ -75,6 +75,12 @@ class Inertia:
         """Whether the principal axes are the axes of the file."""
         return bool(np.array_equal(self.axes, np.eye(3)))
 
+    def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
+        """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the file."""
+        if self.aligned:
+            return rates, quaternion
+        return rates @ self.axes.T, attitude.multiply(quaternion, attitude.from_matrix(self.axes.T))
+
 
 @dataclass(frozen=True, slots=True)
 class Thruster:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics import attitude
+from nutdamp.spacecraft import Inertia
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,12 @@ def make_track(
         space_cone=nutation - body_cone,
         pulse=pulse,
     )
+
+
+def in_file_axes(track: Track, inertia: Inertia) -> Track:
+    """The track with rates and quaternion in the axes of the file."""
+    rates, quaternion = inertia.in_file_axes(track.rates, track.quaternion)
+    return replace(track, rates=rates, quaternion=quaternion)
 
 
 @dataclass(frozen=True, slots=True)

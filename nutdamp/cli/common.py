@@ -125,6 +125,8 @@ def scheme_options(command: Command) -> Command:
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
+        if chosen.on_time is not None and chosen.on_time <= 0.0:
+            raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
         aim = Aim(parameters.pop("target"), parameters.pop("spin"))
         return command(*args, options=chosen, aim=aim, **parameters)
 
@@ -189,22 +191,26 @@ def load(path: str | None, remark: Callable[[str], None], aim: Aim | None = None
 
     ``aim`` takes the place of the goal in the file.
     """
-    body = _load(path, remark)
+    from nutdamp.files.spacecraft_file import read_spacecraft
+
+    body = read_spacecraft(*source(path, remark))
     return body if aim is None else aim.applied(body)
 
 
-def _load(path: str | None, remark: Callable[[str], None]) -> Spacecraft:
+def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
+    """The text of the spacecraft file that `load` reads, and its name."""
     from pathlib import Path
 
-    from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
+    from nutdamp.files.spacecraft_file import built_in_example_text
+    from nutdamp.files.yaml_tree import read_text
 
     if path is None and Path(DEFAULT_FILE).exists():
         remark(f"reading {DEFAULT_FILE}")
         path = DEFAULT_FILE
     if path is not None:
-        return load_spacecraft(path)
+        return read_text(Path(path)), path
     remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
-    return read_spacecraft(built_in_example_text(), "example.yaml")
+    return built_in_example_text(), "example.yaml"
 
 
 def plan_or_read(

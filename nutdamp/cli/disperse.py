@@ -119,7 +119,7 @@ def command(
         return
     if plot is not None:
         expect_picture(plot)
-    results = _fly(study, samples, threads, csv, resume, quiet)
+    results = fly(study, samples, threads, csv, resume, quiet)
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:
         from nutdamp.files.dispersion_json import dispersion_json
@@ -142,7 +142,7 @@ def command(
         sys.exit(REQUIREMENT_MISSED)
 
 
-def _fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Results:
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Results:
     """Fly the cases, with a bar, until they are done or somebody interrupts."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.dispersion.study import Results, run, threads_here

@@ -57,8 +57,6 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output.
     """
-    if options.on_time is not None and options.on_time <= 0.0:
-        raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
     names = tuple(dict.fromkeys(names))
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:

@@ -32,6 +32,18 @@ def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> It
         shown.close()
 
 
+@contextmanager
+def working(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Says ``what`` is done while it is done, where nobody can tell how much is left: only on a terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(what):
+        yield
+
+
 class _Bar:
     def __init__(self, what: str, total: int, done: int) -> None:
         self.what, self.total, self.before = what, total, done

@@ -12,7 +12,7 @@ from nutdamp.cli.boundary import run
 
 COMMANDS = (
     *("plan", "simulate", "trade", "disperse", "animate", "verify", "check"),
-    *("export", "import", "explain", "init", "schema"),
+    *("report", "export", "import", "explain", "init", "schema"),
 )
 
 

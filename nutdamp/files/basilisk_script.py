@@ -9,7 +9,6 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.basilisk import default_step, stretches
 from nutdamp.errors import BadRequest
-from nutdamp.files.frames import file_axes
 from nutdamp.planning import Plan
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -25,7 +24,7 @@ def basilisk_script(plan: Plan) -> str:
     body = plan.spacecraft
     if body.dissipation is not None:
         raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
-    rates, quaternion = file_axes(body.initial.rates, body.initial.quaternion, body.inertia)
+    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     title = " ".join(f"{plan.scheme} schedule for {body.name}".split()).replace("\\", "/").replace('"', "'")
     return _SCRIPT.format(
         title=title,

@@ -11,8 +11,7 @@ import numpy as np
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.flight import Flight, Leg
-from nutdamp.physics import attitude
-from nutdamp.spacecraft import Inertia, Spacecraft, Vector
+from nutdamp.spacecraft import Spacecraft, Vector
 
 FRAMES = ("EME2000", "J2000", "GCRF")
 """Inertial frames that the formats have a name for."""
@@ -78,13 +77,6 @@ def reference(spacecraft: Spacecraft) -> Reference:
         raise BadRequest(f"attitude.epoch: {wrong}") from None
 
 
-def file_axes(rates: Vector, quaternion: Vector, inertia: Inertia) -> tuple[Vector, Vector]:
-    """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the file."""
-    if inertia.aligned:
-        return rates, quaternion
-    return rates @ inertia.axes.T, attitude.multiply(quaternion, attitude.from_matrix(inertia.axes.T))
-
-
 def stretches(flown: Flight, until: float) -> Iterator[Stretch]:
     """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
 
@@ -101,7 +93,7 @@ def stretches(flown: Flight, until: float) -> Iterator[Stretch]:
         t = np.unique(np.rint(np.linspace(begin, end, count))) / NANOSECONDS
         if len(t) < LEAST_RECORDS:
             continue
-        rates, quaternion = file_axes(*leg.path.motion(t), flown.spacecraft.inertia)
+        rates, quaternion = flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t))
         quaternion = _steady(quaternion, previous)
         previous = quaternion[-1]
         yield Stretch(t, rates, quaternion, leg.completed)

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.input import read_utf8
@@ -42,26 +43,35 @@ LARGEST = 1e15
 """Larger magnitudes are no schedule of a spacecraft, and would overflow later."""
 
 
-def pulses_csv(flown: Flight) -> str:
-    """The schedule of a flown flight, one row a pulse; vectors in the axes of the file."""
+def pulses_array(flown: Flight) -> NDArray[np.void]:
+    """The schedule of a flown flight, one row a pulse, fields as in `HEADER`; vectors in the axes of the file.
+
+    What is not known is NaN: the torque of an ideal impulse, a propellant.
+    """
     before, after = flown.around_pulses()
     axes = flown.spacecraft.inertia.axes
-    rows = []
-    for index, pulse in enumerate(flown.schedule):
-        torque = [None] * 3 if pulse.torque is None else axes @ pulse.torque
-        rows.append(
-            [
-                str(index + 1),
-                *map(number, (pulse.t, pulse.start, pulse.on_time)),
-                pulse.channel,
-                *map(number, torque),
-                *map(number, axes @ pulse.impulse),
-                number(pulse.propellant),
-                number(math.degrees(before.nutation[index])),
-                number(math.degrees(after.nutation[index])),
-            ]
+    rows = [
+        (
+            index + 1,
+            *(pulse.t, pulse.start, pulse.on_time),
+            pulse.channel,
+            *(np.full(3, math.nan) if pulse.torque is None else axes @ pulse.torque),
+            *(axes @ pulse.impulse),
+            math.nan if pulse.propellant is None else pulse.propellant,
+            math.degrees(before.nutation[index]),
+            math.degrees(after.nutation[index]),
         )
-    return csv_text(HEADER, rows)
+        for index, pulse in enumerate(flown.schedule)
+    ]
+    longest = max((len(pulse.channel) for pulse in flown.schedule), default=1)
+    kinds = {"pulse": "i8", "channel": f"U{longest}"}
+    return np.array(rows, dtype=[(name, kinds.get(name, "f8")) for name in HEADER])
+
+
+def pulses_csv(flown: Flight) -> str:
+    """The rows of `pulses_array` as CSV; what is not known is empty."""
+    rows = pulses_array(flown).tolist()
+    return csv_text(HEADER, ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows))
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:

@@ -1,13 +1,13 @@
-"""The track of a flight as CSV."""
+"""The track of a flight as a table: an array with named columns, and CSV."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nutdamp.files.frames import file_axes
 from nutdamp.files.output import csv_text, number
 from nutdamp.spacecraft import Inertia
-from nutdamp.track import Track
+from nutdamp.track import Track, in_file_axes
 
 HEADER = (
     "t_s",
@@ -31,10 +31,23 @@ HEADER = (
 )
 
 
-def track_csv(track: Track, inertia: Inertia) -> str:
-    """One row a sample; body rates and quaternion (body -> inertial, scalar first) in the axes of the file."""
-    rates, quaternion = file_axes(track.rates, track.quaternion, inertia)
+ROW = np.dtype([(name, np.int64 if name == "pulse" else np.float64) for name in HEADER])
+"""One row of the track."""
+
+
+def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
+    """One row a sample, fields as in `HEADER`; rates and quaternion (scalar first) in the axes of the file."""
+    turned = in_file_axes(track, inertia)
     cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
-    table = np.column_stack([track.t, rates, quaternion, track.axis, track.momentum, cones])
-    rows = ([*map(number, row), str(pulse)] for row, pulse in zip(table.tolist(), track.pulse.tolist(), strict=True))
-    return csv_text(HEADER, rows)
+    table = np.column_stack([track.t, turned.rates, turned.quaternion, track.axis, track.momentum, cones])
+    rows = np.empty(len(track.t), dtype=ROW)
+    for name, column in zip(HEADER[:-1], table.T, strict=True):
+        rows[name] = column
+    rows["pulse"] = track.pulse
+    return rows
+
+
+def track_csv(track: Track, inertia: Inertia) -> str:
+    """The rows of `track_array` as CSV."""
+    rows = track_array(track, inertia).tolist()
+    return csv_text(HEADER, ([*map(number, row[:-1]), str(row[-1])] for row in rows))

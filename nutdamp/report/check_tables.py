@@ -20,9 +20,9 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
     """Everything that ``check`` shows of one valid file."""
     parts: list[RenderableType] = [header(spacecraft, _spin_axis(spacecraft))]
     if spacecraft.channels:
-        parts += [Text(), _channels(spacecraft)]
+        parts += [Text(), channel_table(spacecraft)]
     if spacecraft.disturbances:
-        parts += [Text(), _disturbances(spacecraft)]
+        parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
     if spacecraft.dispersions is not None:
         parts += [Text(), *_dispersions(spacecraft)]
@@ -45,7 +45,7 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
 
 
-def _disturbances(spacecraft: Spacecraft) -> Table:
+def disturbance_table(spacecraft: Spacecraft) -> Table:
     """The forced tilt, the beat, or the times to reach a cone at resonance."""
     table = columns("disturbance", "does", text=("does",))
     for number, found in enumerate(survey.consequences(spacecraft), start=1):
@@ -70,7 +70,8 @@ def _consequences(found: survey.Consequence) -> list[str]:
     return texts
 
 
-def _channels(spacecraft: Spacecraft) -> Table:
+def channel_table(spacecraft: Spacecraft) -> Table:
+    """What each channel can do."""
     torque = "torque, file axes\nN m"
     table = columns("channel\n", torque, "on-time\n", "smallest step\ndeg", "largest step\ndeg", text=(torque,))
     for steps in survey.channel_steps(spacecraft):

@@ -32,7 +32,7 @@ ROUNDING = 1e-12
 """rad; what varies by less does not vary."""
 
 
-def dispersion_screen(results: Results, *, scheme: str, worst: int) -> RenderableType:
+def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Group:
     """Everything that ``disperse`` shows."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
     if not results.exact:

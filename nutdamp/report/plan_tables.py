@@ -34,6 +34,11 @@ def comparison_screen(compared: Comparison) -> RenderableType:
 
 def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
     """Name and derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    return Group(Text(spacecraft.name, style="bold"), derived_table(spacecraft, more))
+
+
+def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
+    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
     A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
     body, space = cones.body_cone(omega, spin), cones.space_cone(A, C, omega, spin)
@@ -61,7 +66,7 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
     table.add_row("actuators", _actuators(spacecraft))
     for name, value in more:
         table.add_row(name, value)
-    return Group(Text(spacecraft.name, style="bold"), table)
+    return table
 
 
 def _actuators(spacecraft: Spacecraft) -> str:

@@ -22,26 +22,28 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
         Text(),
         Text(f"{name}, flown by independent means", style="bold"),
         Text(),
-        _methods(found),
+        methods_table(found),
         *missing,
         Text(),
         Text(f"Taylor series and DOP853 {verdict} (within {AGREE:g} rad)."),
-        Text(_conservation(spacecraft, found)),
+        Text(conservation(spacecraft, found)),
         Text(),
         Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
         Text(),
-        _budget(found),
+        budget_table(found),
     )
 
 
-def _conservation(spacecraft: Spacecraft, found: Verification) -> str:
+def conservation(spacecraft: Spacecraft, found: Verification) -> str:
+    """How far |H| and the energy change on coasts, in a sentence."""
     drifts = f"|H| by at most {found.momentum_drift:.1e}, the energy by {found.energy_drift:.1e} of itself"
     if spacecraft.disturbances or spacecraft.growth != 0.0:
         return f"On coasts disturbances or dissipation change {drifts}."
     return f"On coasts, where both should stay, rounding changes {drifts}."
 
 
-def _methods(found: Verification) -> Table:
+def methods_table(found: Verification) -> Table:
+    """One row a way to fly the schedule: what it leaves, and how far it differs from the flown motion."""
     names = ("method", "nutation", "shift of H", "axis", "H", "rates")
     units = ("", "left, deg", "deg", "differs, rad", "rad", "relative")
     table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)))
@@ -63,7 +65,8 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-def _budget(found: Verification) -> Table:
+def budget_table(found: Verification) -> Table:
+    """One row an imperfection: what it leaves, alone."""
     table = columns("imperfection\n", "nutation left\ndeg", "shift of H\ndeg")
     for row in found.budget:
         angles = (row.nutation, row.momentum_shift)

@@ -24,7 +24,7 @@ from nutdamp.files.ccsds.message import (
     block,
     label,
 )
-from nutdamp.files.frames import Reference, file_axes
+from nutdamp.files.frames import Reference
 from nutdamp.physics import attitude, cones
 from nutdamp.planning import Plan
 from nutdamp.schedule import Pulse
@@ -100,7 +100,7 @@ def _frames(frame: str) -> Values:
 
 def _motion(body: Spacecraft, frame: str) -> list[Block]:
     """Attitude and angular velocity at t = 0."""
-    rates, quaternion = file_axes(body.initial.rates, body.initial.quaternion, body.inertia)
+    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     scalar, *vector = quaternion.tolist()
     # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
     turn: Values = dict(zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True))
@@ -120,7 +120,7 @@ def _spin(body: Spacecraft) -> Values:
     for a symmetric body (Poinsot). A body that spins backwards has its third axis at more than 90 deg from H.
     """
     inertia = body.inertia
-    rates, quaternion = file_axes(body.initial.rates, body.initial.quaternion, inertia)
+    rates, quaternion = inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     axes = attitude.matrix(quaternion)
     right_ascension = math.atan2(axes[1, 2], axes[0, 2])
     declination = math.atan2(axes[2, 2], math.hypot(axes[0, 2], axes[1, 2]))

@@ -62,5 +62,8 @@ def svg(figure: Figure) -> str:
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
     ours = '<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt" '
     text = text.replace("<svg ", ours, 1).replace(INK, "currentColor")
+    # Roles of labels end up as ids, several times over: only ids that something refers to stay.
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+    text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)
     mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)

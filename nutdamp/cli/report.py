@@ -1,0 +1,96 @@
+"""``nutdamp report``: the plan as a page to hand on."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
+from nutdamp.cli.common import (
+    Aim,
+    quiet_option,
+    remarks,
+    require_dispersions,
+    scheme_options,
+    source,
+    spacecraft_argument,
+    write_all,
+)
+from nutdamp.cli.disperse import Count, fly
+from nutdamp.cli.progress import working
+from nutdamp.schemes import CLASSIC, PLANNED, Options
+
+if TYPE_CHECKING:
+    from nutdamp.dispersion.study import Results
+    from nutdamp.planning import Plan
+
+
+@click.command("report")
+@spacecraft_argument
+@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Compare this one only; repeatable.")
+@scheme_options
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    default="report.html",
+    show_default=True,
+    help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",
+)
+@click.option("--disperse", type=Count(), help="Fly the recommended schedule with so many dispersed truths.")
+@quiet_option
+def command(
+    spacecraft: str | None,
+    names: tuple[str, ...],
+    options: Options,
+    aim: Aim,
+    output: str,
+    disperse: int | None,
+    quiet: bool,
+) -> None:
+    """Write a report: spacecraft, schemes compared, schedule, pictures, error budget, and how to repeat it.
+
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
+    standard output, as HTML. Pictures need the extra plot, a PDF needs Chromium, Chrome or Edge.
+    """
+    from nutdamp.report.page.formats import form_of
+
+    form = form_of(output)
+    remark = remarks(quiet)
+    text, name = source(spacecraft, remark)
+
+    from nutdamp.files.spacecraft_file import read_spacecraft
+    from nutdamp.planning import compare
+    from nutdamp.report.page.content import Repeat, report_page
+
+    repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
+    body = aim.applied(read_spacecraft(text, name))
+    if disperse is not None:
+        require_dispersions(body)
+    with working("planning", quiet=quiet):
+        compared = compare(body, tuple(dict.fromkeys(names)) or CLASSIC, options)
+    chosen = compared.recommended
+    dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
+    with working("writing the page", quiet=quiet):
+        page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed)
+        content = form.write(page, output)
+    write_all([(output, content)])
+    if output != "-":
+        remark(f"wrote {output}")
+    if chosen is None:
+        sys.exit(INFEASIBLE)
+    if chosen.meets_requirement is False or (dispersed is not None and dispersed.meets_requirement is False):
+        sys.exit(REQUIREMENT_MISSED)
+
+
+def _dispersed(chosen: Plan, samples: int, *, quiet: bool) -> Results:
+    """The recommended schedule in many truths, flown as the rest of the report; interrupted, nothing is written."""
+    from nutdamp.dispersion import study_of
+
+    results = fly(study_of(chosen.spacecraft, chosen.pulses, flown=True), samples, None, None, None, quiet)
+    if results.done < samples:
+        raise click.Abort
+    return results

@@ -1,0 +1,186 @@
+"""What stands on the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, NamedTuple
+
+from nutdamp import __version__
+from nutdamp.planning import Comparison, Plan, unrounded
+from nutdamp.report.check_tables import channel_table, disturbance_table
+from nutdamp.report.page.document import (
+    Block,
+    Facts,
+    Figure,
+    Listing,
+    Page,
+    Prose,
+    Remarks,
+    Section,
+    blocks_of,
+    sheet_of,
+)
+from nutdamp.report.page.pictures import dispersion_picture_of, pictures_of
+from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
+from nutdamp.report.text import degrees, mass, moment, quantity
+from nutdamp.report.verify_tables import budget_table, conservation, methods_table
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.verification import verify
+
+if TYPE_CHECKING:  # few reports disperse
+    from nutdamp.dispersion.study import Results
+
+
+class Repeat(NamedTuple):
+    """What it takes to make the page again: the command, and the input file by name and text."""
+
+    command: str
+    name: str
+    text: str
+
+
+def report_page(
+    compared: Comparison,
+    repeat: Repeat,
+    *,
+    pictured: bool,
+    dispersed: Results | None = None,
+) -> Page:
+    """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
+
+    ``dispersed``: the recommended schedule flown with dispersed truths.
+    """
+    body, chosen = compared.spacecraft, compared.recommended
+    sections = [_spacecraft(body), _schemes(compared)]
+    if chosen is not None:
+        sections.append(_schedule(chosen))
+        if pictured:
+            sections.append(Section("pictures", "Pictures", pictures_of(chosen)))
+        sections.append(_budget(chosen))
+        if dispersed is not None:
+            sections.append(_dispersion(chosen, dispersed, pictured=pictured))
+    good = chosen is not None and chosen.meets_requirement is not False
+    if dispersed is not None and dispersed.meets_requirement is False:
+        good = False
+    return Page(
+        title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
+        verdict=_verdict(compared, dispersed),
+        good=good,
+        figures=() if chosen is None else tuple(_figures(chosen, dispersed)),
+        sections=(*sections, _repeat(repeat)),
+        made_by=f"Made by nutdamp {__version__}.",
+    )
+
+
+def _verdict(compared: Comparison, dispersed: Results | None) -> str:
+    chosen = compared.recommended
+    if chosen is None:
+        return f"No recommendation: {compared.reason}."
+    verdict = f"Recommended: {chosen.scheme} – {compared.reason}."
+    if dispersed is None or dispersed.met_fraction is None:
+        return verdict
+    met, asked = (f"{100.0 * share:.4g} %" for share in (dispersed.met_fraction, dispersed.probability))
+    return f"{verdict} With dispersions {met} of {dispersed.done:,} cases meet the requirement; {asked} are asked."
+
+
+def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
+    """The numbers to read first."""
+    body, left, pulses = chosen.spacecraft, chosen.flown, chosen.pulses
+    assert left is not None
+    yield Figure("nutation", f"{degrees(body.nutation)} → {degrees(left.nutation)}")
+    yield Figure("shift of H", degrees(left.momentum_shift))
+    yield Figure("pulses", f"{len(pulses)}, until {moment(pulses.end)}" if len(pulses) else "none")
+    if pulses.propellant is None:
+        yield Figure("impulse", quantity(pulses.total_impulse, "N m s"))
+    else:
+        yield Figure("propellant", mass(pulses.propellant))
+    if chosen.meets_requirement is not None:
+        verdict = VERDICT[chosen.meets_requirement]
+        cases = None if dispersed is None else dispersed.met_fraction
+        yield Figure("requirement", verdict if cases is None else f"{verdict}, by {100.0 * cases:.4g} % of cases")
+
+
+def _spacecraft(body: Spacecraft) -> Section:
+    blocks: list[Block] = [spacecraft_facts(body)]
+    if body.channels:
+        blocks.append(
+            sheet_of("Channels, and the nutation that their shortest and longest pulse takes", channel_table(body))
+        )
+    if body.disturbances:
+        blocks.append(sheet_of("Disturbances, and what each does alone", disturbance_table(body)))
+    return Section("spacecraft", "Spacecraft", tuple(blocks))
+
+
+def _schemes(compared: Comparison) -> Section:
+    """The comparison, why a scheme is infeasible, and the remarks of the others."""
+    remarks = tuple(
+        (plan.scheme, remark)
+        for plan in compared.plans
+        for remark in ((plan.why,) if plan.why is not None else plan.remarks)
+    )
+    note = Prose(
+        "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "
+        "integrate Euler's equations through the real widths; recommendation and requirement go by them."
+    )
+    blocks: tuple[Block, ...] = (comparison_sheet(compared), note)
+    return Section("schemes", "Schemes compared", (*blocks, Remarks(remarks)) if remarks else blocks)
+
+
+def _schedule(chosen: Plan) -> Section:
+    title = f"Recommended schedule: {chosen.scheme}"
+    if not len(chosen.pulses):
+        return Section("schedule", title, (Prose("No pulse is needed."),))
+    note = Prose(
+        "A pulse is on from its start for its on-time; the centre lies halfway. "
+        "Nutation: before the pulse, and after it."
+    )
+    return Section("schedule", title, (pulse_sheet(chosen), note))
+
+
+def _budget(chosen: Plan) -> Section:
+    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen))
+    agree = "agree" if verified.agree else "DO NOT AGREE"
+    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
+    blocks: list[Block] = [
+        sheet_of("What each imperfection alone leaves, everything else ideal", budget_table(verified)),
+        sheet_of("The schedule flown by independent means", methods_table(verified)),
+        Prose(f"Taylor series and DOP853 {agree}. {conservation(chosen.spacecraft, verified)}"),
+    ]
+    if missing:
+        blocks.append(Remarks(missing))
+    return Section("budget", "Error budget", tuple(blocks))
+
+
+def _dispersion(chosen: Plan, dispersed: Results, *, pictured: bool) -> Section:
+    from nutdamp.report.dispersion_tables import dispersion_screen
+
+    blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
+    blocks += [Prose(f"Note: {remark}.") for remark in dispersed.study.remarks]
+    if pictured:
+        blocks.append(dispersion_picture_of(dispersed, chosen.scheme))
+    return Section("dispersion", "Dispersion", tuple(blocks))
+
+
+def _repeat(repeat: Repeat) -> Section:
+    return Section(
+        "repeat",
+        "To repeat it",
+        (
+            Listing("Command", repeat.command, "console"),
+            Facts("Versions", tuple(_versions())),
+            Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"),
+        ),
+    )
+
+
+def _versions() -> Iterator[tuple[str, str]]:
+    """What the numbers and pictures depend on."""
+    yield "nutdamp", __version__
+    yield "Python", platform.python_version()
+    for package in ("numpy", "scipy", "matplotlib"):
+        try:
+            yield package, version(package)
+        except PackageNotFoundError:
+            yield package, "not installed"

@@ -1,0 +1,154 @@
+"""What a report says, apart from how it looks: a page of sections, made of a few kinds of blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+
+class Column(NamedTuple):
+    """One column of a table; ``number``: flush right, and sorted by value."""
+
+    name: str
+    unit: str = ""
+    number: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A table with one row for each thing compared; the first column names it.
+
+    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    mark: int | None = None
+    sortable: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Names and what they are."""
+
+    title: str
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Prose:
+    """A paragraph."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """Remarks, each with the name of what it is about."""
+
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An ``<svg>`` element, a caption, and what it shows in words for those who do not see it."""
+
+    svg: str
+    caption: str
+    described: str
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Text as it stands in a file or on a command line; ``language`` as Markdown names it."""
+
+    title: str
+    text: str
+    language: str = ""
+
+
+Block = Sheet | Facts | Prose | Remarks | Picture | Listing
+
+
+class Section(NamedTuple):
+    """A heading with what stands under it; ``name`` is where links lead to."""
+
+    name: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+class Figure(NamedTuple):
+    """One of the few numbers to read first."""
+
+    name: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A whole report: title, verdict (``good``: nothing is missed), the numbers to read first, sections."""
+
+    title: str
+    verdict: str
+    good: bool
+    figures: tuple[Figure, ...]
+    sections: tuple[Section, ...]
+    made_by: str
+
+
+def sheet_of(title: str, table: Table) -> Sheet:
+    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
+
+    Where the first column has no heading, each row is a quantity of its own unit.
+    """
+    columns = []
+    for column in table.columns:
+        name, _, unit = plain(column.header).partition("\n")
+        columns.append(Column(name, unit, column.justify == "right"))
+    first = columns[0]
+    headed = (first._replace(name=first.name or "quantity"), *columns[1:])
+    return Sheet(title, headed, _rows(table), sortable=bool(first.name))
+
+
+def facts_of(title: str, table: Table) -> Facts:
+    """A screen's list of names and values as `Facts`; a row without a name continues the one before."""
+    rows: list[tuple[str, str]] = []
+    for name, value in _rows(table):
+        if name or not rows:
+            rows.append((name, value))
+        else:
+            rows[-1] = (rows[-1][0], f"{rows[-1][1]}; {value}")
+    return Facts(title, tuple(rows))
+
+
+def blocks_of(title: str, screen: Group) -> Iterator[Block]:
+    """What a screen shows, block by block: a line straight above a table is its title, else ``title`` is."""
+    above = ""
+    for part in screen.renderables:
+        if isinstance(part, Table):
+            made = sheet_of if part.show_header else facts_of
+            yield made(above or title, part)
+            above = ""
+            continue
+        if above:
+            yield Prose(above)
+        above = plain(part)
+    if above:
+        yield Prose(above)
+
+
+def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
+    cells: list[Iterable[str]] = [map(plain, column.cells) for column in table.columns]
+    return tuple(zip(*cells, strict=True))
+
+
+def plain(cell: object) -> str:
+    """The text of a cell, which in the tables of the screens is a text with or without a style."""
+    return cell.plain if isinstance(cell, Text) else str(cell)

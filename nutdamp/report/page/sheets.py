@@ -1,0 +1,111 @@
+"""Results as the tables of pages and notebooks: one unit a column, so that they sort."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+from nutdamp.flight import Residual
+from nutdamp.planning import Comparison, Plan
+from nutdamp.report.page.document import Column, Facts, Sheet, facts_of, sheet_of
+from nutdamp.report.plan_tables import derived_table, pulse_table
+from nutdamp.report.text import MISSING, degrees, duration, moment
+from nutdamp.spacecraft import Spacecraft
+
+VERDICT = {True: "met", False: "not met", None: MISSING}
+"""What `Plan.meets_requirement` says."""
+
+
+def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
+    """The spacecraft at t = 0, what is asked of its plans, and what they must keep."""
+    return facts_of(title, derived_table(spacecraft, _asked(spacecraft)))
+
+
+def _asked(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    asked, limits = spacecraft.requirement, spacecraft.limits
+    if asked is not None:
+        most = (("nutation", asked.nutation), ("shift of H", asked.momentum_shift))
+        yield "requirement", ", ".join(f"{name} at most {degrees(value)}" for name, value in most if value is not None)
+    yield "horizon", duration(spacecraft.horizon)
+    kept = []
+    if limits.earliest > 0.0:
+        kept.append(f"nothing before {duration(limits.earliest)}")
+    if limits.gap > 0.0:
+        kept.append(f"{duration(limits.gap)} between pulses")
+    if limits.tick is not None:
+        kept.append(f"commands in steps of {duration(limits.tick)}")
+    if limits.max_pulses is not None:
+        kept.append(f"at most {limits.max_pulses} pulses")
+    kept += [f"no pulse from {moment(begin)} to {moment(end)}" for begin, end in limits.blackout]
+    if kept:
+        yield "limits", "; ".join(kept)
+
+
+Cell = Callable[[Plan], str]
+
+
+def comparison_sheet(compared: Comparison) -> Sheet:
+    """One row a scheme; the recommended one is marked."""
+    columns = _columns(compared)
+    rows = []
+    for plan in compared.plans:
+        cells = [cell(plan) if plan.feasible else "" for _, cell in columns]
+        rows.append((plan.scheme, *(cells if plan.feasible else ["infeasible", *cells[1:]])))
+    mark = next((index for index, plan in enumerate(compared.plans) if plan is compared.recommended), None)
+    names = (Column("scheme", number=False), *(column for column, _ in columns))
+    return Sheet("What each scheme costs and leaves, flown through the real pulse widths", names, tuple(rows), mark)
+
+
+def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
+    least = compared.spacecraft.least_impulse
+    columns: list[tuple[Column, Cell]] = [
+        (Column("pulses"), lambda plan: str(len(plan.pulses))),
+        (Column("ends at", "s"), lambda plan: f"{plan.pulses.end:.3f}"),
+        (Column("impulse", "N m s"), lambda plan: _number(plan.pulses.total_impulse)),
+        (
+            Column("× least impulse"),
+            lambda plan: f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING,
+        ),
+    ]
+    if any(plan.feasible and plan.pulses.propellant is not None for plan in compared.plans):
+        columns.append((Column("propellant", "g"), lambda plan: _number(plan.pulses.propellant, 1e3)))
+    columns += [
+        (Column("nutation left", "deg"), lambda plan: _angle(plan.flown, "nutation")),
+        (Column("shift of H", "deg"), lambda plan: _angle(plan.flown, "momentum_shift")),
+        (Column("nutation by (17)", "deg"), lambda plan: _angle(plan.residual, "nutation")),
+        (Column("shift by (17)", "deg"), lambda plan: _angle(plan.residual, "momentum_shift")),
+    ]
+    if any(plan.spin_change for plan in compared.plans):
+        columns.append((Column("spin change", "rad/s"), lambda plan: _number(plan.spin_change)))
+    if any(plan.delta_v is not None for plan in compared.plans):
+        columns.append(
+            (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
+        )
+    if compared.spacecraft.requirement is not None:
+        columns.append((Column("requirement", number=False), lambda plan: VERDICT[plan.meets_requirement]))
+    return columns
+
+
+def _number(value: float | None, scale: float = 1.0) -> str:
+    return MISSING if value is None else f"{scale * value:.4g}"
+
+
+def _angle(left: Residual | None, name: str) -> str:
+    return MISSING if left is None else degrees(getattr(left, name)).removesuffix(" deg")
+
+
+def pulse_sheet(plan: Plan) -> Sheet:
+    """One row a pulse."""
+    return sheet_of(f"Pulses of {plan.scheme}", pulse_table(plan))
+
+
+def residual_sheet(title: str, left: Residual) -> Sheet:
+    """What remains after the last pulse."""
+    names = {
+        "nutation": "nutation",
+        "body cone": "body_cone",
+        "space cone": "space_cone",
+        "shift of H": "momentum_shift",
+    }
+    rows = tuple((name, _angle(left, key)) for name, key in names.items())
+    return Sheet(title, (Column("after the last pulse", number=False), Column("angle", "deg")), rows)

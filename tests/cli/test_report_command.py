@@ -1,0 +1,164 @@
+"""``nutdamp report`` as a process: what it writes, and that it writes nothing where it cannot."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp import __version__
+from nutdamp.errors import CannotWrite
+from nutdamp.report.page import pdf
+
+IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+
+
+def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) -> None:
+    done = run("report", "--scheme", "two-pulse")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    assert "built-in example" in done.stderr
+    assert done.stderr.endswith("wrote report.html\n")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<pre>nutdamp report --scheme two-pulse</pre>" in text
+    assert f'<th scope="row">nutdamp</th><td>{__version__}</td>' in text
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
+    assert run("report", "my craft.yaml", "-q", "--coarse", "-o", "a.md").returncode == 0
+    first = (tmp_path / "a.md").read_text(encoding="utf-8")
+    command, file = re.findall(r"```(?:console|yaml)\n(.*?)\n```", first, re.DOTALL)
+    assert command == "nutdamp report 'my craft.yaml' -q --coarse -o a.md"
+    (tmp_path / "my craft.yaml").write_text(file + "\n")
+    assert run(*shlex.split(command)[1:]).returncode == 0
+    assert (tmp_path / "a.md").read_text(encoding="utf-8") == first
+
+
+def test_standard_output_holds_the_page_alone(run: Run) -> None:
+    done = run("report", "-o", "-")
+    assert done.stdout.startswith("<!DOCTYPE html>")
+    assert done.stdout.endswith("</html>\n")
+    assert "wrote" not in done.stderr
+
+
+def test_markdown_needs_no_pictures(run: Run, tmp_path: Path) -> None:
+    assert run("report", "-q", "-o", "report.md").returncode == 0
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert text.startswith("# Sounder-1: damping 5 deg of nutation\n\n✅ **Recommended: four-pulse")
+    assert "| **four-pulse** |" in text
+    assert "<svg" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "status", "said"),
+    [
+        (IDEAL, ("--scheme", "four-pulse"), 3, "No recommendation: no scheme is feasible."),
+        (IDEAL + "requirement: {momentum_shift: 0.01 deg}\n", ("--scheme", "one-pulse"), 4, "meets the requirement;"),
+    ],
+    ids=["infeasible", "missed"],
+)
+def test_the_page_is_written_whatever_the_verdict(
+    run: Run, tmp_path: Path, text: str, arguments: tuple[str, ...], status: int, said: str
+) -> None:
+    (tmp_path / "craft.yaml").write_text(text)
+    done = run("report", "craft.yaml", "-o", "report.md", *arguments)
+    assert done.returncode == status
+    verdict = (tmp_path / "report.md").read_text(encoding="utf-8").splitlines()[2]
+    assert verdict.startswith("⚠️ **")
+    assert said in verdict
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (("-o", "report.doc"), 2, "use one of .html, .md, .pdf"),
+        (("-o", "report"), 2, "use one of"),
+        (("-o", "no/report.md"), 1, "cannot write no/report.md"),
+        (("missing.yaml",), 1, "cannot read missing.yaml"),
+        (("--scheme", "three-pulse"), 2, "three-pulse"),
+        (("--on-time", "0"), 2, "above zero"),
+        (("--disperse", "-1"), 2, "number of cases"),
+    ],
+)
+def test_what_cannot_be_leaves_nothing(
+    run: Run, tmp_path: Path, arguments: tuple[str, ...], status: int, said: str
+) -> None:
+    done = run("report", *arguments)
+    assert done.returncode == status
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
+    text = IDEAL + "requirement: {nutation: 0.2 deg}\ndispersions: {omega0: {normal: 1 deg/s}}\n"
+    (tmp_path / "craft.yaml").write_text(text)
+    done = run("report", "craft.yaml", "--scheme", "two-pulse", "-o", "report.md", "--disperse", "1e3")
+    assert done.returncode == 4
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "of 1,000 cases meet the requirement; 99.7 % are asked." in report.splitlines()[2]
+    assert report.splitlines()[2].startswith("⚠️")
+    assert "NOT met" in report
+
+
+def test_what_is_not_dispersed_says_what_to_write(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "craft.yaml").write_text(IDEAL)
+    done = run("report", "craft.yaml", "--disperse", "100")
+    assert done.returncode == 2
+    assert "has no dispersions" in done.stderr
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text("old")
+    (tmp_path / "craft.yaml").write_text("name: X\n")
+    assert run("report", "craft.yaml").returncode == 2
+    assert (tmp_path / "report.html").read_text() == "old"
+
+
+def test_without_a_browser_no_pdf(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(pdf.VARIABLE, "no-such-browser")
+    done = run("report", "-o", "report.pdf")
+    assert done.returncode == 1
+    assert "cannot write report.pdf: a browser prints the PDF, and none is found" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def printer(folder: Path, script: str) -> str:
+    """An executable that stands for the browser."""
+    path = folder / "browser"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="what stands for the browser is a shell script")
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("echo 'no display' >&2; exit 3", "printed nothing: no display"),
+        ("exit 0", "printed nothing: it said nothing"),
+        ("exec sleep 30", "printed nothing: .*timed out after"),
+    ],
+    ids=["fails", "writes nothing", "hangs"],
+)
+def test_a_browser_that_prints_nothing_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str, said: str
+) -> None:
+    monkeypatch.setenv(pdf.VARIABLE, printer(tmp_path, script))
+    monkeypatch.setattr(pdf, "PATIENCE", 0.5)
+    with pytest.raises(CannotWrite, match=f"cannot write report.pdf: .*{said}"):
+        pdf.printed("<p>", "report.pdf")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="what stands for the browser is a shell script")
+def test_what_the_browser_prints_is_the_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    copy = "for word; do case $word in --print-to-pdf=*) out=${word#*=};; file://*) page=${word#file://};; esac; done"
+    monkeypatch.setenv(pdf.VARIABLE, printer(tmp_path, f'{copy}; cp "$page" "$out"'))
+    assert pdf.printed("<p>ω", "report.pdf") == "<p>ω".encode()

@@ -1,0 +1,210 @@
+"""nutdamp as a library: the names it promises, arrays in the axes of the file, errors of its own."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from process import Run
+from scipy.spatial.transform import Rotation
+
+import nutdamp
+from nutdamp import errors
+from nutdamp.files import pulses_csv, track_csv
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = Path(__file__).with_name("library_example.py")
+
+TILTED = """
+name: Tilted
+inertia: {tensor: [[120, 3, 6], [3, 118, -4], [6, -4, 80]]}
+omega0: [0.2, 0.1, 3.0]
+steerable: {torque: 40 N m, isp: 220 s, lever_arm: 1 m}
+requirement: {nutation: 0.5 deg}
+"""
+
+
+@pytest.fixture
+def craft() -> nutdamp.Spacecraft:
+    return nutdamp.example()
+
+
+def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_importing_loads_nothing_that_takes_time(tmp_path: Path) -> None:
+    code = "import sys, nutdamp; nutdamp.__version__; dir(nutdamp); print('numpy' in sys.modules)"
+    assert python(code, tmp_path).stdout == "False\n"
+
+
+def test_every_public_name_is_there_and_no_other() -> None:
+    for name in nutdamp.__all__:
+        assert getattr(nutdamp, name) is not None
+    assert set(nutdamp.__all__) <= set(dir(nutdamp))
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = nutdamp.nonsense  # type: ignore[attr-defined]
+
+
+def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
+    (tmp_path / "typed.py").write_text(
+        "import nutdamp\n"
+        'plan = nutdamp.plan(nutdamp.load("spacecraft.yaml"), "two-pulse")\n'
+        "reveal_type(plan.fly().track.rates)\n"
+        "plan.fly().to_csv(3)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "typed.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "ndarray" in done.stdout
+    assert "numpy.float64" in done.stdout or "floating" in done.stdout
+    assert 'typed.py:4: error: Argument 1 to "to_csv" of "Flight" has incompatible type "int"' in done.stdout
+    assert "Found 1 error" in done.stdout
+
+
+def test_the_example_runs(run: Run, tmp_path: Path) -> None:
+    assert run("init").returncode == 0
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE)], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert "<Plan four-pulse: 4 pulses" in done.stdout
+    assert (tmp_path / "track.csv").stat().st_size > 100_000
+
+
+def test_files_are_those_of_the_command_line(craft: nutdamp.Spacecraft, run: Run, tmp_path: Path) -> None:
+    run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json")
+    run("simulate", "--scheme", "two-pulse", "--flown", "--csv", "flown.csv")
+    run("simulate", "--scheme", "two-pulse", "--csv", "impulses.csv")
+    plan = nutdamp.plan(craft, "two-pulse")
+    plan.to_csv(tmp_path / "own.csv")
+    assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "pulses.csv").read_bytes()
+    for name, by_impulses in (("flown.csv", False), ("impulses.csv", True)):
+        plan.fly(by_impulses=by_impulses).to_csv(tmp_path / "own.csv")
+        assert (tmp_path / "own.csv").read_bytes() == (tmp_path / name).read_bytes()
+    compared = nutdamp.compare(craft, ["two-pulse"])
+    assert compared.to_dict() == json.loads((tmp_path / "plan.json").read_text())
+
+
+def test_arrays_have_the_columns_of_the_files(tmp_path: Path) -> None:
+    plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
+    flight = plan.fly(samples=50)
+    for made, header, write in (
+        (plan.to_numpy(), pulses_csv.HEADER, plan.to_csv),
+        (flight.to_numpy(), track_csv.HEADER, flight.to_csv),
+    ):
+        assert made.dtype.names == header
+        write(tmp_path / "rows.csv")
+        rows = list(csv.reader(io.StringIO((tmp_path / "rows.csv").read_text())))[1:]
+        assert len(rows) == len(made)
+        for mine, row in zip(made.tolist(), rows, strict=True):
+            assert [str(cell) for cell in mine] == [cell or "nan" for cell in row]
+
+
+def test_the_track_is_in_the_axes_of_the_file() -> None:
+    craft = nutdamp.read(TILTED)
+    tensor = np.array([[120.0, 3, 6], [3, 118, -4], [6, -4, 80]])
+    flight = nutdamp.plan(craft, "none").fly(until=5.0, samples=200)
+    track = flight.track
+    assert track.rates[0] == pytest.approx([0.2, 0.1, 3.0], abs=1e-14)
+    assert craft.rates == pytest.approx([0.2, 0.1, 3.0], abs=1e-14)
+    # H = R I ω stays where it is, with the tensor as the file has it.
+    turn = Rotation.from_quat(np.roll(track.quaternion, -1, axis=1)).as_matrix()
+    momentum = np.einsum("nij,nj->ni", turn, track.rates @ tensor)
+    assert momentum == pytest.approx(np.broadcast_to(momentum[0], momentum.shape), abs=1e-9)
+    assert momentum == pytest.approx(track.momentum, abs=1e-9)
+    assert flight.to_numpy()["omega_1_rad_s"] == pytest.approx(track.rates[:, 0], abs=0.0)
+
+
+def test_a_flight_draws_itself(craft: nutdamp.Spacecraft) -> None:
+    flight = nutdamp.plan(craft, "two-pulse").fly()
+    assert len(flight.figure("motion").axes) == 2
+    assert len(flight.figure("timeline").axes) == 1
+
+
+def test_a_written_schedule_is_read_as_a_plan(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
+    plan = nutdamp.plan(craft, "four-pulse")
+    plan.to_csv(tmp_path / "pulses.csv")
+    again = nutdamp.load_schedule(tmp_path / "pulses.csv", craft)
+    assert again.fly().residual == plan.fly().residual
+    assert again.propellant == pytest.approx(plan.propellant, rel=1e-12)
+    text = (tmp_path / "pulses.csv").read_text().replace("-M1", "+M9")
+    (tmp_path / "edited.csv").write_text(text)
+    with pytest.warns(UserWarning, match=r"channel '\+M9' is not in the spacecraft file"):
+        nutdamp.load_schedule(tmp_path / "edited.csv", craft)
+
+
+def test_the_recommended_plan_is_one_of_those_compared(craft: nutdamp.Spacecraft) -> None:
+    compared = nutdamp.compare(craft)
+    assert [plan.scheme for plan in compared] == ["one-pulse", "two-pulse", "four-pulse"]
+    assert compared.recommended is not None
+    chosen = compared[compared.recommended.scheme]
+    assert chosen.meets_requirement
+    assert chosen.flown == compared.recommended.flown
+    assert chosen.total_impulse >= craft.least_impulse * (1 - 1e-12)
+    with pytest.raises(KeyError):
+        compared["optimal"]
+
+
+def test_what_cannot_be_says_so_in_an_error_of_the_package(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
+    ideal = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n")
+    infeasible = nutdamp.plan(ideal, "four-pulse")
+    assert not infeasible.feasible
+    assert len(infeasible.to_numpy()) == len(infeasible) == 0
+    plan = nutdamp.plan(craft, "two-pulse")
+    for kind, call in (
+        (errors.CannotRead, lambda: nutdamp.load(tmp_path / "missing.yaml")),
+        (errors.FaultyFile, lambda: nutdamp.read("name: X\n")),
+        (errors.BadRequest, lambda: nutdamp.plan(craft, "three-pulse")),
+        (errors.BadRequest, lambda: nutdamp.compare(craft, ["three-pulse"])),
+        (errors.BadRequest, lambda: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time=-1.0))),
+        (errors.BadRequest, lambda: nutdamp.plan(craft, "optimal", nutdamp.Options(least="time"))),
+        (errors.BadRequest, lambda: plan.fly(until=-1.0)),
+        (errors.BadRequest, lambda: plan.fly(samples=1)),
+        (errors.BadRequest, lambda: plan.fly().figure("portrait")),
+        (errors.Infeasible, infeasible.fly),
+        (errors.Infeasible, lambda: infeasible.to_csv(tmp_path / "pulses.csv")),
+        (errors.CannotWrite, lambda: plan.to_csv(tmp_path / "no" / "pulses.csv")),
+    ):
+        with pytest.raises(kind):
+            call()
+        assert issubclass(kind, nutdamp.NutdampError)
+    assert list(tmp_path.iterdir()) == []
+
+
+class _Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
+        self.open.append(tag)
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_notebooks_show_small_tables() -> None:
+    craft = nutdamp.read(TILTED.replace("Tilted", "'<b>&\"'"))
+    compared = nutdamp.compare(craft)
+    plan = compared["two-pulse"]
+    for shown in (craft, compared, plan, plan.fly(), nutdamp.plan(craft, "four-pulse")):
+        tags = _Tags()
+        tags.feed(shown._repr_html_())
+        assert tags.open == []
+        assert "table" in tags.seen or not plan.feasible or "infeasible" in shown._repr_html_()
+        assert "b" not in tags.seen
+        assert repr(shown).startswith(f"<{type(shown).__name__}")
