@@ -169,7 +169,7 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(craft: nutdamp.Spacec
         (errors.BadRequest, lambda: nutdamp.plan(craft, "three-pulse")),
         (errors.BadRequest, lambda: nutdamp.compare(craft, ["three-pulse"])),
         (errors.BadRequest, lambda: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time=-1.0))),
-        (errors.BadRequest, lambda: nutdamp.plan(craft, "optimal", nutdamp.Options(least="time"))),
+        (errors.BadRequest, lambda: nutdamp.plan(craft, "optimal", nutdamp.Options(least="fuel"))),
         (errors.BadRequest, lambda: plan.fly(until=-1.0)),
         (errors.BadRequest, lambda: plan.fly(samples=1)),
         (errors.BadRequest, lambda: plan.fly().figure("portrait")),
