@@ -8,26 +8,22 @@ rigorous one of the nutation alone.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from nutdamp import flight
 from nutdamp.errors import Infeasible
-from nutdamp.schedule import Bounds, Schedule, channel_pulse
+from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes import Options, influence
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.influence import Equations
 from nutdamp.schemes.polish import polish
-from nutdamp.schemes.program import Burn, Program, Solution
-from nutdamp.schemes.windows import SLACK, Windows, usable
-from nutdamp.spacecraft import Channel, Spacecraft
-
-REPAIRS = 60
-"""Rounds in which burns that break a limit are moved elsewhere."""
+from nutdamp.schemes.program import Program, Solution
+from nutdamp.schemes.windows import usable
+from nutdamp.spacecraft import Spacecraft
 
 CHOICES = 3
 """Times that burns are chosen among all channels and moments: at small angles, then along the flight before."""
@@ -46,15 +42,6 @@ DEARER = 0.03
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
-
-GAIN = 0.0005
-"""Share of the cost that is not worth another turn, nor another pulse where there are few."""
-
-UNMET = 1e-7
-"""Share of what there is to do that columns may fail to supply: the program's own tolerance."""
-
-THRIFT = 0.004
-"""Share of the least cost that is given away for fewer pulses."""
 
 HASTE = 0.0008
 """How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
@@ -102,10 +89,6 @@ def _fewest(search: _Search) -> Schedule:
         if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
             return search.with_bounds(made)
     return search.schedule()
-
-
-class _Unrepairable(Exception):
-    """No burns were found that keep on-times, gap and max_pulses all at once."""
 
 
 class _Search:
@@ -216,10 +199,10 @@ class _Search:
             if solution.unmet > UNMET:
                 break
             try:
-                solution, last = self.thinned(program, solution, least), math.inf
+                solution, last = thinned(program, solution, least, fewest=self.options.least == "pulses"), math.inf
                 for turn in range(AIMS):
-                    solution = self.repaired(program, solution)
-                    made = self.pulses(solution.burns)
+                    solution = repaired(program, solution)
+                    made = as_pulses(self.spacecraft, solution.burns)
                     flown = flight.flown(self.spacecraft, made)
                     program.aim(influence.along(flown, self.equations, program.width))
                     if self.left(flown) < NEAR:
@@ -232,7 +215,7 @@ class _Search:
                     solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
                     if solution.unmet > LOST:
                         break
-            except _Unrepairable:
+            except Unrepairable:
                 break
             if any(left == 0.0 and price <= least * (1.0 + DEAR) for left, price, _ in found):
                 break
@@ -270,75 +253,6 @@ class _Search:
         off = max(residual.axis_error - (self.options.shift or 0.0), 0.0) if self.equations.shift else 0.0
         spin = 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0)
         return max(residual.nutation, off, spin)
-
-    def thinned(self, program: Program, solution: Solution, cost: float) -> Solution:
-        """As few burns as cost hardly more: the longest are kept and may grow, as many as it takes.
-
-        The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
-        """
-        few = len(solution.burns) <= 2 * len(self.equations.chosen)
-        most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
-        order = sorted(solution.burns, key=lambda burn: -burn.on_time * float(np.linalg.norm(burn.channel.torque)))
-        best, low, high = solution, 1, len(order)
-        allowed = self.spacecraft.limits.max_pulses
-        if self.options.least == "pulses" or (allowed is not None and high > allowed):
-            most = math.inf
-        while low < high:
-            middle = (low + high) // 2
-            found = program.solve(program.about(order[:middle]))
-            if found.unmet <= UNMET and found.cost <= most:
-                best, high = found, middle
-            else:
-                low = middle + 1
-        return best
-
-    def repaired(self, program: Program, solution: Solution) -> Solution:
-        """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden."""
-        for _ in range(REPAIRS):
-            broken = next(self.broken(program, solution.burns), None)
-            if broken is None:
-                return solution
-            program.forbid(*broken)
-            near = program.solve(program.about(solution.burns))
-            solution = near if near.unmet <= UNMET else program.solve()
-            if solution.unmet > UNMET:
-                raise _Unrepairable
-        raise _Unrepairable
-
-    def broken(self, program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
-        """What to forbid: ends of too long burns, too short ones, the less of two too near, the least if too many."""
-        limits, width = self.spacecraft.limits, program.width
-        for burn in burns:
-            longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
-            if burn.on_time > longest + SLACK:
-                reach = burn.on_time + width
-                yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
-                yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
-            if burn.on_time < 0.5 * shortest:
-                yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
-        for one, two in itertools.pairwise(burns):
-            if two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - SLACK:
-                less = min(one, two, key=lambda burn: burn.on_time)
-                reach = 0.5 * less.on_time + width
-                yield less.channel, less.t - reach, less.t + reach
-        if limits.max_pulses is not None and len(burns) > limits.max_pulses:
-            least = min(burns, key=lambda burn: burn.on_time * float(np.linalg.norm(burn.channel.torque)))
-            reach = 0.5 * least.on_time + 2.0 * width
-            yield least.channel, least.t - reach, least.t + reach
-
-    def pulses(self, burns: tuple[Burn, ...]) -> Schedule:
-        """The burns as pulses, on-times within their bounds."""
-        windows, body = (
-            Windows(replace(self.spacecraft, limits=replace(self.spacecraft.limits, tick=None))),
-            self.spacecraft,
-        )
-        pulses = []
-        for burn in burns:
-            on_time = windows.on_time(burn.on_time, burn.channel.min_on_time, burn.channel.max_on_time)
-            start = max(burn.t - 0.5 * on_time, body.limits.earliest)
-            start = min(start, body.horizon - on_time)
-            pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
-        return Schedule(tuple(pulses))
 
     def cure(self) -> str:
         """Why the program has no solution, and which limit to relax."""

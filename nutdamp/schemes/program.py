@@ -57,6 +57,11 @@ class Burn:
     t: float
     on_time: float
 
+    @property
+    def impulse(self) -> float:
+        """Torque times on-time, N m s."""
+        return self.on_time * float(np.linalg.norm(self.channel.torque))
+
 
 class Columns(NamedTuple):
     """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse)."""
