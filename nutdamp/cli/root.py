@@ -10,10 +10,22 @@ import click
 from nutdamp import __version__
 from nutdamp.cli.boundary import run
 
-COMMANDS = (
-    *("plan", "simulate", "trade", "disperse", "animate", "verify", "check"),
-    *("report", "export", "import", "explain", "init", "schema"),
-)
+COMMANDS = {
+    "plan": "Plan pulse schedules that damp the nutation, and compare them.",
+    "simulate": "Propagate a scheme or a schedule; cone angles and axis track.",
+    "trade": "What an earlier end costs: a front of cheapest schedules.",
+    "disperse": "Fly many dispersed truths; percentiles, tolerance budget.",
+    "verify": "Fly a schedule by independent means; an error budget.",
+    "report": "One page to hand on: HTML, Markdown or PDF.",
+    "animate": "Film the body cone rolling on the space cone.",
+    "check": "All faults of spacecraft files, or what follows from them.",
+    "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",
+    "import": "A spacecraft file from a CCSDS attitude parameter message.",
+    "explain": "Where each equation of the sources stands, and its test.",
+    "init": "Write a commented spacecraft file to start from.",
+    "schema": "JSON Schema of the spacecraft file, for editors.",
+}
+"""The subcommands in the order of a first use, and what the help page says of each."""
 
 
 class Commands(click.Group):
@@ -22,6 +34,11 @@ class Commands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
         """Names in the order of a first use."""
         return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """The commands on the help page, without loading any of them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """The command of that name."""
