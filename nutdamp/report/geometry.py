@@ -108,6 +108,14 @@ def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
     return on_sky(plane, track.axis), on_sky(plane, track.momentum)
 
 
+def sky_target(flight: Flight, track: Track) -> Vector:
+    """(n, 2): the target axis in the same angles; empty where there is none."""
+    axis = flight.spacecraft.goal.axis
+    if axis is None:
+        return np.empty((0, 2))
+    return on_sky(sky_plane(flight, track.momentum[0]), axis[None])
+
+
 def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
     """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
     low, high = points.min(axis=0), points.max(axis=0)

@@ -48,7 +48,8 @@ class Drawing:
         else:
             yield from (*left, Text(), *right)
         pulses = "   digits: pulse" if len(self.flight.schedule) else ""
-        yield Text(f"o t = 0   x end   + H at the start and after each pulse{pulses}", FAINT)
+        target = "" if self.flight.spacecraft.goal.axis is None else "   * target"
+        yield Text(f"o t = 0   x end   + H, first and after each pulse{target}{pulses}", FAINT)
 
     def pole_curve(self, width: int) -> list[Text]:
         """The rotation vector in the body, as lines of ``width`` characters."""
@@ -63,10 +64,13 @@ class Drawing:
     def axis_track(self, width: int) -> list[Text]:
         """The spin axis in space and where H jumps, as lines of ``width`` characters."""
         points, momentum = geometry.sky_paths(self.flight, self.track)
-        panel = fitted(width, *geometry.room(np.vstack([points, momentum]), 0.1))
+        target = geometry.sky_target(self.flight, self.track)
+        panel = fitted(width, *geometry.room(np.vstack([points, momentum, target]), 0.1))
         firings = [stretch for stretch in geometry.stretches(self.flight, self.track) if stretch.pulse is not None]
         for row in (0, *(stretch.last for stretch in firings)):
             panel.mark(momentum[row], "+", MOMENTUM, at=True)
+        for point in target:
+            panel.mark(point, "*", MOMENTUM, at=True)
         self._path(panel, points)
         x, y = geometry.sky_names(self.flight)
         return framed(panel, "Axis track", x, y)

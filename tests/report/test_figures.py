@@ -29,7 +29,7 @@ from nutdamp.report import figures, geometry
 from nutdamp.report.figures import sphere
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft, Steerable, Vector
 from nutdamp.track import Track
 
 NAMES = ("overview", "motion", "sphere", "history", "timeline")
@@ -47,6 +47,10 @@ CASES: dict[str, tuple[Spacecraft, str]] = {
     "blackouts": (
         spinner(channels=cross(20.0), limits=Limits(earliest=1.0, blackout=((3.0, 4.5), (20.0, 25.0)))),
         "four-pulse",
+    ),
+    "pointed": (
+        replace(pointing := spinner(channels=cross(20.0)), goal=Goal(pointing.direction_in_n(0.14, 1.0))),
+        "optimal",
     ),
     "no pulses": (spinner(channels=cross(20.0)), "none"),
     "no nutation": (spinner(degrees=0.0, channels=cross(20.0)), "none"),
@@ -122,6 +126,13 @@ def test_the_axis_track_ends_where_h_and_the_spin_axis_end() -> None:
     assert len(line(space, "H")) == len(made.schedule) + 1
     shift = np.degrees(made.residual.momentum_shift)
     assert np.hypot(*line(space, "H")[-1]) == pytest.approx(shift, abs=1e-9)
+
+
+def test_the_target_is_marked_where_h_ends() -> None:
+    space = panel(drawn("motion", "pointed"), "Axis track")
+    (target,) = line(space, "target")
+    assert np.degrees(0.14) * np.array([np.cos(1.0), np.sin(1.0)]) == pytest.approx(target)
+    assert line(space, "H")[-1] == pytest.approx(target, abs=1e-6)
 
 
 @pytest.mark.parametrize(("name", "case"), [one for one in LAID_OUT if one[0] != "timeline"])

@@ -87,8 +87,11 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
             if np.hypot(*(moved[-1] - moved[0])) > 0.08 * np.ptp(path, axis=0).max():
                 style.heads(axes, moved, _halfway(moved), MOMENTUM)
     axes.plot(*np.vstack(stations).T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
+    target = geometry.sky_target(flight, track)
+    if len(target):
+        axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none", label="target")
     x, y = geometry.sky_names(flight)
-    style.square(axes, np.vstack([path, momentum]), margin=0.14)
+    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     axes.set(xlabel=x, ylabel=y, title="Axis track: spin axis in space")
 
 
