@@ -64,11 +64,28 @@ class Burn:
 
 
 class Columns(NamedTuple):
-    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse)."""
+    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
+
+    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
+    """
 
     channel: NDArray[np.int_]
     t: Vector
     width: Vector
+    burn: NDArray[np.int_]
+
+    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> Columns:
+        """Some of the columns."""
+        return Columns(self.channel[which], self.t[which], self.width[which], self.burn[which])
+
+    def joined(self, other: Columns) -> Columns:
+        """These columns and others."""
+        return Columns(
+            np.concatenate([self.channel, other.channel]),
+            np.concatenate([self.t, other.t]),
+            np.concatenate([self.width, other.width]),
+            np.concatenate([self.burn, other.burn]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +160,14 @@ class Program:
             new = self._priced(duals, chosen)
             if not len(new.t):
                 break
-            chosen = _joined(chosen, new)
+            chosen = chosen.joined(new)
             amounts, duals, slack = self._master(chosen)
         if generate:
             self._pool = chosen
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
-            self._burns(Columns(chosen.channel[used], chosen.t[used], chosen.width[used]), on_times),
+            self._burns(chosen.of(used), on_times),
             float(self.costs[chosen.channel[used]] @ on_times),
             float(slack[: 2 * len(duals)].sum()),
             self._off_by(slack[2 * len(duals) :]),
@@ -175,16 +192,19 @@ class Program:
         wide = np.flatnonzero(columns.width)
         most[wide] = columns.width[wide] / self._unit[columns.channel[wide]]
         # The shares of the directions in which H may end off its target add up to no more than `off`.
-        limit = np.zeros((min(ring.shape[1], 1), len(cost)))
-        limit[:, len(cost) - ring.shape[1] :] = 1.0
+        shares = np.zeros((min(ring.shape[1], 1), len(cost)))
+        shares[:, len(cost) - ring.shape[1] :] = 1.0
+        longest = np.zeros((0, len(cost)))
+        if columns.burn.max(initial=-1) >= 0:
+            longest = self._longest(columns, len(cost))
         bounds = [(0.0, upper) for upper in most.tolist()]
         for presolve in (True, False):  # rarely the solver loses its way after presolving
             found = linprog(
                 cost,
                 A_eq=matrix,
                 b_eq=self.influence.goal / self._scale,
-                A_ub=limit,
-                b_ub=np.full(len(limit), self.off / self._scale),
+                A_ub=np.vstack([shares, longest]),
+                b_ub=np.concatenate([np.full(len(shares), self.off / self._scale), np.ones(len(longest))]),
                 bounds=bounds,
                 method="highs-ds",
                 options={"presolve": presolve},
@@ -195,6 +215,15 @@ class Program:
             raise Infeasible(f"not found: the linear program's solver gave up ({found.message})")
         x = np.asarray(found.x)
         return x[: len(columns.t)], np.asarray(found.eqlin.marginals), x[len(columns.t) :]
+
+    def _longest(self, columns: Columns, count: int) -> Vector:
+        """Rows (burns, ``count``) that hold each burn's on-time, over the longest that its channel may be on."""
+        longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
+        bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
+        numbers, row = np.unique(columns.burn[bounded], return_inverse=True)
+        rows = np.zeros((len(numbers), count))
+        rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
+        return rows
 
     def _ring(self) -> Vector:
         """Columns for free in all directions of the shift, (equations, SIDES), where H may end off its target."""
@@ -231,14 +260,14 @@ class Program:
         if self._pool is not None:
             pool = self._pool
             allowed = ~self.forbidden[pool.channel, self._slot(pool.t)]
-            return Columns(pool.channel[allowed], pool.t[allowed], pool.width[allowed])
+            return pool.of(allowed)
         worth = self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
         channel, slot = np.nonzero(worth > 0.7 * worth.max(initial=0.0) - 0.3)
         chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
         return self._slots(channel[chosen], slot[chosen])
 
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
-        return Columns(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
+        return _alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: Columns) -> Columns:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
@@ -251,7 +280,7 @@ class Program:
             best = np.argpartition(weak[channel, slot], -BEST)[-BEST:]
             channel, slot = channel[best], slot[best]
         found = self._slots(channel, slot)
-        return _joined(found, self._peaks(gains, duals)) if self._strong.any() else found
+        return found.joined(self._peaks(gains, duals)) if self._strong.any() else found
 
     def _peaks(self, gains: Vector, duals: Vector) -> Columns:
         """Moments within slots at which a strong channel is worth most."""
@@ -262,7 +291,7 @@ class Program:
         channel, centre = channel[order], self.centres[slot[order]]
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
         times = centre[:, None] + within
-        fives = Columns(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
+        fives = _alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
         cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
         worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
         best = np.argmax(worth, axis=1)
@@ -273,7 +302,7 @@ class Program:
         aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
         t = times[every, inner] + aside * 0.25 * self.width
         good = worth[every, best] > PRICE
-        return Columns(channel[good], t[good], np.zeros(int(good.sum())))
+        return _alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
         """Neighbouring columns of a channel as one burn about their common centre."""
@@ -281,8 +310,8 @@ class Program:
         for index in np.unique(columns.channel):
             mine = np.flatnonzero(columns.channel == index)
             mine = mine[np.argsort(columns.t[mine], kind="stable")]
-            apart = np.flatnonzero(np.diff(columns.t[mine]) > 1.01 * self.width) + 1
-            for group in np.split(mine, apart):
+            apart = (np.diff(columns.t[mine]) > 1.01 * self.width) | (np.diff(columns.burn[mine]) != 0)
+            for group in np.split(mine, np.flatnonzero(apart) + 1):
                 total = float(on_times[group].sum())
                 burns.append(Burn(self.channels[index], float(on_times[group] @ columns.t[group]) / total, total))
         return tuple(sorted(burns, key=lambda burn: burn.t))
@@ -298,23 +327,25 @@ class Program:
 
         Strong channels fire within that divided by ``zoom``.
         """
-        kept = np.zeros_like(self.forbidden)
-        moments: list[tuple[int, float]] = []
+        owner = np.full(self.forbidden.shape, -1)
+        away = np.full(self.forbidden.shape, np.inf)
+        impulses = _alone(np.zeros(0, dtype=int), np.zeros(0), np.zeros(0))
         half = 0.5 * self.width
-        for burn in burns:
+        for number, burn in enumerate(burns):
             index = self.channels.index(burn.channel)
             reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
             if self._strong[index]:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
                 times = np.unique(np.clip(times, self.centres[0] - half, self.centres[-1] + half))
-                allowed = ~self.forbidden[index, self._slot(times)]
-                moments += [(index, float(time)) for time in times[allowed]]
+                times = times[~self.forbidden[index, self._slot(times)]]
+                same = np.full(len(times), index)
+                impulses = impulses.joined(Columns(same, times, np.zeros(len(times)), np.full(len(times), number)))
             else:
-                kept[index] |= np.abs(self.centres - burn.t) < reach
-        slots = self._slots(*np.nonzero(kept & ~self.forbidden))
-        t = np.array([time for _, time in moments], dtype=float)
-        impulses = Columns(np.array([index for index, _ in moments], dtype=int), t, np.zeros(len(t)))
-        return _joined(slots, impulses)
+                distance = np.abs(self.centres - burn.t)
+                nearer = (distance < reach) & (distance < away[index])
+                owner[index, nearer], away[index, nearer] = number, distance[nearer]
+        kept = np.nonzero((owner >= 0) & ~self.forbidden)
+        return self._slots(*kept)._replace(burn=owner[kept]).joined(impulses)
 
     def _slot(self, times: Vector) -> NDArray[np.int_]:
         """The slots in which ``times`` (n,) s lie."""
@@ -322,9 +353,6 @@ class Program:
         return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
 
 
-def _joined(one: Columns, other: Columns) -> Columns:
-    return Columns(
-        np.concatenate([one.channel, other.channel]),
-        np.concatenate([one.t, other.t]),
-        np.concatenate([one.width, other.width]),
-    )
+def _alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
+    """Columns that belong to no burn."""
+    return Columns(channel, t, width, np.full(len(t), -1))
