@@ -18,7 +18,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
-from nutdamp.schemes import CLASSIC, PLANNED, Options
+from nutdamp.schemes import PLANNED, Options
 
 
 @click.command("plan")
@@ -51,9 +51,9 @@ def command(
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
 
-    from nutdamp.planning import compare
+    from nutdamp.planning import compare, usual
 
-    compared = compare(body, names or CLASSIC, options)
+    compared = compare(body, names or usual(body), options)
     chosen = compared.recommended
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:

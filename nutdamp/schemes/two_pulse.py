@@ -1,5 +1,7 @@
 """Two pulses half an inertial nutation turn apart, Magnus 1970 (22): no nutation, and H back where it was.
 
+With a target axis the two pulses are those of `acquisition`, of which these are the case that H is to stay.
+
 With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
 torque directions d1, d2 the shift of H closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both
 pulses together then oppose ω at cost 1/cos(ψ/2), where ψ is the angle by which the second direction misses
@@ -17,7 +19,7 @@ import numpy as np
 from nutdamp.errors import Infeasible
 from nutdamp.physics import damping, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options, trim
+from nutdamp.schemes import Options, acquisition, trim
 from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
@@ -49,8 +51,11 @@ EXACT = 1e-11
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     """Two pulses, and a remark on what fixed channels cost or leave.
 
-    ``options.literal``: equal halves and the wait as printed, not trimmed. Raises Infeasible with the reason.
+    ``options.literal``: equal halves and the wait as printed, not trimmed, and the target left alone. Raises Infeasible
+    with the reason.
     """
+    if spacecraft.goal.axis is not None and not options.literal:
+        return acquisition.schedule(spacecraft)
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from nutdamp.spacecraft import Channel, Spacecraft
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 SLACK = 1e-9
 """Seconds by which rounding may overstep a limit; far below any command resolution."""
@@ -32,6 +35,14 @@ class Windows:
             and start + on_time <= self.horizon + SLACK
             and self.blocked_until(start, on_time) is None
         )
+
+    def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
+        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""
+        ends = starts + on_times
+        free = (starts >= np.maximum(ready, 0.0) - SLACK) & (ends <= self.horizon + SLACK)
+        for begins, over in self.limits.blackout:
+            free &= (starts >= over - SLACK) | (ends <= begins + SLACK)
+        return np.asarray(free)
 
     def earliest_start(self, on_time: float, ready: float) -> float | None:
         """First allowed start, s, on a tick; None where the horizon comes first."""
