@@ -38,11 +38,17 @@ ASIDE = np.linspace(-1.0, 1.0, 41)
 NARROWEST = 1e-7
 """Share of the first steps at which the search for the best choice ends; the cost is flat there to its square."""
 
+ROUNDING = 1e-14
+"""Relative gain that counts as one while the best choice is made exact."""
+
 EQUAL = 1e-9
 """Costs that differ by less, relatively, are equal: then the earlier end wins."""
 
 SMALLEST = 0.1
 """Least share of both jumps that each real pulse of the two gets."""
+
+APART = 0.5
+"""Least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a turn to five."""
 
 NOTHING = 1e-12
 """Jumps below this times C|ω3| are left out."""
@@ -165,8 +171,10 @@ class Steering:
         ready = times + 0.5 * long + self.spacecraft.limits.gap
         allowed = self.windows.allowed(times - 0.5 * long, long, self.spacecraft.limits.earliest)
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
-        if self.torquer.torque is not None:  # widths are trimmed on both pulses, so both must be there
+        if self.torquer.torque is not None:
+            # Widths are trimmed on both pulses: both must be there, and not do the same a whole turn apart.
             allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
+            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
@@ -228,7 +236,7 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
         around = point + narrowed * rose
         costs = cost(around)
         index = int(np.argmin(costs))
-        if costs[index] < best:
+        if costs[index] < best * (1.0 - ROUNDING):
             best, point = float(costs[index]), around[index]
         else:
             narrowed *= 0.5
