@@ -19,6 +19,7 @@ from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import trim
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.steering import Steering
 from nutdamp.schemes.windows import Windows, usable
@@ -54,9 +55,6 @@ ON_CONE = 1e-3
 BESIDE = 0.05
 """How far beside the target, as a share of the angles at hand, a search goes that would find nothing on it."""
 
-LEFT_OVER = 0.05
-"""Share of the turn, or of the nutation, above which what a pair leaves makes it no acquisition."""
-
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     """The two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
@@ -82,8 +80,7 @@ def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:
     """The schedule, if it keeps the limits and comes near the target."""
     if not trim.keeps_limits(spacecraft, made.pulses):
         raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
-    asked = spacecraft.nutation + spacecraft.to_turn
-    if spacecraft.limits.tick is None and not _left(spacecraft, made) < LEFT_OVER * asked:
+    if not _left(spacecraft, made) <= tolerable(spacecraft):
         raise Infeasible(_too_wide(spacecraft, made.pulses))
     return made
 

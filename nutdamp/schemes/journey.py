@@ -7,13 +7,17 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from nutdamp import flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import trim
-from nutdamp.spacecraft import Attitude, Spacecraft, Vector
+from nutdamp.spacecraft import Attitude, Spacecraft
+
+LEFT_OVER = 0.05
+"""Share of nutation and turn together above which what is left makes a schedule no way to the target."""
+
+LEFT_OVER_BY_TICKS = 0.5
+"""The same where the resolution of commands may be to blame."""
 
 
 class Journey:
@@ -38,11 +42,6 @@ class Journey:
         """How many pulses the limits still allow."""
         most = self.here.limits.max_pulses
         return math.inf if most is None else most
-
-    @property
-    def spin_axis(self) -> Vector:
-        """S in the inertial frame, (3,)."""
-        return spin_axis(self.here)
 
     @property
     def left(self) -> float:
@@ -80,9 +79,10 @@ class Journey:
         return Schedule(tuple(self.pulses), notes)
 
 
-def spin_axis(spacecraft: Spacecraft) -> Vector:
-    """S = σ e3 at t = 0 in the inertial frame, (3,)."""
-    return attitude.rotate(spacecraft.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, spacecraft.spin)]))
+def tolerable(spacecraft: Spacecraft) -> float:
+    """What a schedule may leave, rad, and still count as having reached the target: more where commands have ticks."""
+    share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
+    return share * (spacecraft.nutation + spacecraft.to_turn)
 
 
 def _after(spacecraft: Spacecraft, pulse: Pulse) -> Spacecraft:

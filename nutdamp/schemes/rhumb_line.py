@@ -22,7 +22,7 @@ from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, approach
 from nutdamp.schemes.advice import no_channels, no_target
-from nutdamp.schemes.journey import Journey
+from nutdamp.schemes.journey import Journey, tolerable
 from nutdamp.schemes.windows import Windows, usable
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -81,8 +81,8 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
             best = left, made
         if left < EXACT:
             break
-    if best is None:
-        raise Infeasible(train.reason())
+    if best is None or best[0] > tolerable(train.here):
+        raise Infeasible(train.reason(best))
     return best[1]
 
 
@@ -314,9 +314,10 @@ class _Train:
         by = f" of {names}" if names else ""
         return f"{count} pulses{by} along the {line} of {math.degrees(self.way):.4g}°, arc efficiency {efficiency:.4f}"
 
-    def reason(self) -> str:
-        """Why no train was found."""
-        return "no train of pulses was found that ends on the target within the limits"
+    def reason(self, best: tuple[float, Schedule] | None) -> str:
+        """Why the ``best`` train found, with what it leaves (rad), is none."""
+        text = "no train of pulses was found that ends on the target within the limits"
+        return text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°"
 
     def _too_few(self, needed: int, moments: int) -> str:
         most = self.here.limits.max_pulses
@@ -334,12 +335,16 @@ class _Train:
         inertia, per_turn = self.here.inertia, self.options.per_turn
         ratio = inertia.C / (inertia.A * per_turn)
         off = abs(ratio - round(ratio))
-        each = self.way / most
-        bound = f"at most {math.degrees(each / math.sin(math.pi * off)):.3g}°" if off > 1e-9 else "all of the turn"
+        least = math.degrees(left * self.way / most)
+        if off * most >= 1.0:
+            return (
+                f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
+                f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+            )
         return (
-            f"C/(A × pulses per turn) = {ratio:.4g} is near a whole number: pulse after pulse meets the nutation in "
-            f"nearly the same phase, and of {fewest} to {most} pulses the best train would leave {left:.3g} pulses' "
-            f"worth of nutation ({bound}); another --per-turn, a longer horizon, half-cone or two-pulse can help"
+            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
+            f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
+            f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
         )
 
 
