@@ -112,6 +112,12 @@ def arc_efficiency(spin: float, on_time: float) -> float:
     return math.sin(half) / half if half != 0.0 else 1.0
 
 
+def reach(torque: float, spin: float, longest: float) -> float:
+    """Most by which one pulse of up to ``longest`` s turns H, N m s: 2M/|ω3| in half a spin turn."""
+    half = 0.5 * abs(spin)
+    return torque / half * math.sin(min(half * longest, 0.5 * math.pi))
+
+
 def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
     """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M).
 

@@ -67,6 +67,8 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         made = Schedule(Steering(spacecraft, torquer).two(straight))
+        if spacecraft.limits.tick is not None and not trim.keeps_limits(spacecraft, made.pulses):
+            raise Infeasible(_off_limits())
         if torquer.torque is not None or not model_of(spacecraft).exact:
             made = trim.refine(spacecraft, made, chosen=range(len(made)), momentum=True)
         return _checked(spacecraft, made)
@@ -79,10 +81,14 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:
     """The schedule, if it keeps the limits and comes near the target."""
     if not trim.keeps_limits(spacecraft, made.pulses):
-        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
+        raise Infeasible(_off_limits())
     if not _left(spacecraft, made) <= tolerable(spacecraft):
         raise Infeasible(_too_wide(spacecraft, made.pulses))
     return made
+
+
+def _off_limits() -> str:
+    return "with commands on the ticks of limits.tick the two pulses touch another limit"
 
 
 def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
@@ -126,6 +132,8 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
                 for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
             )
         )
+        if spacecraft.limits.tick is not None and not trim.keeps_limits(spacecraft, made.pulses):
+            continue
         made = trim.refine(spacecraft, made, chosen=(0, 1), momentum=True)
         left = _left(spacecraft, made)
         if trim.keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
@@ -139,6 +147,12 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     one, two = (pulse.channel for pulse in made)
     note = f"{one} then {two} after {made.pulses[1].t - made.pulses[0].t:.4g} s"
     return Schedule(made.pulses, (f"{note}; {made.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
+
+
+def _price(channel: Channel, known: bool) -> float:
+    """Propellant of ``channel`` per second, or where it is not ``known`` of all of them impulse."""
+    flow = channel.mass_flow
+    return flow if known and flow is not None else float(np.linalg.norm(channel.torque))
 
 
 Indices = NDArray[np.intp]
@@ -246,13 +260,11 @@ class _Search:
         ready = first + 0.5 * long + self.spacecraft.limits.gap
         allowed = self.windows.allowed(first - 0.5 * long, long, self.spacecraft.limits.earliest)
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
-        rates = [channel.mass_flow for channel in (one, two)]
-        if any(rate is None for channel in self.channels for rate in (channel.mass_flow,)):
-            rates = [float(np.linalg.norm(channel.torque)) for channel in (one, two)]
+        prices = [_price(channel, all(one.mass_flow is not None for one in self.channels)) for channel in (one, two)]
         made = []
         for row in np.flatnonzero(allowed):
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
-            cost = sum(rate * on_time for rate, (_, on_time) in zip(rates, timing, strict=True) if rate is not None)
+            cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
             made.append(Candidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
         return sorted(made, key=lambda candidate: candidate.cost)[:SHORTLIST]
 
@@ -265,12 +277,9 @@ class _Search:
     def reason(self) -> str:
         """Why there is no candidate."""
         names = ", ".join(channel.name for channel in self.channels)
-        spin = abs(self.spacecraft.spin)
-        reach = {
-            one.name: 2.0 * abs(one.transverse) / spin * math.sin(min(0.5 * spin * one.max_on_time, 0.5 * math.pi))
-            for one in self.channels
-        }
-        strongest = max(reach.values())
+        strongest = max(
+            pointing.reach(abs(one.transverse), self.spacecraft.spin, one.max_on_time) for one in self.channels
+        )
         if 2.0 * strongest < self.floor:
             return (
                 f"one pulse turns H by {strongest:.4g} N m s at most, and two are to do at least "

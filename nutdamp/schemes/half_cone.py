@@ -108,10 +108,7 @@ def _reach(spacecraft: Spacecraft) -> float:
     torquer, spin = spacecraft.torquer, abs(spacecraft.spin)
     if torquer is not None:
         return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
-    return max(
-        2.0 * abs(one.transverse) / spin * math.sin(min(0.5 * spin * one.max_on_time, 0.5 * math.pi))
-        for one in usable(spacecraft)
-    )
+    return max((pointing.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0)
 
 
 def _fewest(spacecraft: Spacecraft) -> int:

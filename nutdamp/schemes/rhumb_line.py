@@ -69,11 +69,21 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
         raise Infeasible(no_target())
     if spacecraft.torquer is None and not usable(spacecraft):
         raise Infeasible(no_channels(spacecraft))
-    journey = Journey(spacecraft)
+    journey, reason = Journey(spacecraft), Infeasible("")
     train = _Train(journey.here, options)
-    if spacecraft.least_impulse > 0.5 * train.strongest:
-        journey.fire(approach.damping(journey.here))
-        train = _Train(journey.here, options)
+    if spacecraft.least_impulse <= 0.5 * train.strongest:
+        try:
+            return _best(journey, train)
+        except Infeasible as why:
+            reason = why
+    if spacecraft.least_impulse <= 1e-9 * train.h:
+        raise reason
+    journey.fire(approach.damping(journey.here))
+    return _best(journey, _Train(journey.here, options))
+
+
+def _best(journey: Journey, train: _Train) -> Schedule:
+    """The train from where the ``journey`` is that leaves least; raises Infeasible where that is too much."""
     best: tuple[float, Schedule] | None = None
     for count in train.counts():
         made, left = _flown(journey.fork(), train, count)
@@ -374,7 +384,9 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
         strength = abs(channel.transverse)
         return (float(np.linalg.norm(channel.torque)) if flow is None else flow) / strength, -strength
 
-    chosen = [min(channels, key=price)] if channels else []
+    if not channels:
+        raise Infeasible("once the nutation is taken out no time is left for the turn")
+    chosen = [min(channels, key=price)]
     while len(chosen) < count:
 
         def apart(channel: Channel) -> float:

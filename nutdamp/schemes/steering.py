@@ -29,8 +29,14 @@ TURNS = 4
 MOST_WINDOWS = 40
 """Blackout windows after which a turn is looked at."""
 
-FURTHER = 200
+FURTHER = 60
 """Further whole turns that the second pulse may wait for, at most."""
+
+FURTHER_BESIDE = 12
+"""The same for the search beside the best places."""
+
+MOST_BESIDE = 1000
+"""Moments looked at in that search, at most."""
 
 ASIDE = np.linspace(-1.0, 1.0, 41)
 """Places of H beside the best one, as shares of both jumps, for the case that the limits forbid that one."""
@@ -142,10 +148,11 @@ class Steering:
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
         if not np.isfinite(least):
             raise Infeasible(self.no_room(1))
-        found = self._best(times, plain, straight)
+        found = self._best(times, plain, straight, FURTHER)
         if (found is None or found.cost > least * (1.0 + 1e-6)) and not straight:
-            beside = np.repeat(times, len(ASIDE)), (ASIDE * free.cost[:, None]).ravel()
-            other = self._best(*beside, straight)
+            some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
+            beside = np.repeat(times[some], len(ASIDE)), (ASIDE * free.cost[some, None]).ravel()
+            other = self._best(*beside, straight, FURTHER_BESIDE)
             if other is not None and (found is None or other.cost < found.cost * (1.0 - EQUAL)):
                 found = other
         if found is None:
@@ -178,10 +185,10 @@ class Steering:
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
-    def _best(self, times: Vector, aside: Vector, straight: bool) -> _Found | None:
-        """The cheapest choice, of equal ones that which ends first."""
+    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Found | None:
+        """The cheapest choice with up to ``most`` further turns, of equal ones that which ends first."""
         best: _Found | None = None
-        for further in range(FURTHER):
+        for further in range(most):
             costs, second, jumps = self._costs(times, aside, further, straight)
             least = float(costs.min())
             if np.isfinite(least) and (best is None or least < best.cost * (1.0 - EQUAL)):
