@@ -147,7 +147,7 @@ def _no_time(spacecraft: Spacecraft) -> str:
 
 def _row(journey: Journey, cones: int) -> Schedule:
     """That many half cones, each planned from the motion that the one before leaves."""
-    spacecraft = journey.here
+    spacecraft, damped = journey.here, len(journey.pulses)
     if journey.allowed < cones + 1:
         raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {journey.allowed}")
     for remaining in range(cones, 1, -1):
@@ -157,7 +157,9 @@ def _row(journey: Journey, cones: int) -> Schedule:
     ideal = pointing.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
     made = journey.schedule()
     note = f"{cones} half cone{'s' if cones > 1 else ''}"
-    if len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
+    if damped:
+        note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
+    elif len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
         note += f"; {made.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
     return journey.schedule(note)
 

@@ -317,12 +317,16 @@ class _Train:
 
     def note(self, journey: Journey, count: int) -> str:
         """What the train is, in words."""
-        start = journey.pulses[-1]
-        efficiency = pointing.arc_efficiency(self.here.spin, start.on_time)
+        efficiency = pointing.arc_efficiency(self.here.spin, journey.pulses[-1].on_time)
         line = "great circle" if self.sun is None else "rhumb line at a fixed Sun phase"
         names = ", ".join(channel.name for channel in self.channels)
-        by = f" of {names}" if names else ""
-        return f"{count} pulses{by} along the {line} of {math.degrees(self.way):.4g}°, arc efficiency {efficiency:.4f}"
+        damped = len(journey.pulses) - count
+        return (
+            (f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then " if damped > 0 else "")
+            + f"{count} pulses"
+            + (f" of {names}" if names else "")
+            + f" along the {line} of {math.degrees(self.way):.4g}°, arc efficiency {efficiency:.4f}"
+        )
 
     def reason(self, best: tuple[float, Schedule] | None) -> str:
         """Why the ``best`` train found, with what it leaves (rad), is none."""

@@ -21,6 +21,7 @@ from nutdamp.physics import damping, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, acquisition, trim
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
 from nutdamp.schemes.windows import Windows, usable
@@ -55,7 +56,33 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     with the reason.
     """
     if spacecraft.goal.axis is not None and not options.literal:
-        return acquisition.schedule(spacecraft)
+        try:
+            return acquisition.schedule(spacecraft)
+        except Infeasible:
+            made = _wide(spacecraft)
+            if made is None:
+                raise
+            return made
+    return _damping(spacecraft, options)
+
+
+def _wide(spacecraft: Spacecraft) -> Schedule | None:
+    """The pulses that damp without drift, trimmed to a target nearby; None where they do not come there.
+
+    A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
+    that are all there is, this finds what an acquisition, which plans for the turn, does not.
+    """
+    if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
+        return None
+    try:
+        made = _damping(spacecraft, Options())
+    except Infeasible:
+        return None
+    return made if float(np.linalg.norm(trim.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+
+
+def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """The two pulses that leave H where it was, as far as trimming goes for a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")

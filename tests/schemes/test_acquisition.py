@@ -188,6 +188,15 @@ def test_a_sphere_is_acquired_by_fixed_channels_too() -> None:
     assert max(left.nutation, left.axis_error) < 1e-10
 
 
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_wide_pulses_of_weak_channels_damp_to_a_target_nearby(tilt: float) -> None:
+    """8 N m take 5° of nutation out within half a body period; they turn H by next to nothing meanwhile."""
+    spacecraft = aimed(spinner(degrees=5.0, channels=cross(8.0)), tilt, 45.0)
+    made = acquired(spacecraft).pulses
+    assert Outcome(spacecraft, made).nutation < 1e-9
+    assert off_target(spacecraft, made) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("channels", "words"),
     [
