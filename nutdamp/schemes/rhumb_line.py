@@ -281,13 +281,12 @@ class _Train:
             wanted = float(pointing.on_times_to_turn(np.array([share]), self.torque, here.spin)[0])
             widest = max(self.on_time, min(self.longest, WIDEST * self.turn))
             on_time = windows.on_time(wanted if math.isfinite(wanted) else widest, self.shortest, widest)
-        since = 0.5 * self.turn / self.options.per_turn  # no two in the same passage of the phase
-        ready = limits.earliest
-        if self.channels:
-            ready = max(ready, since - on_time if here.attitude is not None and self.fired(here) else ready)
-            return self._passing(here, windows, ahead, on_time, ready)
-        if self.fired(here):
-            ready = max(ready, self.turn / self.options.per_turn - on_time)
+        ready, turn = limits.earliest, self.turn / self.options.per_turn
+        begun = here is not self.here
+        if self.channels:  # no two in the same passage of the phase
+            return self._passing(here, windows, ahead, on_time, max(ready, 0.5 * turn - on_time) if begun else ready)
+        if begun:
+            ready = max(ready, turn - on_time)
         start = windows.earliest_start(on_time, ready)
         if start is None:
             return None
@@ -296,10 +295,6 @@ class _Train:
         assert here.torquer is not None
         asked = {"impulse": share} if here.torquer.torque is None else {"on_time": on_time}
         return steerable_pulse(here.torquer, centre, cmath.phase(body), **asked)
-
-    def fired(self, here: Spacecraft) -> bool:
-        """Whether the train has begun before ``here``."""
-        return here is not self.here
 
     def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
         """The first firing of a channel as it passes the phase that the limits allow."""

@@ -13,7 +13,7 @@ from test_limits import HARD, PATIENCE, random_spacecraft
 
 from nutdamp import planning
 from nutdamp.schemes import Options
-from nutdamp.spacecraft import Limits, Spacecraft, Steerable
+from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Steerable
 
 SCHEMES = ["two-pulse", "half-cone", "rhumb-line"]
 
@@ -78,3 +78,19 @@ def test_most_unlimited_cases_end_on_the_target(scheme: str, spin: float) -> Non
         assert plan.feasible, plan.why
         assert plan.flown is not None
         assert max(plan.flown.nutation, plan.flown.axis_error) < math.radians(1e-7)
+
+
+TRUE_BODIES = {
+    "I1 ≠ I2": spinner(moments=(120.0, 100.0, 80.0), degrees=4.0),
+    "axial disturbance": replace(spinner(degrees=4.0), disturbances=(Disturbance(0.0j, 0.05),)),
+    "dissipation": replace(spinner(degrees=4.0), dissipation=300.0),
+}
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("true_body", TRUE_BODIES.values(), ids=TRUE_BODIES)
+def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
+    for body in (replace(true_body, channels=cross(60.0)), replace(true_body, steerable=Steerable(60.0))):
+        plan = planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True))
+        assert plan.flown is not None, plan.why
+        assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
