@@ -391,10 +391,12 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Options | None = None) ->
     return Plan(planning.plan(spacecraft.core, scheme, options))
 
 
-def compare(
-    spacecraft: Spacecraft, names: Sequence[str] = schemes.CLASSIC, options: Options | None = None
-) -> Comparison:
-    """Plan the schemes named (default: the classic three) and recommend one; raises as `plan` does."""
+def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Options | None = None) -> Comparison:
+    """Plan the schemes named and recommend one; raises as `plan` does.
+
+    Default: the classic three, or those that point where the file has a target axis.
+    """
+    names = names or planning.usual(spacecraft.core)
     for scheme in names:
         _known(scheme)
     _sensible(options)

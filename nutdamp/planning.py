@@ -273,6 +273,11 @@ class Comparison:
     reason: str
 
 
+def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
+    """The schemes to compare where none is named: the classic ones, with a target those that can point."""
+    return schemes.CLASSIC if spacecraft.goal.axis is None else schemes.POINTING
+
+
 def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Options | None = None) -> Comparison:
     """Plan the schemes named and recommend one."""
     plans = tuple(plan(spacecraft, name, options) for name in names)

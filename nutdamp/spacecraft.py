@@ -194,11 +194,13 @@ class Goal:
     """Where the motion is to end, besides without nutation.
 
     ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
-    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes.
+    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
+    the inertial direction by which a train of pulses keeps its phase; None is along the great circle to ``axis``.
     """
 
     axis: Vector | None = None
     spin: float | None = None
+    sun: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True)

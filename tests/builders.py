@@ -6,6 +6,7 @@ import math
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
 
 import numpy as np
@@ -38,6 +39,18 @@ def spinner(
     return Spacecraft(
         "test", Inertia(moments), rates, mass, attitude, channels, steerable, requirement, limits or Limits()
     )
+
+
+def aimed(spacecraft: Spacecraft, tilt: float, azimuth: float) -> Spacecraft:
+    """With a target axis ``tilt`` degrees from H at t = 0 and ``azimuth`` degrees about it."""
+    axis = spacecraft.direction_in_n(math.radians(tilt), math.radians(azimuth))
+    return replace(spacecraft, goal=replace(spacecraft.goal, axis=axis))
+
+
+def off_target(spacecraft: Spacecraft, made: Schedule) -> float:
+    """Angle of H from the target by the reference integrator, rad; for bodies without an attitude in the file."""
+    outcome = Outcome(spacecraft, made)
+    return reference.angle(reference.momentum(spacecraft.inertia.moments, outcome.motion), spacecraft.target_axis)
 
 
 def channel(

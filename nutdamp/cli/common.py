@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
-from nutdamp.schemes import CLASSIC, LEAST, Options
+from nutdamp.schemes import LEAST, Options
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
     from nutdamp.planning import Plan
-    from nutdamp.spacecraft import Spacecraft
+    from nutdamp.spacecraft import Spacecraft, Vector
 
 DEFAULT_FILE = "spacecraft.yaml"
 
@@ -63,28 +63,23 @@ class Quantity(click.ParamType["float"]):
 class Aim(NamedTuple):
     """A goal as the command line gives it, in place of the one in the file.
 
-    ``target``: two angles in rad, right ascension and declination where the file has an attitude, else tilt and
-    azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
+    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
     """
 
     target: tuple[float, float] | None = None
     spin: float | str | None = None
+    sun: tuple[float, float] | None = None
 
     def applied(self, spacecraft: Spacecraft) -> Spacecraft:
         """The spacecraft with this goal; a usage error where it cannot be one."""
         from dataclasses import replace
 
-        from nutdamp.spacecraft import on_sphere
-
-        goal, target = spacecraft.goal, self.target
-        if target is not None and spacecraft.attitude is not None:
-            if abs(target[1]) > 0.5 * math.pi:
-                raise click.BadParameter("a declination of -90 deg to 90 deg is wanted", param_hint="--target")
-            goal = replace(goal, axis=on_sphere(*target))
-        elif target is not None:
-            if not 0.0 <= target[0] < math.pi:
-                raise click.BadParameter("a tilt of at least 0 and below 180 deg is wanted", param_hint="--target")
-            goal = replace(goal, axis=spacecraft.direction_in_n(*target))
+        goal = spacecraft.goal
+        if self.target is not None:
+            goal = replace(goal, axis=_direction(spacecraft, self.target, "--target"))
+        if self.sun is not None:
+            goal = replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
         if self.spin is not None:
             spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
             if spin * spacecraft.spin <= 0.0:
@@ -93,6 +88,19 @@ class Aim(NamedTuple):
                 )
             goal = replace(goal, spin=spin)
         return replace(spacecraft, goal=goal)
+
+
+def _direction(spacecraft: Spacecraft, angles: tuple[float, float], option: str) -> Vector:
+    """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
+    from nutdamp.spacecraft import on_sphere
+
+    if spacecraft.attitude is not None:
+        if abs(angles[1]) > 0.5 * math.pi:
+            raise click.BadParameter("a declination of -90 deg to 90 deg is wanted", param_hint=option)
+        return on_sphere(*angles)
+    if not 0.0 <= angles[0] < math.pi:
+        raise click.BadParameter("a tilt of at least 0 and below 180 deg is wanted", param_hint=option)
+    return spacecraft.direction_in_n(*angles)
 
 
 class Direction(click.ParamType["tuple[float, float]"]):
@@ -127,7 +135,7 @@ def scheme_options(command: Command) -> Command:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
         if chosen.on_time is not None and chosen.on_time <= 0.0:
             raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
-        aim = Aim(parameters.pop("target"), parameters.pop("spin"))
+        aim = Aim(*(parameters.pop(name) for name in Aim._fields))
         return command(*args, options=chosen, aim=aim, **parameters)
 
     wrapped: Any = gathered
@@ -145,6 +153,25 @@ def scheme_options(command: Command) -> Command:
             help="Where the spin axis is to end: right ascension and declination where the file has an attitude, else "
             "tilt from H and azimuth about it, such as 10deg,45deg.",
         ),
+        click.option(
+            "--sun",
+            type=Direction(),
+            metavar="ANGLE,ANGLE",
+            help="rhumb-line: the Sun, given as --target is, to which the pulses keep their phase; default: the "
+            "phase of the great circle to the target.",
+        ),
+        click.option(
+            "--per-turn",
+            type=click.IntRange(1),
+            default=1,
+            show_default=True,
+            help="rhumb-line: pulses in each spin turn.",
+        ),
+        click.option(
+            "--cones",
+            type=click.IntRange(1),
+            help="half-cone: how many half cones; default: the fewest of which one more would save less than 1 %.",
+        ),
         click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
         click.option(
             "--shift",
@@ -161,7 +188,9 @@ def scheme_options(command: Command) -> Command:
         ),
         click.option("--literal", is_flag=True, help="two-pulse as printed by Magnus: equal halves, small-angle wait."),
         click.option("--coarse", is_flag=True, help="four-pulse with full pulses only, no shorter one at the end."),
-        click.option("--on-time", type=Quantity("time"), help="Pulse length of four-pulse, such as 200ms."),
+        click.option(
+            "--on-time", type=Quantity("time"), help="Pulse length of four-pulse and rhumb-line, such as 200ms."
+        ),
     ):
         wrapped = option(wrapped)
     return cast(Command, wrapped)
@@ -230,7 +259,11 @@ def plan_or_read(
         for warning in (*warnings, *planning.broken_limits(body, pulses)):
             remark(f"warning: {warning}")
         return planning.Plan(body, schedule, pulses)
-    plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
+    plan = (
+        planning.plan(body, scheme, options)
+        if scheme
+        else planning.compare(body, planning.usual(body), options).recommended
+    )
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     if plan.why is not None:

@@ -22,7 +22,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
-from nutdamp.schemes import CLASSIC, PLANNED, Options
+from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
     from nutdamp.planning import Comparison
@@ -70,9 +70,9 @@ def command(
     if robust:
         require_dispersions(body)
 
-    from nutdamp.planning import compare
+    from nutdamp.planning import compare, usual
 
-    compared = compare(body, names or CLASSIC, options)
+    compared = compare(body, names or usual(body), options)
     dispersed = _disperse(compared, options, quiet) if robust else None
     if dispersed is None:
         chosen = compared.recommended

@@ -21,7 +21,7 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.disperse import Count, fly
 from nutdamp.cli.progress import working
-from nutdamp.schemes import CLASSIC, PLANNED, Options
+from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
@@ -63,7 +63,7 @@ def command(
     text, name = source(spacecraft, remark)
 
     from nutdamp.files.spacecraft_file import read_spacecraft
-    from nutdamp.planning import compare
+    from nutdamp.planning import compare, usual
     from nutdamp.report.page.content import Repeat, report_page
 
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
@@ -71,7 +71,7 @@ def command(
     if disperse is not None:
         require_dispersions(body)
     with working("planning", quiet=quiet):
-        compared = compare(body, tuple(dict.fromkeys(names)) or CLASSIC, options)
+        compared = compare(body, tuple(dict.fromkeys(names)) or usual(body), options)
     chosen = compared.recommended
     dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
     with working("writing the page", quiet=quiet):

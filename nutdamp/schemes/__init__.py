@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -13,7 +14,10 @@ if TYPE_CHECKING:  # so that the command line can know the names without loading
 CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 """The schemes of Magnus 1970, planned when none is named."""
 
-PLANNED = (*CLASSIC, "optimal")
+POINTING = ("two-pulse", "half-cone", "rhumb-line", "optimal")
+"""The schemes that can turn the spin axis to a target axis, planned when there is one and none is named."""
+
+PLANNED = (*CLASSIC, "optimal", "half-cone", "rhumb-line")
 """The schemes that plan pulses."""
 
 NAMES = (*PLANNED, "none")
@@ -26,11 +30,13 @@ LEAST = ("propellant", "impulse", "time", "pulses")
 class Options(NamedTuple):
     """What a user may ask of the schemes; each reads what concerns it.
 
-    ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)). ``coarse``: four-pulse without a
+    ``on_time`` s, pulse length of four-pulse (None: min(max_on_time, T_ω/8)) and of rhumb-line (None: an eighth of a
+    spin turn). ``coarse``: four-pulse without a
     last, shorter pulse. ``literal``: two-pulse as printed in Magnus 1970. ``with_disturbances``: plan on the motion
     with the disturbances of the file, which is otherwise only judged with them. ``least``: what optimal saves,
     propellant (impulse where that is unknown), impulse, time or pulses; ``free_axis``: optimal lets H go where it
-    likes, ``shift`` up to so many rad from its target.
+    likes, ``shift`` up to so many rad from its target. ``cones``: half cones of half-cone (None: the fewest that are
+    nearly cheapest). ``per_turn``: pulses of rhumb-line in each spin turn.
     """
 
     on_time: float | None = None
@@ -40,14 +46,16 @@ class Options(NamedTuple):
     least: str = "propellant"
     free_axis: bool = False
     shift: float | None = None
+    cones: int | None = None
+    per_turn: int = 1
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     """Pulses of the scheme ``name``, disturbances and all.
 
     The scheme plans on the symmetric, undisturbed `model` of the spacecraft; where that is not exact, the last pulse
-    (both of two-pulse) is trimmed on the true motion. Raises Infeasible with the reason where the scheme cannot work
-    within the limits, and KeyError for a name not in `NAMES`.
+    (the last four of schemes that keep or turn H) is trimmed on the true motion. Raises Infeasible with the reason
+    where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
     """
     if name not in NAMES:
         raise KeyError(name)
@@ -79,8 +87,11 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
     from nutdamp.schemes import trim
 
     made = model.translate(made)
+    if model.truth.goal.axis is not None and name not in POINTING and made.pulses:
+        made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
     if model.exact or options.coarse or options.literal or not made.pulses:
         return made
-    keeps = name == "two-pulse" or (name == "optimal" and not options.free_axis)
-    chosen = tuple(range(min(len(made), 4))) if keeps else (-1,)
+    keeps = name in POINTING and not (name == "optimal" and options.free_axis)
+    # The last pulses, which know what the others did on the model, undo what the true motion made of them.
+    chosen = tuple(range(-min(len(made), 4), 0)) if keeps else (-1,)
     return trim.refine(model.truth, made, chosen=chosen, momentum=keeps)

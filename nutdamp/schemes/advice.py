@@ -21,6 +21,11 @@ def no_channels(spacecraft: Spacecraft) -> str:
     return "the file names no thrusters, and this scheme fires body-fixed ones"
 
 
+def no_target() -> str:
+    """The scheme only turns the spin axis to a target, and there is none."""
+    return "needs a target axis: --target, or goal in the file"
+
+
 def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
     """No channel can be fired against ω within the limits; names the cure."""
     omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])

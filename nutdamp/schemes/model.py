@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nutdamp.physics import forced
+from nutdamp.physics import attitude, forced
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.windows import Windows
-from nutdamp.spacecraft import Channel, Disturbance, Inertia, Spacecraft, Steerable, Thruster, Vector
+from nutdamp.spacecraft import Attitude, Channel, Disturbance, Inertia, Spacecraft, Steerable, Thruster, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def model_of(spacecraft: Spacecraft) -> Model:
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
     if inertia.symmetric:
-        return Model(spacecraft, undisturbed, np.ones(2))
+        return Model(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
     from nutdamp.physics import triaxial  # a body of three moments needs it, and few plans are of one
 
     first, second, C = inertia.moments
@@ -82,7 +82,25 @@ def model_of(spacecraft: Spacecraft) -> Model:
         steerable=_stretched_torquer(undisturbed.steerable, stretch),
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
-    return Model(spacecraft, body, stretch)
+    return Model(spacecraft, _aimed(body, spacecraft), stretch)
+
+
+def _aimed(body: Spacecraft, truth: Spacecraft) -> Spacecraft:
+    """The ``body`` with the attitude of the ``truth``, and the target axis as far from its H as the true one is.
+
+    Both have other rates, and so another H; what a plan has to do is the turn from H to the target.
+    """
+    if truth.goal.axis is None or body is truth:
+        return body
+    quaternion = truth.initial.quaternion
+    given = truth.attitude or Attitude(quaternion)
+    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(truth.inertia.axes.T))
+    held = replace(body, attitude=replace(given, quaternion=in_file_axes))
+    before, after = (one / float(np.linalg.norm(one)) for one in (truth.momentum, held.momentum))
+    # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
+    middle = (before + after) / float(np.linalg.norm(before + after))
+    axis = truth.goal.axis - 2.0 * (middle @ truth.goal.axis) * middle
+    return replace(held, goal=replace(truth.goal, axis=axis - 2.0 * (after @ axis) * after))
 
 
 def _stretched(channel: Channel, stretch: Vector) -> Channel:

@@ -32,36 +32,33 @@ PROGRESS = 0.01
 
 
 def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
-    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; shift of H in two.
+    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
 
-    All four are zero exactly when no nutation is left and H is back where it was. Under disturbances the tilt counts
-    from the steady response to them, about which nothing is to be damped.
+    All four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
+    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
     flight_ = flight.flown(spacecraft, schedule)
     moments = np.asarray(flight_.moments)
-    start = spacecraft.initial
-    before = attitude.rotate(start.quaternion, start.rates * moments)
     body = flight_.settled.rates * moments
     after = attitude.rotate(flight_.settled.quaternion, body)
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= moments[:2] * (steady.real, steady.imag)
-    return np.concatenate([body[:2], _across(before, after)]) / float(np.linalg.norm(body))
+    return np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
 
 
 def _across(axis: Vector, vector: Vector) -> Vector:
-    """The two components of ``vector`` square to ``axis``."""
-    unit = axis / float(np.linalg.norm(axis))
-    other = np.eye(3)[int(np.argmin(np.abs(unit)))]
-    first = np.cross(unit, other)
+    """The two components of ``vector`` square to the unit vector ``axis``."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, other)
     first /= float(np.linalg.norm(first))
-    return np.array([first @ vector, np.cross(unit, first) @ vector])
+    return np.array([first @ vector, np.cross(axis, first) @ vector])
 
 
 def refine(spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], momentum: bool) -> Schedule:
     """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
-    brought back, not only the nutation taken out.
+    brought to the target axis (without one, back), not only the nutation taken out.
     """
     chosen = [index % len(made) for index in chosen]
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)

@@ -1,5 +1,7 @@
 """Two pulses half an inertial nutation turn apart, Magnus 1970 (22): no nutation, and H back where it was.
 
+With a target axis the two pulses are those of `acquisition`, of which these are the case that H is to stay.
+
 With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
 torque directions d1, d2 the shift of H closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both
 pulses together then oppose ω at cost 1/cos(ψ/2), where ψ is the angle by which the second direction misses
@@ -18,8 +20,9 @@ import numpy as np
 from nutdamp.errors import Infeasible
 from nutdamp.physics import damping, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options, trim
+from nutdamp.schemes import Options, acquisition, trim
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
 from nutdamp.schemes.windows import Windows, usable
@@ -50,8 +53,37 @@ EXACT = 1e-11
 def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     """Two pulses, and a remark on what fixed channels cost or leave.
 
-    ``options.literal``: equal halves and the wait as printed, not trimmed. Raises Infeasible with the reason.
+    ``options.literal``: equal halves and the wait as printed, not trimmed, and the target left alone. Raises Infeasible
+    with the reason.
     """
+    if spacecraft.goal.axis is not None and not options.literal:
+        try:
+            return acquisition.schedule(spacecraft)
+        except Infeasible:
+            made = _wide(spacecraft)
+            if made is None:
+                raise
+            return made
+    return _damping(spacecraft, options)
+
+
+def _wide(spacecraft: Spacecraft) -> Schedule | None:
+    """The pulses that damp without drift, trimmed to a target nearby; None where they do not come there.
+
+    A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
+    that are all there is, this finds what an acquisition, which plans for the turn, does not.
+    """
+    if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
+        return None
+    try:
+        made = _damping(spacecraft, Options())
+    except Infeasible:
+        return None
+    return made if float(np.linalg.norm(trim.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+
+
+def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """The two pulses that leave H where it was, as far as trimming goes for a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")

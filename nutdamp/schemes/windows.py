@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from nutdamp.spacecraft import Channel, Spacecraft
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 SLACK = 1e-9
 """Seconds by which rounding may overstep a limit; far below any command resolution."""
@@ -17,6 +20,7 @@ class Windows:
         """``endless`` drops the horizon, to tell what a longer one would allow."""
         self.limits = spacecraft.limits
         self.horizon = math.inf if endless else spacecraft.horizon
+        self._dark: tuple[Vector, Vector] | None = None
 
     def blocked_until(self, start: float, on_time: float) -> float | None:
         """End of the first blackout window that the pulse would touch; None where it is free."""
@@ -32,6 +36,29 @@ class Windows:
             and start + on_time <= self.horizon + SLACK
             and self.blocked_until(start, on_time) is None
         )
+
+    def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
+        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""
+        ends = starts + on_times
+        free = (starts >= np.maximum(ready, 0.0) - SLACK) & (ends <= self.horizon + SLACK)
+        if self.limits.blackout:
+            begins, over = self._merged()
+            # The first window that is not over when the pulse starts is the only one that it can touch first.
+            following = np.searchsorted(over, starts + SLACK, side="right")
+            free &= ends <= np.append(begins, np.inf)[following] + SLACK
+        return np.asarray(free)
+
+    def _merged(self) -> tuple[Vector, Vector]:
+        """Begins and ends of the blackout windows in order, those that overlap as one."""
+        if self._dark is None:
+            merged: list[list[float]] = []
+            for begins, ends in sorted(self.limits.blackout):
+                if merged and begins < merged[-1][1]:
+                    merged[-1][1] = max(merged[-1][1], ends)
+                else:
+                    merged.append([begins, ends])
+            self._dark = np.array([one for one, _ in merged]), np.array([other for _, other in merged])
+        return self._dark
 
     def earliest_start(self, on_time: float, ready: float) -> float | None:
         """First allowed start, s, on a tick; None where the horizon comes first."""

@@ -234,3 +234,39 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
     assert literal["residual"]["momentum_shift_deg"] == pytest.approx(0.19, abs=0.005)  # PHYSICS: 0.19° at 10°
     first, second = (math.hypot(*pulse["impulse_Nms"]) for pulse in literal["pulses"])
     assert first == pytest.approx(second, rel=1e-12)
+
+
+def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
+    """Propellant, time and residual of each against C|ω3|β, in one table that fits the screen."""
+    done = run("plan", "--quiet", "--target", "10deg,45deg", "--json", "plans.json", "--scheme", "rhumb-line")
+    assert done.returncode == 0, done.stderr
+    assert "β = 10 deg from H" in done.stdout
+    compared = run("plan", "--quiet", "--target", "2deg,45deg")
+    assert all(name in compared.stdout for name in ("two-pulse", "half-cone", "rhumb-line", "optimal", "× C|ω3|β"))
+    assert all(len(line) <= 80 for line in compared.stdout.splitlines())
+
+
+def test_a_scheme_that_cannot_point_says_so(run: Run) -> None:
+    done = run("plan", "--quiet", "--target", "10deg,45deg", "--scheme", "one-pulse")
+    assert "does not point" in " ".join(done.stdout.split())
+
+
+def test_cones_and_pulses_per_turn_are_heeded(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "body.yaml").write_text("name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n")
+    for option, count, scheme in (("--cones=3", 4, "half-cone"), ("--per-turn=2", None, "rhumb-line")):
+        done = run("plan", "body.yaml", "--target", "30deg,0deg", "--scheme", scheme, option, "--json", "-")
+        plan = json.loads(done.stdout)["plans"][0]
+        assert plan["flown"]["axis_error_deg"] < 1e-7
+        if count is not None:
+            assert len(plan["pulses"]) == count
+        else:
+            first, second = (pulse["t_s"] for pulse in plan["pulses"][:2])
+            assert second - first == pytest.approx(math.pi / 3.0, rel=1e-3)
+
+
+def test_the_sun_by_which_the_pulses_keep_their_phase(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "body.yaml").write_text("name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n")
+    asked = ("plan", "body.yaml", "--target", "40deg,0deg", "--scheme", "rhumb-line", "--json", "-")
+    straight, by_sun = (json.loads(run(*asked, *more).stdout)["plans"][0] for more in ((), ("--sun", "40deg,60deg")))
+    assert by_sun["total_impulse_Nms"] > 1.01 * straight["total_impulse_Nms"]
+    assert run(*asked, "--sun", "190deg,0deg").returncode == 2

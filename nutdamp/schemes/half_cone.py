@@ -1,0 +1,241 @@
+"""Half cones in a row: the spin axis swings along the great circle to the target, half a nutation turn at a time.
+
+From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of the spin axis, each
+further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is not removed
+first: the first pulse comes at the moment from which the whole row is cheapest, and jumps straight onto its first cone.
+The last cone is the acquisition of `acquisition`, which takes out what the others left. Only a nutation that one pulse
+cannot take out is damped first (`approach`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.flight import Arc
+from nutdamp.physics import attitude, pointing
+from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schemes import Options, acquisition, approach, trim
+from nutdamp.schemes.advice import no_channels, no_target
+from nutdamp.schemes.journey import Journey
+from nutdamp.schemes.steering import Steering
+from nutdamp.schemes.windows import Windows, usable
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+WORTH_A_CONE = 0.01
+"""Share of the cost that one more cone must save; else the fewer cones are taken, which end earlier."""
+
+MOST_CONES = 60
+"""Cones tried at most where their number is not given."""
+
+PATIENCE = 5
+"""Numbers of cones that may fail before it is given up."""
+
+SHARES = np.linspace(0.6, 1.3, 15)
+"""Sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone asks for."""
+
+WORTH_WAITING = 0.05
+"""Share of one pulse that waiting for a better phase must save."""
+
+UNEQUAL = 0.3
+"""How much a cone may be wider or narrower than equal ones, as a share: enough for a channel to be in phase."""
+
+LAGGING = 1.1
+"""How much wider a pulse may leave the cones to come than equal ones would be; else the last have too much to do."""
+
+SAMPLES = 96
+"""Moments looked at in each turn of the body."""
+
+LONGEST_SEARCH = 6000
+"""Moments looked at for one pulse, at most."""
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """``options.cones`` half cones; where that is None the fewest of which one more would save less than 1 %.
+
+    Raises Infeasible with the reason.
+    """
+    if spacecraft.goal.axis is None:
+        raise Infeasible(no_target())
+    if spacecraft.torquer is None and not usable(spacecraft):
+        raise Infeasible(no_channels(spacecraft))
+    journey = Journey(spacecraft)
+    if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
+        journey.fire(approach.damping(journey.here))
+    if options.cones is not None:
+        return _row(journey, options.cones)
+    here = journey.here
+    best: Schedule | None = None
+    reason: Infeasible | None = None
+    failed = 0
+    for cones in _counts(_fewest(here), _most(here)):
+        try:
+            made = _row(journey.fork(), cones)
+        except Infeasible as why:
+            reason, failed = why, failed + 1
+            if best is not None or failed > PATIENCE:
+                break
+            continue
+        if best is not None and _cost(made) > (1.0 - WORTH_A_CONE) * _cost(best):
+            break
+        best = made
+    if best is None:
+        raise reason or Infeasible(_no_time(here))
+    return best
+
+
+def _counts(fewest: int, most: int) -> Iterator[int]:
+    """Numbers of cones to try: one after the other, where there are many in steps of a sixth."""
+    cones = fewest
+    while cones <= most:
+        yield cones
+        cones += 1 + cones // 6
+
+
+def _cost(made: Schedule) -> float:
+    return made.total_impulse if made.propellant is None else made.propellant
+
+
+def _axial(spacecraft: Spacecraft) -> float:
+    return spacecraft.inertia.C * abs(spacecraft.spin)
+
+
+def _reach(spacecraft: Spacecraft) -> float:
+    """Most by which one pulse turns H, N m s."""
+    torquer, spin = spacecraft.torquer, abs(spacecraft.spin)
+    if torquer is not None:
+        return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
+    return max((pointing.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0)
+
+
+def _fewest(spacecraft: Spacecraft) -> int:
+    """The least number of cones whose pulses are not beyond reach."""
+    reach, turn = _reach(spacecraft) / _axial(spacecraft), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
+    for cones in range(1, MOST_CONES):
+        pulse = (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))
+        if 0.0 <= pulse <= reach:
+            return cones
+    return MOST_CONES
+
+
+def _most(spacecraft: Spacecraft) -> int:
+    """The largest number of cones for which there are time and pulses."""
+    half_turn = math.pi * spacecraft.inertia.A / _axial(spacecraft)
+    room = int(max(spacecraft.horizon - spacecraft.limits.earliest, 0.0) / half_turn) + 1
+    most = spacecraft.limits.max_pulses
+    return min(MOST_CONES, room, MOST_CONES if most is None else most - 1)
+
+
+def _no_time(spacecraft: Spacecraft) -> str:
+    most = spacecraft.limits.max_pulses
+    fewest = _fewest(spacecraft)
+    if most is not None and most < fewest + 1:
+        return f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}"
+    if fewest >= MOST_CONES:
+        return (
+            f"one pulse turns H by {_reach(spacecraft):.4g} N m s at most, so more than {MOST_CONES} half cones would "
+            "be needed; rhumb-line takes many small pulses"
+        )
+    return (
+        f"{fewest} half cones are needed at least, each half a nutation turn long; "
+        f"the horizon of {spacecraft.horizon:.4g} s leaves no time for them"
+    )
+
+
+def _row(journey: Journey, cones: int) -> Schedule:
+    """That many half cones, each planned from the motion that the one before leaves."""
+    spacecraft, damped = journey.here, len(journey.pulses)
+    if journey.allowed < cones + 1:
+        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {journey.allowed}")
+    for remaining in range(cones, 1, -1):
+        journey.fire(_first_of(journey.here, remaining))
+    journey.fire(acquisition.schedule(journey.here, straight=True))
+    angle = spacecraft.to_turn
+    ideal = pointing.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
+    made = journey.schedule()
+    note = f"{cones} half cone{'s' if cones > 1 else ''}"
+    if damped:
+        note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
+    elif len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
+        note += f"; {made.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
+    return journey.schedule(note)
+
+
+def _first_of(here: Spacecraft, cones: int) -> tuple[Pulse, ...]:
+    """The pulse onto the first of ``cones`` half cones."""
+    torquer = here.torquer
+    if torquer is not None:
+        return Steering(here, torquer).one(cones)
+    return (_fixed(here, usable(here), cones),)
+
+
+def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
+    """The earliest firing of a channel from which the row costs hardly more than from the best one.
+
+    A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
+    and what it misses then is made up for by the cones that follow.
+    """
+    h, windows, target = _axial(here), Windows(here), here.target_axis
+    step = 2.0 * math.pi / abs(here.spin) / SAMPLES
+    share = (windows.horizon - here.limits.earliest) / (cones + 1)
+    span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)
+    count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
+    times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
+    _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(times)
+    best: tuple[float, float, Pulse] | None = None
+    choices: list[tuple[Vector, Vector, Channel]] = []
+    for channel in channels:
+        direction = channel.transverse / abs(channel.transverse)
+        push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
+        costs, sizes = _costs(here, channel, push, cones, h, target)
+        on_times = pointing.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+        costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
+        choices.append((costs, on_times, channel))
+    least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
+    for costs, on_times, channel in choices:
+        for row in np.flatnonzero(costs <= least + WORTH_WAITING * _equal(here, cones)[1])[:1]:
+            pulse = channel_pulse(channel, float(times[row]), float(on_times[row]))
+            if best is None or (pulse.end, costs[row]) < best[:2]:
+                best = pulse.end, float(costs[row]), pulse
+    if best is None or not math.isfinite(least):
+        names = ", ".join(channel.name for channel in channels)
+        raise Infeasible(
+            f"none of the channels ({names}) is in phase for a cone with {cones} to go within the {span:.4g} s that "
+            "the horizon leaves it, on-times and blackout windows kept; another number of cones or rhumb-line can help"
+        )
+    return trim.commandable(here, best[2])
+
+
+def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
+    """Half-angle, rad, of ``cones`` equal cones from the best point of the present one, and the pulse for it, N m s."""
+    far = here.to_turn + here.nutation
+    equal = min(far / (2 * cones), 1.0)
+    return equal, _axial(here) * (math.tan(here.nutation) + math.tan(equal))
+
+
+def _costs(
+    here: Spacecraft, channel: Channel, push: Vector, cones: int, h: float, target: Vector
+) -> tuple[Vector, Vector]:
+    """What the rest of the row costs when H is pushed along ``push`` (n, 3), (n,) N m s, and by how much it then is.
+
+    The rest is the row of cones - 1 half cones from the far end of the cone that the push makes.
+    """
+    equal, nominal = _equal(here, cones)
+    reach = _reach(here)
+    best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
+    for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
+        on_time = float(pointing.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
+        if not channel.min_on_time <= on_time <= channel.max_on_time:
+            continue
+        momentum = here.momentum + size * push
+        half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
+        rest = np.abs(attitude.angle_between(momentum, target) - half_angle) / (2 * (cones - 1))
+        costs = abs(channel.transverse) * on_time + h * (np.tan(half_angle) + 2 * (cones - 1) * np.tan(rest))
+        costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
+        costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
+        better = costs < best
+        best[better], chosen[better] = costs[better], size
+    return best, chosen

@@ -1,0 +1,162 @@
+"""Trains of pulses at a fixed inertial phase: what they cost, what nutation they leave, and where they fail."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference
+from builders import Outcome, aimed, channel, cross, events, fan, off_target, spinner
+from checker import violations
+
+from nutdamp import planning
+from nutdamp.physics import pointing
+from nutdamp.schemes import Options, rhumb_line
+from nutdamp.spacecraft import Limits, Spacecraft, Steerable
+
+
+def train(spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
+    plan = planning.plan(spacecraft, "rhumb-line", options)
+    assert plan.feasible, plan.why
+    assert violations(spacecraft, plan.pulses) == []
+    return plan
+
+
+def ends_on_the_target(plan: planning.Plan) -> None:
+    assert Outcome(plan.spacecraft, plan.pulses).nutation < 1e-9
+    assert off_target(plan.spacecraft, plan.pulses) < 1e-9
+
+
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+@pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 35.0)])
+@pytest.mark.parametrize("per_turn", [1, 2])
+def test_ends_on_the_target(per_turn: int, A: float, C: float, spin: float) -> None:
+    for actuators in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
+        plan = train(aimed(spinner(A, C, spin, 0.0, **actuators), 12.0, 45.0), Options(per_turn=per_turn))
+        ends_on_the_target(plan)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 20.0])
+def test_a_nutation_goes_along_or_first(degrees: float) -> None:
+    for channels in (cross(60.0), (channel("+1", 60.0, 0.0, 0.0),)):
+        ends_on_the_target(train(aimed(spinner(degrees=degrees, channels=channels), 25.0, -60.0)))
+
+
+@pytest.mark.parametrize("on_time", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("torque", [40.0, 10.0])
+def test_arc_efficiency(torque: float, on_time: float) -> None:
+    """Along the great circle the train costs C|ω3|β over the mean of sinc(ω3τ/2), to second order of a pulse."""
+    spacecraft = aimed(spinner(degrees=0.0, channels=cross(torque), limits=Limits(horizon=900.0)), 20.0, 0.0)
+    made = train(spacecraft, Options(on_time=on_time)).pulses
+    assert max(pulse.on_time for pulse in made) < 1.2 * on_time
+    turned = sum(pulse.magnitude * pointing.arc_efficiency(3.0, pulse.on_time) for pulse in made)
+    assert turned == pytest.approx(spacecraft.turning_impulse, rel=3e-3)
+
+
+def test_ideal_pulses_come_down_to_the_floor() -> None:
+    spacecraft = aimed(spinner(degrees=0.0), 40.0, 100.0)
+    plan = train(spacecraft)
+    assert 1.0 <= plan.pulses.total_impulse / spacecraft.turning_impulse < 1.002
+
+
+@pytest.mark.parametrize("per_turn", [1, 2, 3])
+def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
+    turn = 2 * math.pi / 3.0
+    made = train(aimed(spinner(degrees=0.0, channels=fan(3, 30.0)), 30.0, 45.0), Options(per_turn=per_turn)).pulses
+    waits = [two.t - one.t for one, two in itertools.pairwise(made)]
+    assert np.mean(waits) == pytest.approx(turn / per_turn, rel=0.05)
+    assert len({pulse.channel for pulse in made}) == per_turn
+
+
+@pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 93.0)])
+def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float, C: float) -> None:
+    """(angle per pulse)/|sin πa|, and the count chosen closes: flown by the reference integrator."""
+    spacecraft = aimed(spinner(A, C, degrees=0.0, channels=cross(20.0), limits=Limits(horizon=400.0)), 10.0, 0.0)
+    made = train(spacecraft).pulses
+    rotation = reference.frame_n((A, A, C), spacecraft.omega0)
+    each = made.pulses[0].magnitude / (C * 3.0)
+    bound = each / abs(math.sin(math.pi * (1 - C / A)))
+    seen = []
+    for index in range(1, len(made)):
+        until = made.pulses[index].start
+        moving = reference.fly((A, A, C), spacecraft.omega0, events(made.pulses[:index]), until, rotation)
+        seen.append(reference.nutation((A, A, C), moving.rates, 1.0))
+    assert max(seen) < 1.02 * bound
+    assert max(seen) > 0.7 * bound  # it is reached, so the bound is no idle one
+
+
+@pytest.mark.parametrize(("A", "C"), [(100.0, 100.0), (100.0, 99.5), (100.0, 200.0), (100.0, 199.0)])
+def test_fails_where_every_pulse_meets_the_nutation_in_the_same_phase(A: float, C: float) -> None:
+    limits = Limits(horizon=60.0)  # with time for 200 pulses even C = 0.995 A closes
+    spacecraft = aimed(spinner(A, C, degrees=0.0, channels=cross(60.0), limits=limits), 10.0, 0.0)
+    plan = planning.plan(spacecraft, "rhumb-line")
+    assert plan.why is not None
+    assert "so near a whole number" in plan.why
+    assert "--per-turn" in plan.why
+
+
+def test_two_a_turn_cure_the_sphere() -> None:
+    spacecraft = aimed(spinner(100.0, 100.0, degrees=0.0, channels=cross(60.0)), 10.0, 0.0)
+    ends_on_the_target(train(spacecraft, Options(per_turn=2)))
+
+
+def test_too_little_time_says_how_much_it_takes() -> None:
+    spacecraft = aimed(spinner(degrees=0.0, channels=cross(1.0, max_on_time=0.2)), 30.0, 0.0)
+    plan = planning.plan(spacecraft, "rhumb-line")
+    assert plan.why is not None
+    assert "a longer horizon" in plan.why
+
+
+def test_more_pulses_a_turn_than_channels() -> None:
+    spacecraft = aimed(spinner(degrees=0.0, channels=cross(60.0)[:1]), 10.0, 0.0)
+    plan = planning.plan(spacecraft, "rhumb-line", Options(per_turn=2))
+    assert plan.why is not None
+    assert "ask for 2 channels of different directions" in plan.why
+
+
+def test_limits_are_kept() -> None:
+    limits = Limits(earliest=2.0, gap=3.0, blackout=((8.0, 15.0), (20.0, 21.0)), horizon=200.0)
+    ends_on_the_target(train(aimed(spinner(degrees=1.0, channels=cross(40.0), limits=limits), 10.0, 45.0)))
+
+
+# --- fixed Sun phase -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
+    """Small steps on the course as it is at each point end on the target after the way told at first."""
+    rng = np.random.default_rng(seed)
+    here, target, sun = (axis / np.linalg.norm(axis) for axis in rng.normal(size=(3, 3)))
+    _, way = rhumb_line.course(here, target, sun)
+    steps, courses = 4000, []
+    for number in range(steps):
+        ahead, left = rhumb_line.course(here, target, sun)
+        assert left == pytest.approx(way * (1 - number / steps), abs=2e-3 * way + 1e-6)
+        if left > 0.05 * way:  # its angle to the Sun is the same all the way
+            bright = sun - (sun @ here) * here
+            courses.append(math.atan2(ahead @ np.cross(here, bright), ahead @ bright))
+        here = here + ahead * way / steps
+        here /= np.linalg.norm(here)
+    assert reference.angle(here, target) < 2e-3
+    assert np.ptp(np.unwrap(courses)) < 2e-2
+
+
+def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
+    spacecraft = aimed(spinner(degrees=0.0, channels=cross(60.0), limits=Limits(horizon=400.0)), 50.0, 0.0)
+    sun = spacecraft.direction_in_n(math.radians(40.0), math.radians(60.0))
+    by_sun = replace(spacecraft, goal=replace(spacecraft.goal, sun=sun))
+    direct, rhumb = train(spacecraft), train(by_sun)
+    ends_on_the_target(rhumb)
+    assert rhumb.pulses.total_impulse > 1.02 * direct.pulses.total_impulse
+    assert "rhumb line at a fixed Sun phase" in rhumb.remarks[0]
+
+
+def test_an_axis_towards_the_sun_has_no_phase() -> None:
+    spacecraft = aimed(spinner(degrees=0.0, channels=cross(60.0)), 50.0, 0.0)
+    facing = replace(spacecraft, goal=replace(spacecraft.goal, sun=spacecraft.target_axis))
+    why = planning.plan(facing, "rhumb-line").why
+    assert why is not None
+    assert "has no phase" in why
