@@ -70,9 +70,11 @@ def command(
     if robust:
         require_dispersions(body)
 
+    from nutdamp.cli.progress import working
     from nutdamp.planning import compare, usual
 
-    compared = compare(body, names or usual(body), options)
+    with working("planning", quiet=quiet):
+        compared = compare(body, names or usual(body), options)
     dispersed = _disperse(compared, options, quiet) if robust else None
     if dispersed is None:
         chosen = compared.recommended

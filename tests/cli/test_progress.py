@@ -6,11 +6,12 @@ import io
 import os
 import signal
 import sys
+import time
 
 import pytest
 
 from nutdamp.cli import progress as module
-from nutdamp.cli.progress import progress, stoppable
+from nutdamp.cli.progress import progress, stoppable, working
 
 
 class Terminal(io.StringIO):
@@ -55,3 +56,21 @@ def test_a_run_is_asked_to_stop_and_a_second_ctrl_c_interrupts(number: signal.Si
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+@pytest.mark.parametrize(
+    ("patience", "terminal", "seen"), [(0.0, True, True), (60.0, True, False), (0.0, False, False)]
+)
+def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, patience: float, terminal: bool, seen: bool
+) -> None:
+    stream = Terminal() if terminal else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(module, "PATIENCE", patience)
+    monkeypatch.setenv("TERM", "xterm")
+    with working("planning"):
+        for _ in range(200):  # until the timer has had its turn
+            if not seen or "planning" in stream.getvalue():
+                break
+            time.sleep(0.05)
+    assert ("planning" in stream.getvalue()) is seen
