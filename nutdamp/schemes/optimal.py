@@ -9,7 +9,10 @@ rigorous one of the nutation alone.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +24,7 @@ from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.influence import Equations
 from nutdamp.schemes.polish import polish
-from nutdamp.schemes.program import Program, Solution
+from nutdamp.schemes.program import Burn, Program, Solution
 from nutdamp.schemes.windows import usable
 from nutdamp.spacecraft import Spacecraft
 
@@ -39,6 +42,9 @@ DEAR = 0.01
 
 DEARER = 0.03
 """Share above it from which shorter horizons are looked at too."""
+
+WAYS = 3
+"""Schedules of other schemes that are corrected to cost less."""
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
@@ -89,6 +95,14 @@ def _fewest(search: _Search) -> Schedule:
         if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
             return search.with_bounds(made)
     return search.schedule()
+
+
+class _Found(NamedTuple):
+    """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
+
+    left: float
+    price: float
+    made: Schedule
 
 
 class _Search:
@@ -175,15 +189,20 @@ class _Search:
             shorter = _Search(self.within(horizon), self.options)
             if not shorter.feasible(horizon):
                 break
-            other = shorter.settled(first.cost)
-            if best is None or (other is not None and self.price(other) < self.price(best)):
-                best = other
+            best = self.cheaper(best, shorter.settled(first.cost))
+        if self.dear(best, first.cost):
+            best = self.cheaper(best, self.others(first.cost))
         if best is None:
             raise Infeasible(
                 "not found: the program has solutions, but on the true motion the search did not settle on one that "
                 "keeps on-times, gap and max_pulses; another horizon may help"
             )
         return self.with_bounds(best, first)
+
+    def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
+        """The cheaper of two schedules, of which there may be none."""
+        there = [made for made in (one, other) if made is not None]
+        return min(there, key=self.price, default=None)
 
     def dear(self, made: Schedule | None, least: float) -> bool:
         """Whether there is no schedule, or one so dear that it is worth looking for another."""
@@ -193,34 +212,77 @@ class _Search:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
         program = self.program()
         program.haste = HASTE
-        found: list[tuple[float, float, Schedule]] = []
+        found: list[_Found] = []
         for _ in range(CHOICES):
             solution = program.solve()
             if solution.unmet > UNMET:
                 break
+            fewest = self.options.least == "pulses"
+            found += self.corrected(program, thinned(program, solution, least, fewest=fewest), least)
+            if not found or any(one.left == 0.0 and one.price <= least * (1.0 + DEAR) for one in found):
+                break
+        return self.best(found)
+
+    def others(self, least: float) -> Schedule | None:
+        """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
+        from nutdamp.schemes import half_cone, one_pulse, rhumb_line, two_pulse
+
+        names = {channel.name: channel for channel in self.channels}
+        body = replace(self.spacecraft, steerable=None)
+        schemes: tuple[ModuleType, ...] = (two_pulse,) if self.equations.shift else (one_pulse,)
+        if body.goal.axis is not None:
+            schemes = (*schemes, rhumb_line, half_cone)
+        ways: list[Schedule] = []
+        for scheme in schemes:
+            plan: Callable[[Spacecraft, Options], Schedule | Iterable[Schedule]] = scheme.schedule
+            if scheme is two_pulse and body.goal.axis is None:
+                plan = two_pulse.alternatives
             try:
-                solution, last = thinned(program, solution, least, fewest=self.options.least == "pulses"), math.inf
-                for turn in range(AIMS):
-                    solution = repaired(program, solution)
-                    made = as_pulses(self.spacecraft, solution.burns)
-                    flown = flight.flown(self.spacecraft, made)
-                    program.aim(influence.along(flown, self.equations, program.width))
-                    if self.left(flown) < NEAR:
-                        made = polish(self.spacecraft, made, self.equations, solution.off, program.width)
-                        left, price = self.left(flight.flown(self.spacecraft, made)), self.price(made)
-                        found.append((0.0 if left <= LEFT else left, price, made))
-                        if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
-                            break
-                        last = price if left <= LEFT else math.inf
-                    solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
-                    if solution.unmet > LOST:
-                        break
+                made = plan(body, self.options)
+                ways += [made] if isinstance(made, Schedule) else made
+            except Infeasible:
+                continue
+        found: list[_Found] = []
+        flights = [flight.flown(self.spacecraft, Schedule(one.pulses)) for one in ways]
+        for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
+            left = self.left(way)
+            found.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            program = self.program()
+            program.aim(influence.along(way, self.equations, program.width))
+            burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
+            found += self.corrected(program, program.solve(program.about(burns)), least)
+        return self.best(found)
+
+    def corrected(self, program: Program, solution: Solution, least: float) -> list[_Found]:
+        """Schedules from the burns of a solution, corrected along one flight after the other, unless they get lost."""
+        found: list[_Found] = []
+        last = math.inf
+        for turn in range(AIMS):
+            if solution.unmet > LOST:
+                break
+            try:
+                solution = repaired(program, solution)
             except Unrepairable:
                 break
-            if any(left == 0.0 and price <= least * (1.0 + DEAR) for left, price, _ in found):
-                break
-        left, _, best = min(found, key=lambda one: one[:2], default=(math.inf, math.inf, None))
-        return None if left > 0.0 and self.spacecraft.limits.tick is None else best
+            made = as_pulses(self.spacecraft, solution.burns)
+            flown = flight.flown(self.spacecraft, made)
+            program.aim(influence.along(flown, self.equations, program.width))
+            if self.left(flown) < NEAR:
+                made = polish(self.spacecraft, made, self.equations, solution.off, program.width)
+                left, price = self.left(flight.flown(self.spacecraft, made)), self.price(made)
+                found.append(_Found(0.0 if left <= LEFT else left, price, made))
+                if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
+                    break
+                last = price if left <= LEFT else math.inf
+            solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
+        return found
+
+    def best(self, found: list[_Found]) -> Schedule | None:
+        """The cheapest that leaves nothing; on ticks the one that leaves least."""
+        best = min(found, key=lambda one: (one.left, one.price), default=None)
+        if best is None or (best.left > 0.0 and self.spacecraft.limits.tick is None):
+            return None
+        return best.made
 
     def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with what any other must cost."""

@@ -209,8 +209,11 @@ def random_layout(seed: int) -> Spacecraft:
 TEN_MICRODEGREE = math.radians(1e-5)
 
 
-def flies(seed: int) -> None:
-    """Flown by the reference integrator, nothing is left, within all limits, and the rigorous bound holds."""
+def flies(seed: int, dearest: float) -> None:
+    """Flown by the reference integrator, nothing is left, within all limits, and the rigorous bound holds.
+
+    The cost lies below ``dearest`` times the first-order bound, which knows neither large angles nor on-times.
+    """
     spacecraft = random_layout(seed)
     made = plan(spacecraft, "optimal")
     assert made.schedule is not None, made.why
@@ -222,18 +225,18 @@ def flies(seed: int) -> None:
     assert made.pulses.propellant is not None
     bounds = made.schedule.bounds
     assert bounds.rigorous <= made.pulses.propellant * (1 + 1e-9)
-    assert made.pulses.propellant <= 1.1 * bounds.first_order
+    assert made.pulses.propellant <= dearest * bounds.first_order
 
 
 @pytest.mark.parametrize("seed", range(16))
 def test_random_layouts_are_planned(seed: int) -> None:
-    flies(seed)
+    flies(seed, 1.03)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(16, 200))
 def test_many_random_layouts_are_planned(seed: int) -> None:
-    flies(seed)
+    flies(seed, 1.25)
 
 
 @pytest.mark.parametrize(("seed", "degrees"), [(0, 1.0), (1, 5.0)])
