@@ -271,12 +271,18 @@ def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
 
 
 def show(renderable: RenderableType) -> None:
-    """Print a result on standard output."""
-    console().print(renderable)
+    """Print a result on standard output; in a file or a pipe without the blanks that fill up lines."""
+    shown = console()
+    if shown.is_terminal:
+        shown.print(renderable)
+        return
+    with shown.capture() as captured:
+        shown.print(renderable)
+    click.echo("\n".join(line.rstrip() for line in captured.get().split("\n")), nl=False)
 
 
 def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded."""
+    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded, names such as [red] or :rocket: left alone."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=False)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False)

@@ -1,0 +1,103 @@
+"""Where output goes when standard output is full, closed or of a narrow encoding, and names that look like markup."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import IO
+
+import pytest
+from process import Run
+
+FULL = Path("/dev/full")
+
+ODD_NAMES = """
+name: "[red]Evil[/] [/] :rocket:"
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters:
+  - {name: "[red]", torque: [8, 0, 0]}
+  - {name: "[/]", torque: [0, 8, 0]}
+  - {name: ":rocket:", torque: [-8, 0, 0]}
+dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
+"""
+
+
+@pytest.fixture
+def odd(tmp_path: Path) -> str:
+    """A spacecraft whose names rich would take for markup."""
+    (tmp_path / "odd.yaml").write_text(ODD_NAMES)
+    return "odd.yaml"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("plan",),
+        ("plan", "--robust"),
+        ("check",),
+        ("verify",),
+        ("simulate", "--scheme", "two-pulse", "--show"),
+        ("trade", "--points", "1"),
+        ("disperse", "--samples", "100"),
+        ("disperse", "--case", "1"),
+    ],
+    ids=" ".join,
+)
+def test_names_that_look_like_markup_are_shown_as_they_are(run: Run, odd: str, command: tuple[str, ...]) -> None:
+    done = run(*command, odd)
+    assert "Traceback" not in done.stderr
+    assert "[red]Evil[/] [/] :rocket:" in done.stdout
+
+
+def test_thrusters_named_like_markup_keep_their_names_in_tables(run: Run, odd: str) -> None:
+    rows = run("check", odd).stdout.splitlines()
+    for name in ("[red]", "[/]", ":rocket:"):
+        assert any(row.startswith(f"{name}  ") for row in rows)
+
+
+def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
+    for command in (("plan",), ("check",), ("simulate", "--scheme", "two-pulse")):
+        assert not [line for line in run(*command).stdout.splitlines() if line != line.rstrip()]
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("command", ["plan --quiet", "check --quiet", "plan --quiet --json -", "--help", "explain"])
+def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
+    with FULL.open("w") as full:
+        done = _process(tmp_path, command, stdout=full)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert "cannot write" in done.stderr
+    assert "No space left" in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a descriptor as a shell does")
+@pytest.mark.parametrize("command", ["plan --quiet", "plan --quiet --csv -"])
+def test_a_process_without_standard_output_does_its_work(tmp_path: Path, command: str) -> None:
+    call = f'exec "{sys.executable}" -m nutdamp {command} --json pulses.json >&-'
+    done = subprocess.run(["sh", "-c", call], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "pulses.json").exists()
+
+
+def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> None:
+    done = _process(tmp_path, "plan --quiet", stdout=subprocess.PIPE, PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "A|?0|" in done.stdout
+
+
+def _process(folder: Path, command: str, *, stdout: int | IO[str], **more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "nutdamp", *command.split()],
+        cwd=folder,
+        env={**os.environ, **more},
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="latin-1",
+        timeout=60,
+        check=False,
+    )
