@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
@@ -95,6 +95,29 @@ class Aim(NamedTuple):
         return replace(spacecraft, goal=goal)
 
 
+READ_BY = {
+    "on_time": ("four-pulse", "rhumb-line"),
+    "coarse": ("four-pulse",),
+    "literal": ("two-pulse",),
+    "least": ("optimal",),
+    "free_axis": ("optimal",),
+    "shift": ("optimal",),
+}
+"""Options of planning that only some schemes read; the others are for all."""
+
+SPINNING = "optimal"
+"""The scheme that can change the spin rate on purpose."""
+
+
+def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
+    """Say what was asked for that none of the schemes ``names`` heeds."""
+    for option, readers in READ_BY.items():
+        if getattr(options, option) != Options._field_defaults[option] and not set(readers) & set(names):
+            remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
+    if body.goal.spin is not None and set(names) - {"none"} and SPINNING not in names:
+        remark(f"the final spin asked for is out of reach here: --scheme {SPINNING} can set it")
+
+
 class Direction(click.ParamType["tuple[float, float]"]):
     """Two angles with a comma between them."""
 
@@ -127,6 +150,10 @@ def scheme_options(command: Command) -> Command:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
         if chosen.on_time is not None and chosen.on_time <= 0.0:
             raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
+        if chosen.shift is not None and chosen.shift < 0.0:
+            raise click.BadParameter("an angle of at least 0 is wanted", param_hint="--shift")
+        if chosen.shift is not None and chosen.free_axis:
+            raise click.UsageError("either --shift, how far H may end from its target, or --free-axis, anywhere")
         aim = Aim(parameters.pop("target"), parameters.pop("spin"))
         return command(*args, options=chosen, aim=aim, **parameters)
 
@@ -179,8 +206,12 @@ def plot_options(command: Command) -> Command:
     return command
 
 
-def expect_picture(path: str) -> None:
-    """Say at once, not after the work, that a picture cannot be made."""
+def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
+    """Say at once, not after the work, that a picture cannot be made; a usage error for a ``figure`` without file."""
+    if path is None:
+        if figure != FIGURES[0]:
+            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
+        return
     from nutdamp.report import figures
 
     figures.ending(path)
@@ -223,6 +254,7 @@ def plan_or_read(
     from nutdamp import planning
     from nutdamp.errors import Infeasible
 
+    tell_unread(() if schedule else (scheme,) if scheme else CLASSIC, options, body, remark)
     if schedule is not None:
         from nutdamp.files.pulses_csv import read_pulses
 

@@ -103,6 +103,7 @@ def command(
     if resume == "-":
         raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
     silent = one_stdout(csv=csv, json=json, plot=plot)
+    expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
 
@@ -117,8 +118,6 @@ def command(
     if case is not None:
         _one_case(study, case - 1, plan.scheme, json, silent)
         return
-    if plot is not None:
-        expect_picture(plot)
     results = fly(study, samples, threads, csv, resume, quiet)
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:

@@ -20,6 +20,7 @@ from nutdamp.cli.common import (
     scheme_options,
     show,
     spacecraft_argument,
+    tell_unread,
     write_all,
 )
 from nutdamp.schemes import CLASSIC, PLANNED, Options
@@ -62,11 +63,11 @@ def command(
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
     silent = one_stdout(csv=csv, json=json, plot=plot)
-    if plot is not None:
-        expect_picture(plot)
+    expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
 
+    tell_unread(names or CLASSIC, options, body, remark)
     if robust:
         require_dispersions(body)
 

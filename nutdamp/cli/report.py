@@ -17,6 +17,7 @@ from nutdamp.cli.common import (
     scheme_options,
     source,
     spacecraft_argument,
+    tell_unread,
     write_all,
 )
 from nutdamp.cli.disperse import Count, fly
@@ -70,8 +71,10 @@ def command(
     body = aim.applied(read_spacecraft(text, name))
     if disperse is not None:
         require_dispersions(body)
+    schemes = tuple(dict.fromkeys(names)) or CLASSIC
+    tell_unread(schemes, options, body, remark)
     with working("planning", quiet=quiet):
-        compared = compare(body, tuple(dict.fromkeys(names)) or CLASSIC, options)
+        compared = compare(body, schemes, options)
     chosen = compared.recommended
     dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
     with working("writing the page", quiet=quiet):

@@ -65,8 +65,7 @@ def command(
     silent = one_stdout(csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
-    if plot is not None:
-        expect_picture(plot)
+    expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
 
