@@ -55,8 +55,8 @@ def command(
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output.
+    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
+    example. A FILE of - is standard output.
     """
     names = tuple(dict.fromkeys(names))
     for option, path in (("--csv", csv), ("--plot", plot)):

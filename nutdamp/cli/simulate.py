@@ -55,8 +55,8 @@ def command(
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, the residuals and the axis track.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output.
+    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
+    example. A FILE of - is standard output, for --schedule standard input.
     """
     if (scheme is None) == (schedule is None):
         raise click.UsageError("name what to propagate: either --scheme or --schedule")

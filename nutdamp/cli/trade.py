@@ -62,8 +62,8 @@ def command(
 ) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
-    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT is a YAML file;
-    without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output.
+    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT and FILE are as
+    for `nutdamp plan`.
     """
     if options.free_axis or options.shift is not None:
         raise click.UsageError("--allow says how far H may end from its target; --free-axis and --shift are for plan")

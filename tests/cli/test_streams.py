@@ -101,3 +101,27 @@ def _process(folder: Path, command: str, *, stdout: int | IO[str], **more: str) 
         timeout=60,
         check=False,
     )
+
+
+# --- standard input ---------------------------------------------------------------------------------------------------
+
+
+def test_a_spacecraft_comes_from_standard_input(run: Run) -> None:
+    done = run("plan", "-", stdin=ODD_NAMES)
+    assert done.returncode == 0
+    assert "Evil" in done.stdout
+    assert run("check", "-", stdin="name: 5").stderr.startswith("-:1:")
+
+
+def test_a_schedule_comes_from_standard_input(run: Run) -> None:
+    pulses = run("plan", "--csv", "-", "--quiet").stdout
+    done = run("simulate", "--schedule", "-", "--quiet", stdin=pulses)
+    assert done.returncode == 0
+    assert "after the last pulse" in done.stdout
+
+
+def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
+    for command in (("plan", "-"), ("simulate", "--schedule", "-"), ("import", "apm", "-")):
+        done = run(*command, stdin="")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "-:1:1: " in done.stderr
