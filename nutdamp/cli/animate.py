@@ -61,7 +61,7 @@ def command(
     animation.film_format(output)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
-    pulses = plan_or_read(body, scheme, schedule, options, remark).pulses
+    pulses = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet).pulses
 
     from nutdamp import flight
 

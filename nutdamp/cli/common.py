@@ -245,13 +245,20 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
 
 
 def plan_or_read(
-    body: Spacecraft, scheme: str | None, schedule: str | None, options: Options, remark: Callable[[str], None]
+    body: Spacecraft,
+    scheme: str | None,
+    schedule: str | None,
+    options: Options,
+    remark: Callable[[str], None],
+    *,
+    quiet: bool,
 ) -> Plan:
     """The plan of ``scheme`` (the recommended one where it is None), or the pulses of a ``schedule`` file as a plan.
 
     Raises Infeasible where there is no such plan.
     """
     from nutdamp import planning
+    from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible
 
     tell_unread(() if schedule else (scheme,) if scheme else CLASSIC, options, body, remark)
@@ -262,7 +269,8 @@ def plan_or_read(
         for warning in (*warnings, *planning.broken_limits(body, pulses)):
             remark(f"warning: {warning}")
         return planning.Plan(body, schedule, pulses)
-    plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
+    with working("planning", quiet=quiet):
+        plan = planning.plan(body, scheme, options) if scheme else planning.compare(body, CLASSIC, options).recommended
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     if plan.why is not None:

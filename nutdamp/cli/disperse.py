@@ -108,7 +108,7 @@ def command(
     body = load(spacecraft, remark, aim)
 
     require_dispersions(body)
-    plan = plan_or_read(body, scheme, schedule, options, remark)
+    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
 
     from nutdamp.dispersion import study_of
 

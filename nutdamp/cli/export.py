@@ -62,7 +62,7 @@ def command(
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
-    plan = plan_or_read(body, scheme, schedule, options, remark)
+    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     write_all([(output, export_text(plan, form, xml=notation, until=until))])
     if output != "-":

@@ -71,9 +71,11 @@ def command(
     if robust:
         require_dispersions(body)
 
+    from nutdamp.cli.progress import working
     from nutdamp.planning import compare
 
-    compared = compare(body, names or CLASSIC, options)
+    with working("planning", quiet=quiet):
+        compared = compare(body, names or CLASSIC, options)
     dispersed = _disperse(compared, options, quiet) if robust else None
     if dispersed is None:
         chosen = compared.recommended

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
+    from rich.status import Status
 
 PATIENCE = 1.0
 """Seconds that pass before a bar appears."""
@@ -34,14 +36,31 @@ def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> It
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Says ``what`` is done while it is done, where nobody can tell how much is left: only on a terminal."""
+    """Says ``what`` is done while it is done, where nobody can tell how much is left.
+
+    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
+    """
     if quiet or not sys.stderr.isatty():
         yield
         return
-    from rich.console import Console
+    shown: list[Status] = []
 
-    with Console(stderr=True).status(what):
+    def show() -> None:
+        from rich.console import Console
+
+        shown.append(Console(stderr=True).status(what))
+        shown[0].start()
+
+    timer = threading.Timer(PATIENCE, show)
+    timer.daemon = True
+    timer.start()
+    try:
         yield
+    finally:
+        timer.cancel()
+        timer.join()
+        for status in shown:
+            status.stop()
 
 
 class _Bar:

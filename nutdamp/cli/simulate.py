@@ -71,7 +71,7 @@ def command(
 
     from nutdamp import flight
 
-    plan = plan_or_read(body, scheme, schedule, options, remark)
+    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)

@@ -47,11 +47,13 @@ def command(
     silent = one_stdout(json=json)
     body = load(spacecraft, remarks(quiet), aim)
 
+    from nutdamp.cli.progress import working
     from nutdamp.planning import unrounded
     from nutdamp.verification import verify
 
-    plan = plan_or_read(body, scheme, schedule, options, remarks(quiet))
-    found = verify(body, plan.pulses, None if schedule else unrounded(plan))
+    plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
+    with working("verifying", quiet=quiet):
+        found = verify(body, plan.pulses, None if schedule else unrounded(plan))
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.verification_json import verification_json
