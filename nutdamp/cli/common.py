@@ -301,6 +301,15 @@ def one_stdout(**files: str | None) -> bool:
     return bool(taken)
 
 
+def expect_places(*paths: str | None) -> None:
+    """Say at once, not after the work, that a file cannot be written where it is to be."""
+    from nutdamp.files.output import check_place
+
+    for path in paths:
+        if path is not None:
+            check_place(path)
+
+
 def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
     """Write the files asked for, once all of their contents are made."""
     if outputs:

@@ -13,6 +13,7 @@ from nutdamp.cli.boundary import INTERRUPTED, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -106,6 +107,7 @@ def command(
     expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot, resume)
 
     require_dispersions(body)
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)

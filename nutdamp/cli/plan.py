@@ -11,6 +11,7 @@ from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plot_options,
@@ -66,6 +67,7 @@ def command(
     expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
 
     tell_unread(names or CLASSIC, options, body, remark)
     if robust:

@@ -11,6 +11,7 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    expect_places,
     quiet_option,
     remarks,
     require_dispersions,
@@ -69,6 +70,7 @@ def command(
 
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
     body = aim.applied(read_spacecraft(text, name))
+    expect_places(output)
     if disperse is not None:
         require_dispersions(body)
     schemes = tuple(dict.fromkeys(names)) or CLASSIC

@@ -8,6 +8,7 @@ from nutdamp.cli.common import (
     Aim,
     Quantity,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -68,6 +69,7 @@ def command(
     expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
 
     from nutdamp import flight
 

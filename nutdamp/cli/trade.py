@@ -11,6 +11,7 @@ from nutdamp.cli.common import (
     Aim,
     Quantity,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     quiet_option,
@@ -75,6 +76,7 @@ def command(
     expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
     tell_unread(("optimal",), options, body, remark)
 
     from nutdamp import trade

@@ -9,6 +9,7 @@ import click
 from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
     Aim,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -46,6 +47,7 @@ def command(
         raise click.UsageError("name what to verify: either --scheme or --schedule")
     silent = one_stdout(json=json)
     body = load(spacecraft, remarks(quiet), aim)
+    expect_places(json)
 
     from nutdamp.cli.progress import working
     from nutdamp.planning import unrounded

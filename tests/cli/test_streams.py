@@ -125,3 +125,46 @@ def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
         done = run(*command, stdin="")
         assert (done.returncode, done.stdout) == (2, "")
         assert "-:1:1: " in done.stderr
+
+
+# --- places that cannot be written to are told before the work --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "plan --csv no/x.csv",
+        "simulate --scheme none --json no/x.json",
+        "trade --points 1000 --csv no/x.csv",
+        "disperse --samples 1e10 --json no/x.json",
+        "disperse --samples 1e10 --resume no/x.npz",
+        "animate -o no/x.gif --seconds 600",
+        "report -o no/x.html",
+        "export --format json -o no/x.json",
+        "verify --json no/x.json",
+    ],
+)
+def test_a_missing_folder_is_told_before_the_work(run: Run, tmp_path: Path, command: str) -> None:
+    done = run(*command.split(), "--quiet")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "cannot write no/x." in done.stderr
+    assert "is no directory" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bad_file_is_told_before_a_missing_folder(run: Run, odd: str, tmp_path: Path) -> None:
+    (tmp_path / "bad.yaml").write_text("name: 5")
+    assert run("plan", "bad.yaml", "--csv", "no/x.csv").returncode == 2
+
+
+def test_a_file_is_no_folder_for_schedules(run: Run, odd: str) -> None:
+    done = run("trade", "--points", "1", "--schedules", odd)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == "nutdamp: cannot write odd.yaml: it is there, and no directory"
+
+
+def test_a_schedule_with_semicolons_is_told_about_commas(run: Run, tmp_path: Path) -> None:
+    pulses = run("plan", "--csv", "-", "--quiet").stdout
+    done = run("simulate", "--schedule", "-", "--quiet", stdin=pulses.replace(",", ";"))
+    assert done.returncode == 2
+    assert done.stderr == "-:1:1: columns are separated by commas, not by semicolons or tabs\n"
