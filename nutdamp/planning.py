@@ -49,7 +49,7 @@ class Plan:
     @property
     def pulses(self) -> Schedule:
         """The schedule; empty where the plan is infeasible."""
-        return self.schedule or Schedule()
+        return Schedule() if self.schedule is None else self.schedule
 
     @cached_property
     def residual(self) -> Residual | None:
@@ -109,9 +109,10 @@ class Plan:
         if spent is None:
             return ()
         gap = 100.0 * (spent / bounds.first_order - 1.0)
+        beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: that holds for small angles"
         return (
             f"{scale * spent:.4g} {unit}; first-order least within {bounds.within:.4g} s "
-            f"{scale * bounds.first_order:.4g} {unit} (gap {gap:.2g} %); "
+            f"{scale * bounds.first_order:.4g} {unit} ({beside}); "
             f"no schedule at all below {scale * bounds.rigorous:.4g} {unit}",
         )
 
@@ -132,7 +133,7 @@ class Plan:
             reason = "the resolution of commands (limits.tick) or the shortest pulse leaves it"
         else:
             reason = "on-times, horizon or blackout windows allow no more"
-        return (f"{math.degrees(left):.3g}° of nutation remain: {reason}",)
+        return (f"{_degrees(left)} of nutation remain: {reason}",)
 
     def _asymmetry(self) -> tuple[str, ...]:
         """What the same pulses would leave if I1 and I2 were their mean."""
@@ -145,9 +146,14 @@ class Plan:
         left = self.flight.residual.nutation
         return (
             f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % accounts for "
-            f"{math.degrees(abs(left - without)):.3g}°: these pulses leave {math.degrees(left):.3g}° of nutation, "
-            f"and would leave {math.degrees(without):.3g}° if both were their mean",
+            f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
+            f"and would leave {_degrees(without)} if both were their mean",
         )
+
+
+def _degrees(angle: float) -> str:
+    """An angle given in rad, as remarks tell it; what is below 1e-9 deg is rounding."""
+    return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"
 
 
 def _momentum_gained(flown: Flight) -> Vector:
@@ -301,7 +307,8 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     meeting = [(one, left) for one, left in feasible if one.meets_requirement is not False]
     if not meeting:
         best = next(one for one, left in feasible if missed(one, left) == least)
-        return best, "no feasible plan meets the requirement; this one leaves least nutation"
+        nearest = "leaves least nutation" if best.spacecraft.goal.axis is None else "comes nearest to the target"
+        return best, f"no feasible plan meets the requirement; this one {nearest}"
     least = min(missed(one, left) for one, left in meeting)
     close = [(one, left) for one, left in meeting if missed(one, left) <= max(2.0 * least, AS_GOOD)]
     those = "meet the requirement" if asked else "are feasible"
@@ -319,7 +326,9 @@ def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
     equal = [(one, left) for one, left in close if cost(one) <= cheapest * (1.0 + 1e-6)]
     what = "propellant" if known else "impulse"
     if len(equal) == 1:
-        return equal[0][0], f"least {what} of the {len(close)} plans that {those} and leave least nutation"
+        even = all(missed(one, left) <= AS_GOOD for one, left in close)
+        leave = "leave least nutation" if even else "leave at most twice the least nutation"
+        return equal[0][0], f"least {what} of the {len(close)} plans that {those} and {leave}"
     least_shift = min(left.axis_error for _, left in equal)
     still = [one for one, left in equal if left.axis_error <= least_shift + 1e-9]
     best = min(still, key=lambda one: one.pulses.end)

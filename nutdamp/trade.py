@@ -65,15 +65,27 @@ def fronts(
 ) -> tuple[Front, ...]:
     """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
 
+    What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
     A schedule that keeps a smaller shift stands for the larger ones too, where none beats it. ``progress`` is told
     how many of the count × len(shifts) searches are done.
     """
+    if options.least == "impulse":
+        # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
+        spacecraft = _of_unknown_propellant(spacecraft)
     made: list[Front] = []
     for index, shift in enumerate(sorted(set(shifts))):
         front = _front(spacecraft, _allowing(options, shift), count, shift, partial(_told, progress, index * count))
         points = (*front.points, *(point for other in made for point in other.points))
         made.append(Front(shift, _undominated(points), None if points else front.why))
     return tuple(made)
+
+
+def _of_unknown_propellant(spacecraft: Spacecraft) -> Spacecraft:
+    channels = (
+        replace(channel, thrusters=tuple(replace(thruster, isp=None) for thruster in channel.thrusters))
+        for channel in spacecraft.channels
+    )
+    return replace(spacecraft, channels=tuple(channels))
 
 
 def _told(progress: Callable[[int], None], before: int, done: int) -> None:

@@ -15,8 +15,8 @@ from scipy.integrate import simpson
 from nutdamp import planning, schemes
 from nutdamp.flight import Residual
 from nutdamp.planning import Plan, broken_limits, compare, plan, recommend
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.schedule import Bounds, Pulse, Schedule, channel_pulse
+from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Goal, Limits, Requirement, Spacecraft, Steerable, Vector
 
 CLASSIC = schemes.CLASSIC
 
@@ -121,6 +121,21 @@ def test_reasons_say_what_decided() -> None:
     assert "ends first" in recommend([judged("a", 0.1), judged("b", 0.1, end=2.0)])[1]
 
 
+def test_the_reason_admits_that_the_cheapest_leaves_up_to_twice_the_least_nutation() -> None:
+    _, reason = recommend([judged("A", 2.0, impulse=2.0), judged("B", 3.9, impulse=1.0)])
+    assert reason == "least impulse of the 2 plans that are feasible and leave at most twice the least nutation"
+    _, reason = recommend([judged("A", 1e-6, impulse=2.0), judged("B", 9e-4, impulse=1.0)])
+    assert reason.endswith("and leave least nutation")
+
+
+def test_with_a_target_the_reason_speaks_of_it() -> None:
+    asked = Requirement(nutation=math.radians(0.1), momentum_shift=math.radians(0.1))
+    one = judged("A", 1e-6, shift=7.0, asked=asked)
+    pointing = replace(one, spacecraft=replace(one.spacecraft, goal=Goal(axis=np.array([0.6, 0.0, 0.8]))))
+    assert recommend([pointing])[1].endswith("comes nearest to the target")
+    assert recommend([one])[1].endswith("leaves least nutation")
+
+
 def test_compare_keeps_the_order_asked_for_and_recommends_one_of_them() -> None:
     compared = compare(spinner(channels=cross(20.0), requirement=BOTH), CLASSIC)
     assert [one.scheme for one in compared.plans] == list(CLASSIC)
@@ -179,6 +194,31 @@ def test_without_nutation_there_is_an_empty_schedule(scheme: str, degrees: float
     assert len(done.pulses) == 0
     assert done.meets_requirement is True
     assert done.pulses.total_impulse == 0.0
+
+
+def test_a_plan_without_pulses_keeps_its_remarks() -> None:
+    assert plan(spinner(degrees=0.0), "two-pulse").remarks == ("there is no nutation to damp",)
+
+
+def test_remarks_tell_no_rounding() -> None:
+    """With I1 ≠ I2 the trimmed pulses leave nothing: 1e-14 degrees are not worth a number."""
+    body = spinner(channels=cross(8.0))
+    first, second, third = body.inertia.moments
+    uneven = replace(body, inertia=replace(body.inertia, moments=(1.01 * first, second, third)))
+    (told,) = [text for text in plan(uneven, "one-pulse").remarks if "I1 ≠ I2" in text]
+    assert "these pulses leave less than 1e-9° of nutation" in told
+
+
+def test_a_cost_below_the_first_order_bound_says_why_that_can_be() -> None:
+    body = spinner(channels=cross(8.0))
+    cost = plan(body, "one-pulse").pulses.total_impulse
+    for bound, said in (
+        (1.01 * cost, "% more: that holds for small angles"),
+        (cost, "(gap 0 %)"),
+        (0.5 * cost, "gap 1"),
+    ):
+        made = replace(plan(body, "one-pulse").pulses, bounds=Bounds(bound, 0.1 * cost, "N m s", 60.0))
+        assert any(said in text for text in Plan(body, "one-pulse", made).remarks)
 
 
 def test_none_is_free_motion() -> None:

@@ -7,6 +7,7 @@ import io
 import itertools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,24 @@ def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[tra
             assert left.nutation < math.radians(1e-6)
             assert left.momentum_shift <= front.shift + math.radians(1e-6)
             assert point.bounds.rigorous <= point.cost
+
+
+def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: Spacecraft) -> None:
+    """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all others."""
+    fuelled = replace(
+        body,
+        channels=tuple(
+            replace(one, thrusters=tuple(replace(each, isp=220.0, thrust=10.0) for each in one.thrusters))
+            for one in body.channels
+        ),
+    )
+    (front,) = trade.fronts(fuelled, Options(least="impulse"), count=3, shifts=(0.0,))
+    (known,) = trade.fronts(fuelled, Options(), count=3, shifts=(0.0,))
+    assert {point.bounds.unit for point in front.points} == {"N m s"}
+    assert {point.bounds.unit for point in known.points} == {"kg"}
+    assert len(front.points) == len(known.points) >= 2
+    for by_impulse, by_propellant in zip(front.points, known.points, strict=True):  # all thrusters are alike
+        assert by_impulse.cost == pytest.approx(by_propellant.plan.pulses.total_impulse, rel=1e-6)
 
 
 def test_what_is_allowed_more_costs_no_more(found: tuple[trade.Front, ...]) -> None:

@@ -7,6 +7,7 @@ import click
 from nutdamp.cli.common import (
     Aim,
     Quantity,
+    expect_places,
     load,
     plan_or_read,
     quiet_option,
@@ -61,6 +62,7 @@ def command(
     animation.film_format(output)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(output)
     pulses = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet).pulses
 
     from nutdamp import flight

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
+from pathlib import Path
 
 import click
 
@@ -17,6 +19,7 @@ INTERRUPTED = 130
 
 def run(group: click.Group) -> None:
     """Run ``group`` on the arguments of the process and leave with its exit status."""
+    _open_streams()
     try:
         status = group.main(standalone_mode=False)
         sys.stdout.flush()
@@ -30,11 +33,36 @@ def run(group: click.Group) -> None:
         status = INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence_stdout()
+        status = UNREADABLE
+    except OSError as wrong:
+        # Files name themselves and become CannotRead or CannotWrite; what has no name is standard output.
+        if wrong.filename is not None:
+            raise
+        _silence_stdout()
+        click.echo(f"nutdamp: cannot write standard output: {wrong.strerror or wrong}", err=True)
         status = UNREADABLE
     except Exception as wrong:
         status = _explain(wrong)
     sys.exit(status if isinstance(status, int) else DONE)
+
+
+def _open_streams() -> None:
+    """See that everything can be printed.
+
+    A process that was started without standard output or error (`>&-`) gets some that lead nowhere; where the screen's
+    encoding lacks a character, such as ω in Latin-1, it becomes a question mark.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - until the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _silence_stdout() -> None:
+    """Let what is still buffered for standard output go nowhere, so that Python does not stumble over it at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _explain(wrong: Exception) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
@@ -103,6 +103,31 @@ def _direction(spacecraft: Spacecraft, angles: tuple[float, float], option: str)
     return spacecraft.direction_in_n(*angles)
 
 
+READ_BY = {
+    "on_time": ("four-pulse", "rhumb-line"),
+    "coarse": ("four-pulse",),
+    "literal": ("two-pulse",),
+    "least": ("optimal",),
+    "free_axis": ("optimal",),
+    "shift": ("optimal",),
+    "cones": ("half-cone",),
+    "per_turn": ("rhumb-line",),
+}
+"""Options of planning that only some schemes read; the others are for all."""
+
+SPINNING = "optimal"
+"""The scheme that can change the spin rate on purpose."""
+
+
+def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
+    """Say what was asked for that none of the schemes ``names`` heeds."""
+    for option, readers in READ_BY.items():
+        if getattr(options, option) != Options._field_defaults[option] and not set(readers) & set(names):
+            remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
+    if body.goal.spin is not None and set(names) - {"none"} and SPINNING not in names:
+        remark(f"the final spin asked for is out of reach here: --scheme {SPINNING} can set it")
+
+
 class Direction(click.ParamType["tuple[float, float]"]):
     """Two angles with a comma between them."""
 
@@ -135,6 +160,10 @@ def scheme_options(command: Command) -> Command:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
         if chosen.on_time is not None and chosen.on_time <= 0.0:
             raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
+        if chosen.shift is not None and chosen.shift < 0.0:
+            raise click.BadParameter("an angle of at least 0 is wanted", param_hint="--shift")
+        if chosen.shift is not None and chosen.free_axis:
+            raise click.UsageError("either --shift, how far H may end from its target, or --free-axis, anywhere")
         aim = Aim(*(parameters.pop(name) for name in Aim._fields))
         return command(*args, options=chosen, aim=aim, **parameters)
 
@@ -208,8 +237,12 @@ def plot_options(command: Command) -> Command:
     return command
 
 
-def expect_picture(path: str) -> None:
-    """Say at once, not after the work, that a picture cannot be made."""
+def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
+    """Say at once, not after the work, that a picture cannot be made; a usage error for a ``figure`` without file."""
+    if path is None:
+        if figure != FIGURES[0]:
+            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
+        return
     from nutdamp.report import figures
 
     figures.ending(path)
@@ -259,6 +292,7 @@ def plan_or_read(
     from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible
 
+    tell_unread(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
         from nutdamp.files.pulses_csv import read_pulses
 
@@ -302,6 +336,15 @@ def one_stdout(**files: str | None) -> bool:
     return bool(taken)
 
 
+def expect_places(*paths: str | None) -> None:
+    """Say at once, not after the work, that a file cannot be written where it is to be."""
+    from nutdamp.files.output import check_place
+
+    for path in paths:
+        if path is not None:
+            check_place(path)
+
+
 def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
     """Write the files asked for, once all of their contents are made."""
     if outputs:
@@ -312,12 +355,18 @@ def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
 
 
 def show(renderable: RenderableType) -> None:
-    """Print a result on standard output."""
-    console().print(renderable)
+    """Print a result on standard output; in a file or a pipe without the blanks that fill up lines."""
+    shown = console()
+    if shown.is_terminal:
+        shown.print(renderable)
+        return
+    with shown.capture() as captured:
+        shown.print(renderable)
+    click.echo("\n".join(line.rstrip() for line in captured.get().split("\n")), nl=False)
 
 
 def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded."""
+    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded, names such as [red] or :rocket: left alone."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=False)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False)

@@ -13,6 +13,7 @@ from nutdamp.cli.boundary import INTERRUPTED, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -103,8 +104,10 @@ def command(
     if resume == "-":
         raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
     silent = one_stdout(csv=csv, json=json, plot=plot)
+    expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot, resume)
 
     require_dispersions(body)
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
@@ -117,8 +120,6 @@ def command(
     if case is not None:
         _one_case(study, case - 1, plan.scheme, json, silent)
         return
-    if plot is not None:
-        expect_picture(plot)
     results = fly(study, samples, threads, csv, resume, quiet)
     outputs: list[tuple[str, str | bytes]] = []
     if json is not None:

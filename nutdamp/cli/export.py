@@ -10,6 +10,7 @@ from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     Quantity,
+    expect_places,
     load,
     plan_or_read,
     quiet_option,
@@ -62,6 +63,7 @@ def command(
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(output)
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     write_all([(output, export_text(plan, form, xml=notation, until=until))])

@@ -17,7 +17,8 @@ def command(form: str, file: str, output: str, schedule: str | None, quiet: bool
     """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN or XML).
 
     The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
-    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque.
+    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for
+    standard input.
     """
     one_stdout(output=output, schedule=schedule)
 

@@ -11,6 +11,7 @@ from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plot_options,
@@ -20,6 +21,7 @@ from nutdamp.cli.common import (
     scheme_options,
     show,
     spacecraft_argument,
+    tell_unread,
     write_all,
 )
 from nutdamp.schemes import PLANNED, Options
@@ -54,18 +56,18 @@ def command(
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output.
+    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
+    example. A FILE of - is standard output.
     """
     names = tuple(dict.fromkeys(names))
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
     silent = one_stdout(csv=csv, json=json, plot=plot)
-    if plot is not None:
-        expect_picture(plot)
+    expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
 
     if robust:
         require_dispersions(body)
@@ -73,8 +75,10 @@ def command(
     from nutdamp.cli.progress import working
     from nutdamp.planning import compare, usual
 
+    names = names or usual(body)
+    tell_unread(names, options, body, remark)
     with working("planning", quiet=quiet):
-        compared = compare(body, names or usual(body), options)
+        compared = compare(body, names, options)
     dispersed = _disperse(compared, options, quiet) if robust else None
     if dispersed is None:
         chosen = compared.recommended

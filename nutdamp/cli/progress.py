@@ -38,7 +38,7 @@ def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> It
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
     """Says ``what`` is done while it is done, where nobody can tell how much is left.
 
-    Only on a terminal, only after a second, and it leaves nothing behind.
+    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
     """
     if quiet or not sys.stderr.isatty():
         yield
@@ -51,15 +51,16 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
         shown.append(Console(stderr=True).status(what))
         shown[0].start()
 
-    patience = threading.Timer(PATIENCE, show)
-    patience.start()
+    timer = threading.Timer(PATIENCE, show)
+    timer.daemon = True
+    timer.start()
     try:
         yield
     finally:
-        patience.cancel()
-        patience.join()
-        if shown:
-            shown[0].stop()
+        timer.cancel()
+        timer.join()
+        for status in shown:
+            status.stop()
 
 
 class _Bar:

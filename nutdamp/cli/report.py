@@ -11,12 +11,14 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    expect_places,
     quiet_option,
     remarks,
     require_dispersions,
     scheme_options,
     source,
     spacecraft_argument,
+    tell_unread,
     write_all,
 )
 from nutdamp.cli.disperse import Count, fly
@@ -68,10 +70,13 @@ def command(
 
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
     body = aim.applied(read_spacecraft(text, name))
+    expect_places(output)
     if disperse is not None:
         require_dispersions(body)
+    schemes = tuple(dict.fromkeys(names)) or usual(body)
+    tell_unread(schemes, options, body, remark)
     with working("planning", quiet=quiet):
-        compared = compare(body, tuple(dict.fromkeys(names)) or usual(body), options)
+        compared = compare(body, schemes, options)
     chosen = compared.recommended
     dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
     with working("writing the page", quiet=quiet):

@@ -8,6 +8,7 @@ from nutdamp.cli.common import (
     Aim,
     Quantity,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -55,8 +56,8 @@ def command(
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, the residuals and the axis track.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output.
+    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
+    example. A FILE of - is standard output, for --schedule standard input.
     """
     if (scheme is None) == (schedule is None):
         raise click.UsageError("name what to propagate: either --scheme or --schedule")
@@ -65,10 +66,10 @@ def command(
     silent = one_stdout(csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
-    if plot is not None:
-        expect_picture(plot)
+    expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
 
     from nutdamp import flight
 

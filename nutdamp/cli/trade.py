@@ -11,6 +11,7 @@ from nutdamp.cli.common import (
     Aim,
     Quantity,
     expect_picture,
+    expect_places,
     load,
     one_stdout,
     quiet_option,
@@ -18,6 +19,7 @@ from nutdamp.cli.common import (
     scheme_options,
     show,
     spacecraft_argument,
+    tell_unread,
     write_all,
 )
 from nutdamp.schemes import Options
@@ -61,15 +63,21 @@ def command(
 ) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
-    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT is a YAML file;
-    without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output.
+    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT and FILE are as
+    for `nutdamp plan`.
     """
+    if options.free_axis or options.shift is not None:
+        raise click.UsageError("--allow says how far H may end from its target; --free-axis and --shift are for plan")
+    if options.least not in ("propellant", "impulse"):
+        raise click.UsageError("time is traded against propellant or impulse: --least is one of these here")
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
     silent = one_stdout(csv=csv, json=json, plot=plot)
-    if plot is not None:
-        expect_picture(plot)
-    body = load(spacecraft, remarks(quiet), aim)
+    expect_picture(plot)
+    remark = remarks(quiet)
+    body = load(spacecraft, remark, aim)
+    expect_places(csv, json, plot)
+    tell_unread(("optimal",), options, body, remark)
 
     from nutdamp import trade
     from nutdamp.cli.progress import progress

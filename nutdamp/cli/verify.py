@@ -9,6 +9,7 @@ import click
 from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
     Aim,
+    expect_places,
     load,
     one_stdout,
     plan_or_read,
@@ -46,13 +47,14 @@ def command(
         raise click.UsageError("name what to verify: either --scheme or --schedule")
     silent = one_stdout(json=json)
     body = load(spacecraft, remarks(quiet), aim)
+    expect_places(json)
 
     from nutdamp.cli.progress import working
     from nutdamp.planning import unrounded
     from nutdamp.verification import verify
 
     plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
-    with working("flying", quiet=quiet):
+    with working("verifying", quiet=quiet):
         found = verify(body, plan.pulses, None if schedule else unrounded(plan))
     if json is not None:
         from nutdamp.files.output import json_text

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from nutdamp.errors import CannotRead, Fault, FaultyFile
+
+STDIN = "-"
+"""File name that stands for standard input."""
+
+
+def read_bytes(path: str, most: int = -1) -> bytes:
+    """What is in a file, at most ``most`` bytes of it; ``-`` is standard input. Raises CannotRead."""
+    try:
+        if path == STDIN:
+            if sys.stdin is None:
+                raise CannotRead(path, "there is no standard input")
+            return sys.stdin.buffer.read(most)
+        with Path(path).open("rb") as stream:
+            return stream.read(most)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CannotRead(path, reason.lower()) from error
 
 
 def read_utf8(path: str) -> str:
     """The text of a file, without a byte order mark; raises CannotRead, or FaultyFile where it is not UTF-8."""
     try:
-        return Path(path).read_bytes().decode("utf-8-sig")
-    except OSError as reason:
-        raise CannotRead(path, reason.strerror or str(reason)) from reason
+        return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise FaultyFile([Fault(path, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason

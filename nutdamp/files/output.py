@@ -52,10 +52,25 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
         raise CannotWrite(path, reason.strerror or str(reason)) from reason
 
 
+def check_place(path: str) -> None:
+    """See before long work that a file has a folder that is there and may be written to. Raises CannotWrite."""
+    if path == STDOUT:
+        return
+    target = Path(path).resolve()
+    if target.is_dir():
+        raise CannotWrite(path, "it is a directory")
+    if not target.parent.is_dir():
+        raise CannotWrite(path, f"{target.parent} is no directory")
+    if not os.access(target if target.exists() else target.parent, os.W_OK):
+        raise CannotWrite(path, "permission denied")
+
+
 def make_folder(path: str) -> None:
     """Make the folder ``path`` unless it is there. Raises CannotWrite."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
+    except FileExistsError as reason:
+        raise CannotWrite(path, "it is there, and no directory") from reason
     except OSError as reason:
         raise CannotWrite(path, reason.strerror or str(reason)) from reason
 

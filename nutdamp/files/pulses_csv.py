@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,8 @@ class _Reader:
         self.warnings: list[str] = []
 
     def read(self, rows: list[tuple[int, list[str]]]) -> tuple[Schedule, list[str]]:
+        if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
+            raise FaultyFile([Fault(self.name, 1, 1, "", "columns are separated by commas, not by semicolons or tabs")])
         for column in ("t_s", "on_time_s", *IMPULSE):
             if column not in self.header:
                 self._fault(1, column, "the column is missing")

@@ -18,7 +18,8 @@ from yaml.parser import Parser
 from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
-from nutdamp.errors import CannotRead, Fault, FaultyFile
+from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.input import read_bytes
 from nutdamp.units import shown
 
 MAX_BYTES = 1 << 20
@@ -100,13 +101,7 @@ def dotted(path: KeyPath) -> str:
 
 def read_text(path: Path) -> str:
     """Text of a file; raises `CannotRead`, or `FaultyFile` where it is too large, binary or not UTF-8."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = getattr(error, "strerror", None) or str(error)
-        raise CannotRead(str(path), reason.lower()) from error
-    return decode(data, str(path))
+    return decode(read_bytes(str(path), MAX_BYTES + 1), str(path))
 
 
 def decode(data: bytes, name: str) -> str:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from nutdamp.flight import Residual
 from nutdamp.physics import cones
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
 from nutdamp.schedule import STEERABLE
@@ -24,7 +24,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     parts.extend(_reasons(compared))
     chosen = compared.recommended
     if chosen is None:
-        parts.append(Text(f"No recommendation: {compared.reason}.", style="bold"))
+        parts += [Text(), Text(f"No recommendation: {compared.reason}.", style="bold")]
         return Group(*parts)
     parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {compared.reason}.")]
     if len(chosen.pulses):
@@ -52,13 +52,14 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     table.add_row(
         "nutation", f"{degrees(spacecraft.nutation)} = body cone {degrees(body)} + space cone {degrees(space)}"
     )
-    turns = "stands still in the body" if math.isinf(spacecraft.body_period) else duration(spacecraft.body_period)
-    table.add_row("nutation period", f"{turns} in the body, {duration(spacecraft.inertial_period)} inertially")
+    still = math.isinf(spacecraft.body_period)
+    in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
+    table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
     alone = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
     floor = "no schedule needs less" if alone else "the floor of a symmetric body left alone"
     table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:
-        turning = quantity(spacecraft.turning_impulse, "N m s")
+        turning = quantity(_turning(spacecraft), "N m s")
         table.add_row("target", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}, the least to turn H")
     if spacecraft.goal.spin is not None:
         final = spacecraft.goal.spin
@@ -67,6 +68,11 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     for name, value in more:
         table.add_row(name, value)
     return table
+
+
+def _turning(spacecraft: Spacecraft) -> float:
+    """C |ω3| β in N m s; 0 where H points at the target already, but for rounding."""
+    return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
 
 
 def _actuators(spacecraft: Spacecraft) -> str:
@@ -105,12 +111,12 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         ("  body cone", lambda plan: _angle(plan.flown, "body_cone")),
         ("  space cone", lambda plan: _angle(plan.flown, "space_cone")),
         ("  shift of H", lambda plan: _angle(plan.flown, "momentum_shift")),
-        ("  spin change", lambda plan: quantity(plan.spin_change, "rad/s")),
+        ("  spin change", lambda plan: quantity(_spin_change(plan), "rad/s")),
     ]
     goal = compared.spacecraft.goal
     if goal.axis is not None:
         rows.insert(-1, ("  off the target", lambda plan: _angle(plan.flown, "axis_error")))
-        turning = compared.spacecraft.turning_impulse
+        turning = _turning(compared.spacecraft)
         rows.insert(
             4, ("  × C|ω3|β", lambda plan: f"{plan.pulses.total_impulse / turning:.4f}" if turning else MISSING)
         )
@@ -128,6 +134,12 @@ def _angle(left: Residual | None, name: str) -> str:
     return MISSING if left is None else degrees(getattr(left, name))
 
 
+def _spin_change(plan: Plan) -> float | None:
+    """ω3 gained, rad/s, without what is rounding."""
+    change = plan.spin_change
+    return change if change is None or abs(change) > 1e-13 * abs(plan.spacecraft.spin) else 0.0
+
+
 def _final_spin(plan: Plan) -> float | None:
     return None if plan.spin_change is None else plan.spacecraft.spin + plan.spin_change
 
@@ -139,7 +151,8 @@ def _speed(plan: Plan) -> float | None:
 def _comparison(compared: Comparison) -> Table:
     """Quantities down, schemes across: so three schemes fit a screen of 80 columns."""
     table = columns("", *(plan.scheme for plan in compared.plans))
-    for name, cell in _rows(compared):
+    rows = _rows(compared) if any(plan.feasible for plan in compared.plans) else _rows(compared)[:1]
+    for name, cell in rows:
         cells = [cell(plan) if plan.feasible else "" for plan in compared.plans]
         if name == "pulses":
             cells = [text or "infeasible" for text in cells]
@@ -148,11 +161,12 @@ def _comparison(compared: Comparison) -> Table:
 
 
 def _reasons(compared: Comparison) -> list[RenderableType]:
-    """Why a scheme is infeasible, and the remarks of the others."""
-    lines: list[RenderableType] = []
+    """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
+    said: dict[str, list[str]] = {}
     for plan in compared.plans:
         for remark in (plan.why,) if plan.why is not None else plan.remarks:
-            lines.append(Text.assemble((f"{plan.scheme}: ", "bold"), remark or ""))
+            said.setdefault(remark, []).append(plan.scheme)
+    lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in said.items()]
     return [Text(), *lines] if lines else []
 
 

@@ -270,3 +270,54 @@ def test_the_sun_by_which_the_pulses_keep_their_phase(run: Run, tmp_path: Path) 
     straight, by_sun = (json.loads(run(*asked, *more).stdout)["plans"][0] for more in ((), ("--sun", "40deg,60deg")))
     assert by_sun["total_impulse_Nms"] > 1.01 * straight["total_impulse_Nms"]
     assert run(*asked, "--sun", "190deg,0deg").returncode == 2
+
+
+# --- awkward spacecraft on the screen ---------------------------------------------------------------------------------
+
+AXIAL = """
+name: Axial
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters: [{name: T1, torque: [0, 0, 5]}]
+"""
+
+AT_REST = """
+name: At rest
+inertia: {A: 100, C: 200}
+state: {spin: 30 rpm, nutation: 0 deg}
+"""
+
+SPHERE = """
+name: Sphere
+inertia: {A: 100, C: 100}
+state: {spin: 30 rpm, nutation: 5 deg}
+"""
+
+
+def test_what_holds_for_all_schemes_is_said_once_and_no_empty_rows_are_shown(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "axial.yaml").write_text(AXIAL)
+    done = run("plan", "axial.yaml", columns=140)
+    assert done.returncode == 3
+    assert done.stdout.count("no channel has a torque more transverse than axial") == 1
+    assert "one-pulse, two-pulse, four-pulse: no channel" in done.stdout
+    assert "nutation left" not in done.stdout
+
+
+def test_without_nutation_the_screen_says_so(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "rest.yaml").write_text(AT_REST)
+    done = run("plan", "rest.yaml")
+    assert done.returncode == 0
+    assert done.stdout.count("there is no nutation to damp") == 1
+
+
+def test_the_nutation_of_a_sphere_has_no_period_in_the_body(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "sphere.yaml").write_text(SPHERE)
+    assert "none in the body, where ω stands still, 1.992 s inertially" in run("plan", "sphere.yaml").stdout
+
+
+def test_a_target_along_h_is_compared_with_no_rounding(run: Run) -> None:
+    done = run("plan", "--target", "0deg,0deg", columns=80)
+    (row,) = [line for line in done.stdout.splitlines() if "× C|ω3|β" in line]
+    assert set(row.split()[2:]) == {"–"}
+    assert "C|ω3|β = 0 N m s" in done.stdout
+    assert "…" not in done.stdout

@@ -46,6 +46,22 @@ def test_only_a_terminal_is_shown_a_bar_and_only_where_it_is_wanted(monkeypatch:
     assert shown(monkeypatch, Terminal(), 0.0, quiet=True) == ""
 
 
+@pytest.mark.parametrize(("patience", "quiet", "told"), [(0.0, False, True), (60.0, False, False), (0.0, True, False)])
+def test_what_takes_long_is_named_while_it_is_done(
+    monkeypatch: pytest.MonkeyPatch, patience: float, quiet: bool, told: bool
+) -> None:
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(module, "PATIENCE", patience)
+    monkeypatch.setenv("TERM", "xterm")
+    with working("planning", quiet=quiet):
+        for _ in range(200):
+            if not told or "planning" in stream.getvalue():
+                break
+            time.sleep(0.05)
+    assert ("planning" in stream.getvalue()) is told
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_run_is_asked_to_stop_and_a_second_ctrl_c_interrupts(number: signal.Signals) -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)

@@ -34,7 +34,7 @@ def form_of(path: str) -> Form:
     """
     ending = ".html" if path == "-" else Path(path).suffix.lower()
     if ending not in FORMS:
-        raise BadRequest(f"--output {path}: the ending says the form; use one of {', '.join(FORMS)}")
+        raise BadRequest(f"--output {path}: the ending says the format; use one of {', '.join(FORMS)}")
     if ending == ".pdf":
         needed_browser(path)
     return FORMS[ending]
