@@ -72,7 +72,7 @@ def command(
     if not timed.smooth:
         remark(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
-            f"{timed.turns * animation.SMOOTH / fps:.0f} --seconds would show it, or an earlier --until"
+            f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
     with progress("filming", timed.frames, quiet=quiet) as step:
         content = animation.film(flight.flown(body, pulses, end), timed, output, width, step)

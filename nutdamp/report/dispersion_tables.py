@@ -90,7 +90,9 @@ def _requirement(results: Results) -> list[RenderableType]:
     verdict = ("met", "green") if results.meets_requirement else ("NOT met", "red")
     probability = f"{100 * results.probability:.6g} %"
     text = Text.assemble(("Requirement ", "bold"), f"({wanted}, by {probability}): ", verdict)
-    text.append(f", by {100 * fraction:.6g} % of the cases (95 % interval {100 * low:.6g} % to {100 * high:.6g} %).")
+    digits = max(2 - math.floor(math.log10(100 * (high - low))), 0)  # what the interval leaves worth telling
+    shares = [f"{100 * share:.{digits}f} %" for share in (fraction, low, high)]
+    text.append(f", by {shares[0]} of the cases (95 % interval {shares[1]} to {shares[2]}).")
     if results.meets_requirement and low < results.probability:
         few = cases_to_show(results.probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -315,3 +316,13 @@ def test_a_finished_study_is_resumed_and_extended(run: Run, body: Path) -> None:
     other = run(*arguments, "--samples", "40000", "--seed", "9")
     assert other.returncode == 2
     assert "another study" in other.stderr
+
+
+def test_shares_are_told_as_finely_as_their_interval_is_wide(run: Run) -> None:
+    told = []
+    for samples in ("200", "20000"):
+        text = " ".join(run("disperse", "--quiet", "--scheme", "two-pulse", "--samples", samples).stdout.split())
+        found = re.search(r"by ([\d.]+) % of the cases \(95 % interval ([\d.]+) % to ([\d.]+) %\)", text)
+        assert found is not None
+        told.append({len(share.partition(".")[2]) for share in found.groups()})
+    assert told == [{1}, {2}]
