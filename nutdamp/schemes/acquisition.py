@@ -22,7 +22,7 @@ from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.steering import Steering
-from nutdamp.schemes.windows import Windows, usable
+from nutdamp.schemes.windows import Windows, for_pairs
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 DEAREST = 3.0
@@ -72,7 +72,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         if torquer.torque is not None or not model_of(spacecraft).exact:
             made = trim.refine(spacecraft, made, chosen=range(len(made)), momentum=True)
         return _checked(spacecraft, made)
-    channels = usable(spacecraft)
+    channels = for_pairs(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     return _fixed(spacecraft, channels)

@@ -12,9 +12,11 @@ from nutdamp.spacecraft import Channel, Spacecraft
 def no_channels(spacecraft: Spacecraft) -> str:
     """No body-fixed channel can damp."""
     if any(channel.damps for channel in spacecraft.channels):
+        ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
+        time = spacecraft.horizon - spacecraft.limits.earliest
         return (
-            "no channel has an on-time that can be commanded: between min_on_time and max_on_time, a multiple of "
-            f"limits.tick, and within the {spacecraft.horizon - spacecraft.limits.earliest:.4g} s there are"
+            f"no channel can be on for as long as its min_on_time asks{ticks}, at most for its max_on_time, within the "
+            f"{time:.4g} s from limits.earliest to limits.horizon"
         )
     if spacecraft.channels:
         return "no channel has a torque more transverse than axial, so none can damp a nutation"
@@ -47,5 +49,5 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         )
     return (
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
-        f"the first does until {min(ends):.4g} s: set limits.horizon beyond that"
+        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that"
     )

@@ -25,7 +25,7 @@ from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
-from nutdamp.schemes.windows import Windows, usable
+from nutdamp.schemes.windows import Windows, for_pairs
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
 
 DEAREST = 2.0
@@ -90,7 +90,7 @@ def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         return _steered(spacecraft, torquer, options)
-    channels = usable(spacecraft)
+    channels = for_pairs(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     return _fixed(spacecraft, channels, options)
@@ -190,7 +190,7 @@ class Candidate(NamedTuple):
 def alternatives(spacecraft: Spacecraft, options: Options) -> Iterator[Schedule]:
     """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer."""
     if spacecraft.torquer is None and (spacecraft.limits.max_pulses or 2) >= 2:
-        for made, _ in _shortlist(spacecraft, usable(spacecraft), options):
+        for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
             yield made
 
 

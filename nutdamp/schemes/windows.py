@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
@@ -96,3 +97,29 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
         return least <= min(channel.max_on_time, time) + SLACK
 
     return [channel for channel in spacecraft.channels if (channel.damps or axial) and commandable(channel)]
+
+
+PAIRED = 24
+"""Directions about which channels are looked at in pairs."""
+
+
+def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
+    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions: pairs are many."""
+    channels = usable(spacecraft)
+    if len(channels) <= PAIRED:
+        return channels
+
+    def dear(channel: Channel) -> tuple[float, float]:
+        flow = channel.mass_flow
+        spent = float(np.linalg.norm(channel.torque)) if flow is None else flow
+        return spent / abs(channel.transverse), -abs(channel.transverse)
+
+    cheapest: dict[int, Channel] = {}
+    for channel in sorted(channels, key=dear):
+        cheapest.setdefault(_about(channel), channel)
+    return [channel for channel in channels if cheapest.get(_about(channel)) is channel]
+
+
+def _about(channel: Channel) -> int:
+    """Number of the direction that a channel is about."""
+    return round(cmath.phase(channel.transverse) / (2.0 * math.pi) * PAIRED) % PAIRED

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
+import numpy as np
 import pytest
-from builders import spinner
+from builders import fan, spinner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp.schemes.windows import SLACK, Windows
+from nutdamp.schemes.windows import SLACK, Windows, for_pairs
 from nutdamp.spacecraft import Limits
 
 
@@ -109,3 +111,12 @@ def test_earliest_start_is_allowed_and_nothing_before_it_is(
         earlier = index * step
         if ready <= earlier < last - 10 * SLACK:
             assert not dark.allows(earlier, on_time, ready)
+
+
+def test_of_very_many_channels_pairs_are_made_of_the_cheapest_about_each_direction() -> None:
+    some = for_pairs(spinner(channels=fan(200, 5.0)))
+    assert len(some) == 24
+    turns = sorted(cmath.phase(channel.transverse) for channel in some)
+    assert max(np.diff(turns)) < 2 * math.tau / 24
+    few = spinner(channels=fan(9, 5.0))
+    assert for_pairs(few) == list(few.channels)
