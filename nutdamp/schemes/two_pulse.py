@@ -20,7 +20,7 @@ import numpy as np
 from nutdamp.errors import Infeasible
 from nutdamp.physics import damping, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options, acquisition, trim
+from nutdamp.schemes import Options, trim
 from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
@@ -58,6 +58,8 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     """
     if spacecraft.goal.axis is not None and not options.literal:
         try:
+            from nutdamp.schemes import acquisition  # here, because few plans have a target
+
             return acquisition.schedule(spacecraft)
         except Infeasible:
             made = _wide(spacecraft)
@@ -302,7 +304,7 @@ def _promising(factor: Vector) -> Vector:
     before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
     better = np.flatnonzero(factor * CLOSE_IN_COST < before)
     cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
-    chosen = np.union1d(better, cheapest)
+    chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
     return np.asarray(chosen[factor[chosen] <= DEAREST])
 
 
