@@ -68,8 +68,7 @@ class Candidate:
     @property
     def cost(self) -> float:
         """Propellant in kg, impulse in N m s where that is not known."""
-        pulses = self.plan.pulses
-        return pulses.total_impulse if pulses.propellant is None else pulses.propellant
+        return self.plan.pulses.cost
 
 
 class Cost(NamedTuple):

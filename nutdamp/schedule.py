@@ -117,6 +117,12 @@ class Schedule:
         return iter(self.pulses)
 
     @property
+    def cost(self) -> float:
+        """Propellant in kg; where that is not known, impulse in N m s."""
+        propellant = self.propellant
+        return self.total_impulse if propellant is None else propellant
+
+    @property
     def end(self) -> float:
         """End of the last pulse, s; 0 without pulses."""
         return max((pulse.end for pulse in self.pulses), default=0.0)

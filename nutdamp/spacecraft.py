@@ -152,6 +152,12 @@ class Channel:
         return math.fsum(known) if len(known) == len(flows) else None
 
     @property
+    def price(self) -> float:
+        """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
+        flow = self.mass_flow
+        return (float(np.linalg.norm(self.torque)) if flow is None else flow) / abs(self.transverse)
+
+    @property
     def force(self) -> Vector | None:
         """Sum of the forces in body axes, (3,) N; None where the direction of one is not known."""
         known = [thruster.force for thruster in self.thrusters if thruster.force is not None]
@@ -394,9 +400,3 @@ class Spacecraft:
     def least_impulse(self) -> float:
         """A |ω0| in N m s: no schedule can remove the nutation with less."""
         return self.inertia.A * self.transverse_rate
-
-
-def on_sphere(right_ascension: float, declination: float) -> Vector:
-    """Unit vector (3,) towards ``right_ascension`` and ``declination``, rad."""
-    across = math.cos(declination)
-    return np.array([across * math.cos(right_ascension), across * math.sin(right_ascension), math.sin(declination)])

@@ -92,7 +92,7 @@ class Aim(NamedTuple):
 
 def _direction(spacecraft: Spacecraft, angles: tuple[float, float], option: str) -> Vector:
     """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
-    from nutdamp.spacecraft import on_sphere
+    from nutdamp.physics.attitude import on_sphere
 
     if spacecraft.attitude is not None:
         if abs(angles[1]) > 0.5 * math.pi:

@@ -44,6 +44,7 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
             with target.open("wb") as stream:
                 yield stream
             return
+        check_place(path)
         with _replacing(target) as stream:
             yield stream
     except BrokenPipeError:
@@ -77,10 +78,6 @@ def make_folder(path: str) -> None:
 
 @contextmanager
 def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    if target.is_dir():
-        raise IsADirectoryError(0, "it is a directory")
-    if target.exists() and not os.access(target, os.W_OK):
-        raise PermissionError(0, "permission denied")
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as stream:

@@ -26,6 +26,7 @@ from nutdamp.files.models import (
 )
 from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
 from nutdamp.files.yaml_tree import read_text
+from nutdamp.physics import attitude
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import (
     Attitude,
@@ -38,7 +39,6 @@ from nutdamp.spacecraft import (
     Spacecraft,
     Steerable,
     Thruster,
-    on_sphere,
 )
 
 __all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spacecraft"]
@@ -177,7 +177,7 @@ def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
     if section.tilt is not None:
         return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
     if section.right_ascension is not None and section.declination is not None:
-        return Goal(on_sphere(section.right_ascension, section.declination), section.spin)
+        return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
     return Goal(spin=section.spin)
 
 

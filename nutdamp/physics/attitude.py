@@ -133,3 +133,9 @@ def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, 
     )
     cosine, sine = math.cos(half_about_axis), math.sin(half_about_axis)
     return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])
+
+
+def on_sphere(right_ascension: float, declination: float) -> Array:
+    """Unit vector (3,) towards ``right_ascension`` and ``declination``, rad."""
+    across = math.cos(declination)
+    return np.array([across * math.cos(right_ascension), across * math.sin(right_ascension), math.sin(declination)])

@@ -12,6 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude
+
 Array = NDArray[np.float64]
 
 
@@ -133,3 +136,32 @@ def _square_to(vector: Array) -> Array:
     other = np.eye(3)[int(np.argmin(np.abs(vector)))]
     square = np.cross(vector, other)
     return np.asarray(square / np.linalg.norm(square))
+
+
+def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, float]:
+    """Unit vector (3,) square to H = ``momentum`` (3,) in which H is to go to ``target`` (3,), and the way, rad.
+
+    Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle χ to the direction
+    of the Sun: tan χ = Δλ/Δψ with ψ = ln tan(γ/2), γ the angle from the Sun and λ the longitude about it; the
+    way is Δγ/cos χ. Raises Infeasible where an axis points to the Sun or away from it.
+    """
+    here = momentum / float(np.linalg.norm(momentum))
+    if sun is None:
+        ahead = target - (target @ here) * here
+        size = float(np.linalg.norm(ahead))
+        angle = float(attitude.angle_between(here, target))
+        return (ahead / size if size > 0.0 else ahead), angle
+    gammas = [float(attitude.angle_between(axis, sun)) for axis in (here, target)]
+    if min(*gammas, *(math.pi - gamma for gamma in gammas)) < 1e-6:
+        raise Infeasible("the spin axis points to the Sun or away from it, at t = 0 or on the target: it has no phase")
+    dark = np.cross(sun, here)  # along growing longitude
+    bright = np.cross(here, dark)
+    longitude = math.atan2(
+        float(target @ dark) / math.sin(gammas[0]), float(target @ np.cross(dark, sun)) / math.sin(gammas[0])
+    )
+    heights = [math.log(math.tan(0.5 * gamma)) for gamma in gammas]
+    chi = math.atan2(longitude, heights[0] - heights[1])
+    away = gammas[0] - gammas[1]
+    way = away / math.cos(chi) if abs(math.cos(chi)) > 1e-6 else math.sin(gammas[0]) * abs(longitude)
+    direction = math.cos(chi) * bright / np.linalg.norm(bright) + math.sin(chi) * dark / np.linalg.norm(dark)
+    return np.asarray(direction), abs(way)

@@ -94,4 +94,7 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
     keeps = name in POINTING and not (name == "optimal" and options.free_axis)
     # The last pulses, which know what the others did on the model, undo what the true motion made of them.
     chosen = tuple(range(-min(len(made), 4), 0)) if keeps else (-1,)
-    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps)
+    spin = name == "optimal" and model.truth.goal.spin is not None
+    if spin:  # and the pulse that gives most to the spin
+        chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin)

@@ -79,7 +79,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
             if best is not None or failed > PATIENCE:
                 break
             continue
-        if best is not None and _cost(made) > (1.0 - WORTH_A_CONE) * _cost(best):
+        if best is not None and made.cost > (1.0 - WORTH_A_CONE) * best.cost:
             break
         best = made
     if best is None:
@@ -93,10 +93,6 @@ def _counts(fewest: int, most: int) -> Iterator[int]:
     while cones <= most:
         yield cones
         cones += 1 + cones // 6
-
-
-def _cost(made: Schedule) -> float:
-    return made.total_impulse if made.propellant is None else made.propellant
 
 
 def _axial(spacecraft: Spacecraft) -> float:

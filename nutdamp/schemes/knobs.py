@@ -8,6 +8,7 @@ from nutdamp import flight
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import influence
 from nutdamp.schemes.influence import Equations
+from nutdamp.schemes.windows import longest_on_time
 from nutdamp.spacecraft import Spacecraft, Vector
 
 
@@ -19,7 +20,6 @@ class Knobs:
         self.channels = [names[pulse.channel] for pulse in made]
         self.made = made
         pace = 1.0 / abs(spacecraft.spin)
-        longest = 0.5 * spacecraft.body_period  # beyond that a pulse works against itself
         ready, bounds = limits.earliest, []
         for pulse in made:
             latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - 1e-9)])
@@ -41,7 +41,7 @@ class Knobs:
             start += [pulse.t, pulse.on_time]
             scale += [pace, min(pulse.on_time, pace)]
             lower += [pulse.t - 0.5 * before, min(channel.min_on_time, pulse.on_time)]
-            most = min(channel.max_on_time, max(longest, pulse.on_time), pulse.on_time + min(before, after))
+            most = min(longest_on_time(spacecraft, channel), pulse.on_time + min(before, after))
             upper += [pulse.t + 0.5 * after, max(most, pulse.on_time)]
         self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
 

@@ -45,8 +45,12 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG
 
 def _preference(walk: Walk) -> tuple[bool, int, float, float]:
     chosen = walk.schedule()
-    cost = chosen.total_impulse if chosen.propellant is None else chosen.propellant
-    return not walk.settled and walk.left > LEFT_OVER * walk.spacecraft.least_impulse, len(chosen), cost, chosen.end
+    return (
+        not walk.settled and walk.left > LEFT_OVER * walk.spacecraft.least_impulse,
+        len(chosen),
+        chosen.cost,
+        chosen.end,
+    )
 
 
 def _fixed(spacecraft: Spacecraft, channel: Channel) -> Walk:

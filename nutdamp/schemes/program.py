@@ -92,14 +92,13 @@ class Columns(NamedTuple):
 class Solution:
     """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
 
-    ``off`` (2,) N m s is how far from the target H is to end, where it may; ``duals`` are the prices of the equations.
+    ``off`` (2,) N m s is how far from the target H is to end, where it may.
     """
 
     burns: tuple[Burn, ...]
     cost: float
     unmet: float
     off: Vector
-    duals: Vector
 
 
 @dataclass(eq=False)
@@ -171,7 +170,6 @@ class Program:
             float(self.costs[chosen.channel[used]] @ on_times),
             float(slack[: 2 * len(duals)].sum()),
             self._off_by(slack[2 * len(duals) :]),
-            duals * self._dearest / self._scale,
         )
 
     def _master(self, columns: Columns) -> tuple[Vector, Vector, Vector]:

@@ -111,35 +111,6 @@ def _flown(journey: Journey, train: _Train, count: int) -> tuple[Schedule, float
     return journey.schedule(train.note(journey, count)), journey.left
 
 
-def course(momentum: Vector, target: Vector, sun: Vector | None) -> tuple[Vector, float]:
-    """Unit vector (3,) square to H = ``momentum`` (3,) in which H is to go to ``target`` (3,), and the way, rad.
-
-    Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle χ to the direction
-    of the Sun: tan χ = Δλ/Δψ with ψ = ln tan(γ/2), γ the angle from the Sun and λ the longitude about it; the
-    way is Δγ/cos χ.
-    """
-    here = momentum / float(np.linalg.norm(momentum))
-    if sun is None:
-        ahead = target - (target @ here) * here
-        size = float(np.linalg.norm(ahead))
-        angle = float(attitude.angle_between(here, target))
-        return (ahead / size if size > 0.0 else ahead), angle
-    gammas = [float(attitude.angle_between(axis, sun)) for axis in (here, target)]
-    if min(*gammas, *(math.pi - gamma for gamma in gammas)) < 1e-6:
-        raise Infeasible("the spin axis points to the Sun or away from it, at t = 0 or on the target: it has no phase")
-    dark = np.cross(sun, here)  # along growing longitude
-    bright = np.cross(here, dark)
-    longitude = math.atan2(
-        float(target @ dark) / math.sin(gammas[0]), float(target @ np.cross(dark, sun)) / math.sin(gammas[0])
-    )
-    heights = [math.log(math.tan(0.5 * gamma)) for gamma in gammas]
-    chi = math.atan2(longitude, heights[0] - heights[1])
-    away = gammas[0] - gammas[1]
-    way = away / math.cos(chi) if abs(math.cos(chi)) > 1e-6 else math.sin(gammas[0]) * abs(longitude)
-    direction = math.cos(chi) * bright / np.linalg.norm(bright) + math.sin(chi) * dark / np.linalg.norm(dark)
-    return np.asarray(direction), abs(way)
-
-
 class _Train:
     """What a train from the motion of ``here`` can do."""
 
@@ -166,7 +137,7 @@ class _Train:
             )
         self.on_time = min(self.longest, TURN_SHARE * self.turn) if asked is None else asked
         self.on_time = max(self.on_time, self.shortest)
-        self.way = course(here.momentum, here.target_axis, self.sun)[1]
+        self.way = pointing.course(here.momentum, here.target_axis, self.sun)[1]
 
     def turns_by(self, on_time: float) -> float:
         """By how much a pulse turns H, N m s."""
@@ -266,14 +237,14 @@ class _Train:
         return found
 
     def _ahead(self, here: Spacecraft) -> Vector:
-        return course(here.momentum, here.target_axis, self.sun)[0]
+        return pointing.course(here.momentum, here.target_axis, self.sun)[0]
 
     def _first(self, channel: Channel) -> float:
         return _aligned(self.here, channel, self._ahead(self.here), self.here.limits.earliest)
 
     def next_pulse(self, here: Spacecraft, remaining: int) -> Pulse | None:
         """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
-        ahead, way = course(here.momentum, here.target_axis, self.sun)
+        ahead, way = pointing.course(here.momentum, here.target_axis, self.sun)
         windows, limits = Windows(here), here.limits
         share = self.h * way / remaining
         on_time = 0.0
@@ -377,15 +348,9 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
 
 def _spread(channels: list[Channel], count: int) -> list[Channel]:
     """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
-
-    def price(channel: Channel) -> tuple[float, float]:
-        flow = channel.mass_flow
-        strength = abs(channel.transverse)
-        return (float(np.linalg.norm(channel.torque)) if flow is None else flow) / strength, -strength
-
     if not channels:
         raise Infeasible("once the nutation is taken out no time is left for the turn")
-    chosen = [min(channels, key=price)]
+    chosen = [min(channels, key=lambda one: (one.price, -abs(one.transverse)))]
     while len(chosen) < count:
 
         def apart(channel: Channel) -> float:

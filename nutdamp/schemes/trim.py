@@ -16,7 +16,7 @@ from nutdamp import flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.model import steady_omega
-from nutdamp.schemes.windows import Windows
+from nutdamp.schemes.windows import Windows, longest_on_time
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 CONVERGED = 1e-14
@@ -31,10 +31,12 @@ PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
 
 
-def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
+def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) -> Vector:
     """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
 
-    All four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
+    ``spin`` adds a fifth, by how much of itself the final spin asked for is missed.
+
+    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
     flight_ = flight.flown(spacecraft, schedule)
@@ -43,7 +45,9 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     after = attitude.rotate(flight_.settled.quaternion, body)
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= moments[:2] * (steady.real, steady.imag)
-    return np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
+    left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
+    final = spacecraft.goal.spin
+    return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
 
 
 def _across(axis: Vector, vector: Vector) -> Vector:
@@ -54,13 +58,16 @@ def _across(axis: Vector, vector: Vector) -> Vector:
     return np.array([first @ vector, np.cross(axis, first) @ vector])
 
 
-def refine(spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], momentum: bool) -> Schedule:
+def refine(
+    spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], momentum: bool, spin: bool = False
+) -> Schedule:
     """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
-    brought to the target axis (without one, back), not only the nutation taken out.
+    brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the spin to the
+    rate asked for.
     """
-    chosen = [index % len(made) for index in chosen]
+    chosen = sorted({index % len(made) for index in chosen})
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
     knobs = [_Knob(spacecraft, made.pulses[index]) for index in chosen]
     ends = np.cumsum([len(knob.start) for knob in knobs])
@@ -72,7 +79,8 @@ def refine(spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], mom
         )
 
     def left(made: Schedule) -> Vector:
-        return misses(spacecraft, made)[: 4 if momentum else 2]
+        missed = misses(spacecraft, made, spin=spin)
+        return missed if momentum else np.delete(missed, [2, 3])
 
     start, scale, lower, upper = (
         np.concatenate([getattr(knob, name) for knob in knobs]) for name in ("start", "scale", "lower", "upper")
@@ -95,9 +103,7 @@ class _Knob:
             self.start = np.array([pulse.start, pulse.on_time])
             self.scale = np.array([pace, pulse.on_time])
             self.lower = np.array([earliest, self.channel.min_on_time])
-            # Longer than half a nutation period in the body a pulse works against itself.
-            longest = max(min(self.channel.max_on_time, 0.5 * spacecraft.body_period), pulse.on_time)
-            self.upper = np.array([latest, longest])
+            self.upper = np.array([latest, max(longest_on_time(spacecraft, self.channel), pulse.on_time)])
         else:
             self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
             self.scale = np.array([pace, pulse.magnitude, 1.0])

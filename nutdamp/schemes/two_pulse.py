@@ -354,9 +354,8 @@ def _place(
         if delay == 0.0:
             pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
             made = Schedule(pulses)
-            cost = made.total_impulse if made.propellant is None else made.propellant
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return Candidate(short if short > 1e-9 else 0.0, cost, made.end, (one, two), timing, miss, factor)
+            return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
         if a == 0.0:
             first += delay
         else:

@@ -99,6 +99,11 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     return [channel for channel in spacecraft.channels if (channel.damps or axial) and commandable(channel)]
 
 
+def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
+    """Longest useful on-time, s: a torque across the spin axis works against itself after half a nutation period."""
+    return min(channel.max_on_time, 0.5 * spacecraft.body_period if channel.damps else math.inf)
+
+
 PAIRED = 24
 """Directions about which channels are looked at in pairs."""
 
@@ -108,14 +113,8 @@ def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
     channels = usable(spacecraft)
     if len(channels) <= PAIRED:
         return channels
-
-    def dear(channel: Channel) -> tuple[float, float]:
-        flow = channel.mass_flow
-        spent = float(np.linalg.norm(channel.torque)) if flow is None else flow
-        return spent / abs(channel.transverse), -abs(channel.transverse)
-
     cheapest: dict[int, Channel] = {}
-    for channel in sorted(channels, key=dear):
+    for channel in sorted(channels, key=lambda one: (one.price, -abs(one.transverse))):
         cheapest.setdefault(_about(channel), channel)
     return [channel for channel in channels if cheapest.get(_about(channel)) is channel]
 

@@ -14,7 +14,7 @@ from checker import violations
 
 from nutdamp import planning
 from nutdamp.physics import pointing
-from nutdamp.schemes import Options, rhumb_line
+from nutdamp.schemes import Options
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
 
@@ -130,10 +130,10 @@ def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     """Small steps on the course as it is at each point end on the target after the way told at first."""
     rng = np.random.default_rng(seed)
     here, target, sun = (axis / np.linalg.norm(axis) for axis in rng.normal(size=(3, 3)))
-    _, way = rhumb_line.course(here, target, sun)
+    _, way = pointing.course(here, target, sun)
     steps, courses = 4000, []
     for number in range(steps):
-        ahead, left = rhumb_line.course(here, target, sun)
+        ahead, left = pointing.course(here, target, sun)
         assert left == pytest.approx(way * (1 - number / steps), abs=2e-3 * way + 1e-6)
         if left > 0.05 * way:  # its angle to the Sun is the same all the way
             bright = sun - (sun @ here) * here
