@@ -16,17 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics import attitude, rates, rigid
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.rigid import NOTHING, Forcing, Piece
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
-from nutdamp.track import Track, make_track
+from nutdamp.track import Track, make_track, widest
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
     """What remains after the last pulse, rad.
 
-    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``space_cone`` is signed.
+    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
+    (signed) are those of that instant, so that they add up to it.
     ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis.
     """
 
@@ -120,12 +122,9 @@ class Flight:
         body = self.settled.rates * moments
         after = attitude.rotate(self.settled.quaternion, body)
         shift = float(attitude.angle_between(before, after))
-        omega, spin = abs(self.settled.omega), self.settled.spin * self._sense
-        nutation = largest_nutation(self.moments, body, self._sense)
-        body_cone = math.atan2(omega, spin)
-        tilt = math.atan2(math.hypot(body[0], body[1]), self._sense * body[2])
+        left = arc_cones(self.moments, self.settled.rates, self._sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
-        return Residual(nutation, body_cone, tilt - body_cone, shift, error)
+        return Residual(left.nutation, left.body, left.space, shift, error)
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""
@@ -161,7 +160,7 @@ class Flight:
         return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
 
     def around_pulses(self) -> tuple[Track, Track]:
-        """The motion just before and just after each pulse, one row a pulse."""
+        """The motion just before and just after each pulse, one row a pulse; cone angles as in `Residual`."""
         before, after = [], []
         for begins, ends in self.spans:
             first = next(leg for leg in self.legs if leg.end >= begins)
@@ -174,9 +173,9 @@ class Flight:
         t = np.array([time for time, _, _ in states])
         body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
         quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
-        return make_track(
-            self.moments, self.spacecraft.spin, t, body, quaternion, completed + np.arange(len(t), dtype=np.int64)
-        )
+        numbers = completed + np.arange(len(t), dtype=np.int64)
+        made = make_track(self.moments, self.spacecraft.spin, t, body, quaternion, numbers)
+        return widest(made, self.moments, self.spacecraft.spin)
 
     @property
     def _sense(self) -> float:
@@ -221,13 +220,12 @@ class Setting:
 
 
 def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
-    """``true``: the principal moments as they are and |H| kept by dissipation; else the linear, symmetric body."""
-    inertia, disturbances = spacecraft.inertia, spacecraft.disturbances
-    symmetric = (inertia.A, inertia.A, inertia.C)
+    """What is flown: the true principal moments; dissipation keeps |H| where ``true``, else it is the linear law."""
+    disturbances = spacecraft.disturbances
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
     transverse = sum(disturbance.transverse for disturbance in fixed)
     return Setting(
-        moments=inertia.moments if true and not inertia.symmetric else symmetric,
+        moments=spacecraft.inertia.flown_moments,
         constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
         forcing=Forcing(
             turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
@@ -238,11 +236,11 @@ def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
-    """The impulse-sum solution, Magnus 1970 (17), pulse by pulse, with exact attitude arcs between.
+    """The impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
-    Each pulse acts at its centre with its effective impulse (`effective_impulses`); the body is the equivalent
-    symmetric one. Disturbances and dissipation (by its linear law) act between the pulses. The last leg reaches at
-    least to ``until`` s.
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
+    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation (by its
+    linear law) act between the pulses. The last leg reaches at least to ``until`` s.
     """
     setting, state = make_setting(spacecraft, true=False), spacecraft.initial
     legs: list[Leg] = []
@@ -259,14 +257,17 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
 
 
 def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
-    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`."""
+    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`.
+
+    With I1 ≠ I2 by the rate of a small nutation, which turns on an ellipse: exact for small angles.
+    """
     inertia, spin = spacecraft.inertia, spacecraft.spin
     drift = spacecraft.spin_drift
     impulses = np.empty(len(schedule), dtype=complex)
     for index, pulse in enumerate(schedule):
         axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
         factor = rates.width_factor(
-            inertia.a,
+            inertia.body_rate,
             spin + drift * pulse.start,
             axial_torque / inertia.C,
             pulse.on_time,
@@ -311,14 +312,3 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
-
-
-def largest_nutation(moments: tuple[float, float, float], momentum: Vector, sense: float) -> float:
-    """Largest angle in rad between H and the spin axis on the torque-free motion through ``momentum`` (body axes)."""
-    if moments[0] == moments[1]:
-        return math.atan2(math.hypot(momentum[0], momentum[1]), sense * float(momentum[2]))
-    from nutdamp.physics import triaxial  # a body of three moments needs it, and few flights are of one
-
-    least, largest = triaxial.polhode_extremes(moments, momentum / np.asarray(moments))
-    # The extremes count from the end of the axis about which the body spins now, which may have been reversed.
-    return largest if sense * momentum[2] >= 0.0 else math.pi - least

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.actuators import Channel as Channel
+from nutdamp.actuators import Steerable as Steerable
+from nutdamp.actuators import Thruster as Thruster
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
+from nutdamp.physics.arc_cones import arc_cones
+from nutdamp.physics.cones import Cones
 from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
-
-STANDARD_GRAVITY = 9.80665
-"""m/s², exact by definition (3rd CGPM, 1901); turns a specific impulse in seconds into m/s."""
 
 SYMMETRY_TOLERANCE = 1e-12
 """Transverse moments that differ by less, relatively, count as equal: the rounding of an eigensolver."""
@@ -51,6 +54,16 @@ class Inertia:
         return inertia.ratio(self.A, self.C)
 
     @property
+    def body_rate(self) -> float:
+        """Rate at which a small nutation turns in the body, over ω3: ``a`` where I1 = I2."""
+        first, second, third = self.moments
+        if self.symmetric or (first - third) * (second - third) <= 0.0:
+            return self.a
+        from nutdamp.physics import triaxial  # few bodies need it
+
+        return triaxial.body_nutation_rate(self.moments, 1.0)
+
+    @property
     def shape(self) -> str:
         """``prolate``, ``oblate`` or ``sphere``."""
         return inertia.shape(self.A, self.C)
@@ -60,6 +73,11 @@ class Inertia:
         """Whether I1 = I2, so that the closed forms hold exactly."""
         first, second, _ = self.moments
         return abs(first - second) <= SYMMETRY_TOLERANCE * max(first, second)
+
+    @property
+    def flown_moments(self) -> tuple[float, float, float]:
+        """(I1, I2, I3) with I1 = I2 to the last digit where they differ by rounding only, so that closed forms hold."""
+        return (self.A, self.A, self.C) if self.symmetric else self.moments
 
     @property
     def tensor(self) -> Vector:
@@ -80,107 +98,6 @@ class Inertia:
         if self.aligned:
             return rates, quaternion
         return rates @ self.axes.T, attitude.multiply(quaternion, attitude.from_matrix(self.axes.T))
-
-
-@dataclass(frozen=True, slots=True)
-class Thruster:
-    """One thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
-
-    ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
-    """
-
-    name: str
-    torque: Vector
-    force: Vector | None = None
-    thrust: float | None = None
-    isp: float | None = None
-    min_on_time: float = 0.0
-    max_on_time: float = math.inf
-    position: Vector | None = None
-
-    @property
-    def mass_flow(self) -> float | None:
-        """Propellant flow in kg/s; None where thrust or specific impulse is not known."""
-        if self.thrust is None or self.isp is None:
-            return None
-        return self.thrust / (self.isp * STANDARD_GRAVITY)
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """Thrusters that fire together, as one body-fixed torque."""
-
-    name: str
-    thrusters: tuple[Thruster, ...]
-
-    @property
-    def torque(self) -> Vector:
-        """Sum of the torques, (3,) N m."""
-        return np.asarray(sum(thruster.torque for thruster in self.thrusters), dtype=np.float64)
-
-    @property
-    def transverse(self) -> complex:
-        """M1 + i M2 in N m."""
-        torque = self.torque
-        return complex(torque[0], torque[1])
-
-    @property
-    def axial(self) -> float:
-        """M3 in N m, which changes the spin."""
-        return float(self.torque[2])
-
-    @property
-    def damps(self) -> bool:
-        """Whether the torque is more transverse than axial; thrusters for the spin are left alone."""
-        return abs(self.transverse) > abs(self.axial)
-
-    @property
-    def min_on_time(self) -> float:
-        """Largest of the thrusters' minima, s."""
-        return max(thruster.min_on_time for thruster in self.thrusters)
-
-    @property
-    def max_on_time(self) -> float:
-        """Smallest of the thrusters' maxima, s."""
-        return min(thruster.max_on_time for thruster in self.thrusters)
-
-    @property
-    def mass_flow(self) -> float | None:
-        """Propellant flow of all thrusters in kg/s; None where one of them is not known."""
-        flows = [thruster.mass_flow for thruster in self.thrusters]
-        known = [flow for flow in flows if flow is not None]
-        return math.fsum(known) if len(known) == len(flows) else None
-
-    @property
-    def price(self) -> float:
-        """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
-        flow = self.mass_flow
-        return (float(np.linalg.norm(self.torque)) if flow is None else flow) / abs(self.transverse)
-
-    @property
-    def force(self) -> Vector | None:
-        """Sum of the forces in body axes, (3,) N; None where the direction of one is not known."""
-        known = [thruster.force for thruster in self.thrusters if thruster.force is not None]
-        return np.sum(known, axis=0) if len(known) == len(self.thrusters) else None
-
-
-@dataclass(frozen=True, slots=True)
-class Steerable:
-    """Magnus' actuator: a torque about any transverse axis, body-fixed during one pulse.
-
-    ``torque`` in N m; None is an ideal impulse of no width.
-    """
-
-    torque: float | None = None
-    isp: float | None = None
-    lever_arm: float | None = None
-
-    @property
-    def propellant_per_impulse(self) -> float | None:
-        """kg for each N m s; None where specific impulse or lever arm is not known."""
-        if self.isp is None or self.lever_arm is None:
-            return None
-        return 1.0 / (self.lever_arm * self.isp * STANDARD_GRAVITY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +240,7 @@ class Spacecraft:
         """
         if self.limits.horizon is not None:
             return self.limits.horizon
-        body, inertial = self.body_period, self.inertial_period
+        body, inertial = cones.body_period(self.inertia.A, self.inertia.C, self.spin), self.inertial_period
         return 20.0 * (max(body, inertial) if math.isfinite(body) else inertial)
 
     @property
@@ -371,10 +288,20 @@ class Spacecraft:
         in_body = attitude.matrix(body_to_n).T @ in_n
         return attitude.rotate(self.initial.quaternion, in_body)
 
+    @cached_property
+    def widest(self) -> Cones:
+        """The cone angles of the free motion from t = 0, where its nutation is largest; with I1 = I2 it stays so."""
+        return arc_cones(self.inertia.flown_moments, self.omega0, math.copysign(1.0, self.spin))
+
     @property
     def nutation(self) -> float:
-        """Nutation angle θ at t = 0, rad, Magnus (19)."""
-        return float(cones.nutation_angle(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin))
+        """Nutation angle θ of the free motion from t = 0, rad, Magnus (19); its largest where I1 ≠ I2."""
+        return self.widest.nutation
+
+    @property
+    def tilt(self) -> float:
+        """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2, else equal."""
+        return cones.momentary(self.inertia.flown_moments, self.omega0, math.copysign(1.0, self.spin)).nutation
 
     @property
     def transverse_rate(self) -> float:
@@ -388,8 +315,9 @@ class Spacecraft:
 
     @property
     def body_period(self) -> float:
-        """Nutation period seen in the body, Magnus (12), s; infinite for a sphere."""
-        return cones.body_period(self.inertia.A, self.inertia.C, self.spin)
+        """Period of a small nutation seen in the body, Magnus (12), s; infinite for a sphere."""
+        rate = abs(self.inertia.body_rate * self.spin)
+        return 2 * math.pi / rate if rate > 0.0 else math.inf
 
     @property
     def inertial_period(self) -> float:

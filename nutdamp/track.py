@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics import attitude
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.spacecraft import Inertia
 
 Array = NDArray[np.float64]
@@ -47,7 +48,8 @@ def make_track(
 ) -> Track:
     """Everything that follows from rates (n, 3) and attitude (n, 4) for a body with principal ``moments`` (kg m²).
 
-    The spin axis is the end of body axis 3 about which the body spins at t = 0, by the sign of ``spin0``.
+    The spin axis is the end of body axis 3 about which the body spins at t = 0, by the sign of ``spin0``. The cone
+    angles are those of each moment; with I1 ≠ I2 they swing, see `widest`.
     """
     sense = math.copysign(1.0, spin0)
     momentum = rates * np.asarray(moments)
@@ -64,6 +66,15 @@ def make_track(
         space_cone=nutation - body_cone,
         pulse=pulse,
     )
+
+
+def widest(track: Track, moments: tuple[float, float, float], spin0: float) -> Track:
+    """The track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
+    if moments[0] == moments[1]:
+        return track
+    found = [arc_cones(moments, row, math.copysign(1.0, spin0)) for row in track.rates]
+    nutation, body_cone = np.array(found, dtype=float).reshape(-1, 2).T
+    return replace(track, nutation=nutation, body_cone=body_cone, space_cone=nutation - body_cone)
 
 
 def in_file_axes(track: Track, inertia: Inertia) -> Track:

@@ -11,6 +11,7 @@ from nutdamp import basilisk, flight
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import Flight, Residual
 from nutdamp.physics import attitude, rates
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import trim
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -103,8 +104,8 @@ def _closed_form(
     """Attitude by exact arcs between effective impulses, rates by the impulse sum (17) written out."""
     arcs = flight.by_impulses(spacecraft, schedule, end)
     body, quaternion = _motion(arcs, times)
-    if not spacecraft.disturbances:
-        inertia = spacecraft.inertia
+    inertia = spacecraft.inertia
+    if inertia.symmetric and not spacecraft.disturbances:
         omega, spin = rates.impulse_sum(
             times,
             complex(spacecraft.omega0[0], spacecraft.omega0[1]),
@@ -226,10 +227,8 @@ def _compared(
     before = attitude.rotate(start.quaternion, start.rates * moments)
     after = attitude.rotate(motion[1][last], motion[0][last] * moments)
     shift = float(attitude.angle_between(before, after))
-    nutation = flight.largest_nutation(
-        spacecraft.inertia.moments, motion[0][last] * moments, math.copysign(1.0, spacecraft.spin)
-    )
-    residual = Residual(nutation, math.nan, math.nan, shift, shift)
+    left = arc_cones(spacecraft.inertia.flown_moments, motion[0][last], math.copysign(1.0, spacecraft.spin))
+    residual = Residual(left.nutation, left.body, left.space, shift, shift)
     return _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
 
 

@@ -13,10 +13,11 @@ from builders import channel, cross, events, spinner
 from scipy.integrate import simpson
 
 from nutdamp import planning, schemes
+from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.flight import Residual
 from nutdamp.planning import Plan, broken_limits, compare, plan, recommend
 from nutdamp.schedule import Bounds, Pulse, Schedule, channel_pulse
-from nutdamp.spacecraft import STANDARD_GRAVITY, Channel, Goal, Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.spacecraft import Channel, Goal, Limits, Requirement, Spacecraft, Steerable, Vector
 
 CLASSIC = schemes.CLASSIC
 

@@ -13,6 +13,7 @@ from nutdamp import flight
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dispersion.truth import Model, Triple, Truth, rotated
 from nutdamp.physics import many
+from nutdamp.physics.arc_cones import arc_cones
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def largest_nutation(moments: Array, momentum: Triple, sense: float) -> Array:
 
     ``moments`` (3, n) kg m². What u1 (1/I1 - 1/I3) + u2 (1/I2 - 1/I3) is, u the squared components of H, stays
     (2T - H²/I3), as do the other two sums of its kind: so the components where one of H1, H2 vanishes follow without
-    differences of large numbers. Motions about another axis than the third go one by one, as in `flight`.
+    differences of large numbers. Motions about another axis than the third go one by one, by `arc_cones`.
     """
     u1, u2, u3 = (part * part for part in momentum)
     first, second, third = 1.0 / moments
@@ -83,8 +84,8 @@ def largest_nutation(moments: Array, momentum: Triple, sense: float) -> Array:
     plain &= sense * momentum[2] > 0.0
     for case in np.flatnonzero(~plain):
         first_, second_, third_ = (float(moment) for moment in moments[:, case])
-        body = np.array([part[case] for part in momentum])
-        largest[case] = flight.largest_nutation((first_, second_, third_), body, sense)
+        rates = np.array([part[case] for part in momentum]) / moments[:, case]
+        largest[case] = arc_cones((first_, second_, third_), rates, sense).nutation
     return np.asarray(largest)
 
 

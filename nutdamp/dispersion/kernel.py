@@ -83,7 +83,7 @@ def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...]) -> Ends:
     """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse."""
     A, C = truth.A, truth.C
     a, per_A = 1.0 - C / A, 1.0 / A
-    x, y = A * truth.omega0[0], A * truth.omega0[1]
+    x, y = truth.moments[0] * truth.omega0[0], truth.moments[1] * truth.omega0[1]  # H is the true one, I1 ≠ I2 or not
     spin = truth.omega0[2]
     z = C * spin
     before = (x, y, z)

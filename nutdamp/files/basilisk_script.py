@@ -138,23 +138,25 @@ def main():
     sense = math.copysign(1.0, (PRINCIPAL_AXES.T @ RATES)[2])
     after = momentum()
     shift = math.atan2(np.linalg.norm(np.cross(before, after)), before @ after)
-    print("nutation left ", shown(largest_nutation(left, sense)))
-    print("body cone     ", shown(math.atan2(math.hypot(left[0], left[1]), sense * left[2])))
+    nutation, body_cone = largest_cones(left, sense)
+    print("nutation left ", shown(nutation))
+    print("body cone     ", shown(body_cone))
     print("shift of H    ", shown(shift))
 
 
-def largest_nutation(rates, sense):
-    """Largest angle between H and the spin axis on the torque-free motion that follows."""
+def largest_cones(rates, sense):
+    """Largest angle between H and the spin axis on the torque-free motion that follows, and the body cone then."""
     first, second, third = PRINCIPAL_MOMENTS
     h = PRINCIPAL_MOMENTS * rates
-    transverse = math.hypot(h[0], h[1])
+    square, moment = h[0] ** 2 + h[1] ** 2, first
     if first != second:
         # 2T - H²/I3 and H are constant; the angle is largest where the momentum about one of the two axes is zero.
         excess = h[0] ** 2 * (1 / first - 1 / third) + h[1] ** 2 * (1 / second - 1 / third)
-        crossings = [excess / (1 / moment - 1 / third) for moment in (first, second) if moment != third]
+        crossings = [(excess / (1 / one - 1 / third), one) for one in (first, second) if one != third]
         pick = max if sense * h[2] >= 0.0 else min
-        transverse = math.sqrt(pick([square for square in crossings if square <= h @ h], default=h @ h))
-    return math.atan2(transverse, sense * math.copysign(math.sqrt(h @ h - transverse**2), h[2]))
+        square, moment = pick([one for one in crossings if one[0] <= h @ h], default=(h @ h, first))
+    transverse, axial = math.sqrt(square), sense * math.copysign(math.sqrt(h @ h - square), h[2])
+    return math.atan2(transverse, axial), math.atan2(transverse / moment, axial / third)
 
 
 def to_mrp(q):

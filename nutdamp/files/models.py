@@ -85,7 +85,7 @@ class StateSection(Section):
 
     spin: Rate = Field(description="Spin rate about axis 3, signed, rad/s; not zero.")
     nutation: Nutation = Field(
-        description="Nutation angle between angular momentum and spin axis, rad, from 0 to below 90 deg."
+        description="Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg."
     )
     phase: Angle = Field(default=0.0, description="Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.")
 

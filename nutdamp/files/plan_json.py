@@ -7,7 +7,6 @@ from typing import Any
 
 from nutdamp import __version__
 from nutdamp.flight import Flight, Residual
-from nutdamp.physics import cones
 from nutdamp.planning import Comparison, Plan
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -27,19 +26,20 @@ def comparison_json(compared: Comparison) -> dict[str, Any]:
 def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Derived quantities of a spacecraft at t = 0."""
     inertia = spacecraft.inertia
-    A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
+    found = spacecraft.widest
     return {
         "name": spacecraft.name,
-        "A_kgm2": A,
-        "C_kgm2": C,
+        "A_kgm2": inertia.A,
+        "C_kgm2": inertia.C,
         "a": inertia.a,
         "shape": inertia.shape,
         "moments_kgm2": list(inertia.moments),
         "principal_axes": inertia.axes.T.tolist(),
         "omega0_rad_s": (inertia.axes @ spacecraft.omega0).tolist(),
-        "nutation_deg": math.degrees(spacecraft.nutation),
-        "body_cone_deg": math.degrees(cones.body_cone(omega, spin)),
-        "space_cone_deg": math.degrees(cones.space_cone(A, C, omega, spin)),
+        "nutation_deg": math.degrees(found.nutation),
+        "body_cone_deg": math.degrees(found.body),
+        "space_cone_deg": math.degrees(found.space),
+        "nutation_at_start_deg": math.degrees(spacecraft.tilt),
         "body_nutation_period_s": spacecraft.body_period,
         "inertial_nutation_period_s": spacecraft.inertial_period,
         "target_axis": spacecraft.target_axis.tolist(),

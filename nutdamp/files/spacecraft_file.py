@@ -101,14 +101,19 @@ def _inertia(section: InertiaSection) -> Inertia:
 
 
 def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
-    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = A|ω|/(C|ω3|), Magnus 1970 (19)."""
+    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/(I3|ω3|), Magnus 1970 (19).
+
+    So θ is the angle between H and the spin axis at t = 0, whatever I1 and I2 are.
+    """
     if contents.omega0 is not None:
         rates: Vector = inertia.axes.T @ np.array(contents.omega0)
         return rates
     state = contents.state
     assert state is not None
-    transverse = inertia.C / inertia.A * abs(state.spin) * math.tan(state.nutation)
-    return np.array([transverse * math.cos(state.phase), transverse * math.sin(state.phase), state.spin])
+    first, second, third = inertia.flown_moments
+    way = np.array([math.cos(state.phase), math.sin(state.phase)])
+    moment = first if first == second else math.hypot(first * way[0], second * way[1])
+    return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])
 
 
 def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:

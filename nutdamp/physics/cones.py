@@ -8,12 +8,35 @@ Angles come from components by arctan2: arccos loses everything below 1e-8 rad.
 from __future__ import annotations
 
 import math
-from typing import overload
+from typing import NamedTuple, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+class Cones(NamedTuple):
+    """The cone angles of one instant, rad: ``nutation`` θ and ``body`` cone μ."""
+
+    nutation: float
+    body: float
+
+    @property
+    def space(self) -> float:
+        """Space cone λ = θ - μ, signed: negative for oblate bodies."""
+        return self.nutation - self.body
+
+
+def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> Cones:
+    """The cones of any body now: angles of H and of ω from the spin axis ``sense``·e3, up to π.
+
+    ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
+    """
+    w = np.asarray(rates, dtype=float)
+    first, second, third = (np.asarray(moments, dtype=float) * w).tolist()
+    across, along = math.hypot(w[0], w[1]), sense * float(w[2])
+    return Cones(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
 
 
 @overload

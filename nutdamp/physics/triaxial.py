@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nutdamp.physics import attitude, stability
+from nutdamp.physics import attitude, cones, stability
+from nutdamp.physics.cones import Cones
 
 Array = NDArray[np.float64]
 
@@ -106,20 +107,44 @@ def polhode_extremes(moments: ArrayLike, rates0: ArrayLike) -> tuple[float, floa
     For motion about axis 3 they come where ω_b = 0 and where ω_a = 0. Motion that goes about another axis turns axis
     3 over and back: the largest angle is then π less the least. On the separatrix the largest is a bound, π/2.
     """
+    least, largest = _extreme_cones(moments, rates0)
+    return least.nutation, largest.nutation
+
+
+def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
+    """The cone angles at the instant of the motion through ``rates0`` at which the nutation angle is largest.
+
+    The spin axis is ``sense``·e3, so that angles above 90 deg stand for a spin that has been reversed.
+    """
+    least, largest = _extreme_cones(moments, rates0)
+    # The extremes count from the end of the axis about which the body spins now, which need not be that one.
+    reversed_ = sense * float(np.asarray(rates0, dtype=float)[2]) < 0.0
+    return _of_other_end(least) if reversed_ else largest
+
+
+def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]:
+    """The cones at the least and at the largest nutation angle."""
     polhode = _polhode(moments, rates0)
     inertia, (a, b, c) = polhode.moments, polhode.axes
     if polhode.pace == 0.0:
-        momentum = np.abs(inertia * polhode.rates)
-        now = math.atan2(math.hypot(momentum[0], momentum[1]), momentum[2])
+        now = cones.momentary(inertia, np.abs(polhode.rates), 1.0)
         return now, now
     d_ca, d_cb = abs(inertia[c] - inertia[a]), abs(inertia[c] - inertia[b])
     # Components of H at the two crossings; P and Q hold at both.
-    c_at_b, a_at_b = inertia[c] * polhode.largest, math.sqrt(inertia[a] * polhode.about_c / d_ca)
-    c_at_a, b_at_a = math.sqrt(inertia[c] * polhode.balance / d_cb), math.sqrt(inertia[b] * polhode.about_c / d_cb)
+    at_b, at_a = np.zeros(3), np.zeros(3)
+    at_b[c], at_b[a] = inertia[c] * polhode.largest, math.sqrt(inertia[a] * polhode.about_c / d_ca)
+    at_a[c] = math.sqrt(inertia[c] * polhode.balance / d_cb)
+    at_a[b] = math.sqrt(inertia[b] * polhode.about_c / d_cb)
+    crossing_b, crossing_a = (cones.momentary(inertia, momentum / inertia, 1.0) for momentum in (at_b, at_a))
     if c == 2:
-        return math.atan2(a_at_b, c_at_b), math.atan2(b_at_a, c_at_a)
-    least = math.atan2(c_at_b, a_at_b) if a == 2 else math.atan2(c_at_a, b_at_a)
-    return least, math.pi - least
+        return crossing_b, crossing_a
+    least = crossing_b if a == 2 else crossing_a
+    return least, _of_other_end(least)
+
+
+def _of_other_end(found: Cones) -> Cones:
+    """The same instant seen from the other end of axis 3."""
+    return Cones(math.pi - found.nutation, math.pi - found.body)
 
 
 class _Polhode(NamedTuple):

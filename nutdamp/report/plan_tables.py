@@ -10,7 +10,6 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.flight import Residual
-from nutdamp.physics import cones
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
@@ -40,18 +39,17 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
-    A, C, omega, spin = inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin
-    body, space = cones.body_cone(omega, spin), cones.space_cone(A, C, omega, spin)
+    spin, found = spacecraft.spin, spacecraft.widest
     table = facts()
-    moments = f"A = {quantity(A, 'kg m²')}, C = {quantity(C, 'kg m²')}"
+    moments = f"A = {quantity(inertia.A, 'kg m²')}, C = {quantity(inertia.C, 'kg m²')}"
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
     if not inertia.symmetric:
         first, second, _ = inertia.moments
         table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on a symmetric body alike")
     table.add_row("spin", f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})")
-    table.add_row(
-        "nutation", f"{degrees(spacecraft.nutation)} = body cone {degrees(body)} + space cone {degrees(space)}"
-    )
+    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
+    cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
+    table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import messages
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 from nutdamp import planning
 from nutdamp.errors import BadRequest
 from nutdamp.files.exchange import export_text
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.planning import Plan
 from nutdamp.report.text import degrees
 from nutdamp.schedule import Pulse, Schedule
@@ -110,3 +112,20 @@ def test_dissipation_is_refused() -> None:
     plan = messages.planned("prolate")
     with pytest.raises(BadRequest, match="leave dissipation out"):
         export_text(replace(plan, spacecraft=replace(plan.spacecraft, dissipation=600.0)), "basilisk")
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize("moments", [(100.0, 130.0, 180.0), (130.0, 100.0, 80.0), (120.0, 120.0, 80.0)])
+def test_the_cones_that_the_script_prints_are_those_of_the_residual(
+    moments: tuple[float, float, float], sense: float
+) -> None:
+    """Without Basilisk: the function alone, as it stands in the script."""
+    script = export_text(planning.plan(messages.spacecraft("prolate"), "one-pulse"), "basilisk")
+    wanted: list[ast.stmt] = [
+        node for node in ast.parse(script).body if isinstance(node, ast.FunctionDef) and node.name == "largest_cones"
+    ]
+    names: dict[str, Any] = {"math": math, "PRINCIPAL_MOMENTS": np.array(moments)}
+    exec(compile(ast.Module(wanted, []), "fly.py", "exec"), names)
+    for rates in ([0.4, 0.1, 2.0], [0.1, -0.4, -2.0], [1e-6, 1e-7, 2.0]):
+        expected = arc_cones(moments, rates, sense)
+        assert names["largest_cones"](np.array(rates), sense) == pytest.approx(tuple(expected), rel=1e-9)

@@ -43,10 +43,12 @@ def title(flight: Flight) -> str:
     """What every sheet is headed with."""
     count = len(flight.schedule)
     start, left = math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
+    swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
     if not count:
-        return f"{short_name(flight)}: nutation {start:.3g}°, no pulse"
+        return f"{short_name(flight)}: nutation {swings}{start:.3g}°, no pulse"
     kept = f"{left:.3g}°" if left > 1e-6 else "0°"
-    return f"{short_name(flight)}: nutation {start:.3g}° → {kept} by {'1 pulse' if count == 1 else f'{count} pulses'}"
+    pulses = "1 pulse" if count == 1 else f"{count} pulses"
+    return f"{short_name(flight)}: nutation {swings}{start:.3g}° → {kept} by {pulses}"
 
 
 def short_name(flight: Flight) -> str:
