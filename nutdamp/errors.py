@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 
 class NutdampError(Exception):
-    """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback."""
+    """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback.
+
+    What an error was made of is in ``args``, so that it can be pickled, as passing it between processes needs.
+    """
 
 
 class Fault(NamedTuple):
@@ -32,7 +35,10 @@ class FaultyFile(NutdampError):
 
     def __init__(self, faults: list[Fault]) -> None:
         self.faults = sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
-        super().__init__("\n".join(str(fault) for fault in self.faults))
+        super().__init__(self.faults)
+
+    def __str__(self) -> str:
+        return "\n".join(str(fault) for fault in self.faults)
 
 
 class BadRequest(NutdampError):
@@ -44,7 +50,10 @@ class CannotRead(NutdampError):
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
-        super().__init__(f"cannot read {path}: {reason}")
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"cannot read {self.path}: {self.reason}"
 
 
 class CannotWrite(NutdampError):
@@ -52,15 +61,21 @@ class CannotWrite(NutdampError):
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
-        super().__init__(f"cannot write {path}: {reason}")
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"cannot write {self.path}: {self.reason}"
 
 
 class MissingExtra(NutdampError):
     """An optional part of the installation is needed and not there."""
 
     def __init__(self, extra: str, purpose: str) -> None:
-        self.extra = extra
-        super().__init__(f"{purpose} needs the extra '{extra}': pip install 'nutdamp[{extra}]'")
+        self.extra, self.purpose = extra, purpose
+        super().__init__(extra, purpose)
+
+    def __str__(self) -> str:
+        return f"{self.purpose} needs the extra '{self.extra}': pip install 'nutdamp[{self.extra}]'"
 
 
 class Infeasible(NutdampError):
