@@ -6,7 +6,6 @@ import click
 
 from nutdamp.cli.common import (
     Aim,
-    Quantity,
     expect_places,
     load,
     plan_or_read,
@@ -16,6 +15,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
+from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.progress import progress
 from nutdamp.schemes import NAMES, Options
 
@@ -23,11 +23,9 @@ from nutdamp.schemes import NAMES, Options
 @click.command("animate")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to show; default the recommended one.")
-@click.option("--schedule", metavar="FILE", help="Show the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Show the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
-@click.option(
-    "-o", "--output", metavar="FILE", required=True, help="The film: .gif, or .mp4 where ffmpeg is installed."
-)
+@click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
 @click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")

@@ -9,11 +9,12 @@ import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
 from nutdamp.cli.common import load, one_stdout, quiet_option, remarks, show
+from nutdamp.cli.parameters import FILE
 
 
 @click.command("check")
-@click.argument("files", nargs=-1, metavar="[SPACECRAFT]...")
-@click.option("--json", metavar="FILE", help="Write derived quantities and faults.")
+@click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
+@click.option("--json", type=FILE, help="Write derived quantities and faults.")
 @quiet_option
 def command(files: tuple[str, ...], json: str | None, quiet: bool) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""

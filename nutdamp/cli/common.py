@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
+from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
 from nutdamp.schemes import LEAST, Options
 
 if TYPE_CHECKING:
@@ -34,30 +35,8 @@ dispersions:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-spacecraft_argument = click.argument("spacecraft", required=False, metavar="[SPACECRAFT]")
+spacecraft_argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
-
-
-class Quantity(click.ParamType["float"]):
-    """A number in SI or a text with a unit, as in a spacecraft file."""
-
-    name = "quantity"
-
-    def __init__(self, kind: str) -> None:
-        self.kind = kind
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The SI value; a usage error for anything else."""
-        from nutdamp.units import parse
-
-        try:
-            return parse(value, self.kind, bare=True)
-        except ValueError as wrong:
-            self.fail(str(wrong), param, ctx)
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:  # noqa: ARG002 - signature of click
-        """Shown in the help page."""
-        return self.kind.upper()
 
 
 class Aim(NamedTuple):
@@ -126,30 +105,6 @@ def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark
             remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
     if body.goal.spin is not None and set(names) - {"none"} and SPINNING not in names:
         remark(f"the final spin asked for is out of reach here: --scheme {SPINNING} can set it")
-
-
-class Direction(click.ParamType["tuple[float, float]"]):
-    """Two angles with a comma between them."""
-
-    name = "angle,angle"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
-        """Both in rad; a usage error for anything else."""
-        if isinstance(value, tuple):
-            return value
-        parts = str(value).split(",")
-        if len(parts) != 2:
-            self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
-        first, second = (Quantity("angle").convert(part.strip(), param, ctx) for part in parts)
-        return first, second
-
-
-class FinalSpin(Quantity):
-    """A rate, or ``keep``."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The rate in rad/s, or ``keep`` as it stands."""
-        return value if value == "keep" else super().convert(value, param, ctx)
 
 
 def scheme_options(command: Command) -> Command:
@@ -231,7 +186,7 @@ def plot_options(command: Command) -> Command:
         click.option(
             "--figure", type=click.Choice(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."
         ),
-        click.option("--plot", metavar="FILE", help="Draw the motion (.png, .svg, .pdf; needs the extra plot)."),
+        click.option("--plot", type=FILE, help="Draw the motion (.png, .svg, .pdf; needs the extra plot)."),
     ):
         command = option(command)
     return command

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,6 +25,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
+from nutdamp.cli.parameters import FILE, Count
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -34,30 +35,10 @@ SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
 
 
-class Count(click.ParamType["int"]):
-    """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
-
-    name = "count"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """The number; a usage error for anything else."""
-        try:
-            number = float(value)
-        except ValueError:
-            number = 0.0
-        if not (1.0 <= number <= 1e12 and number.is_integer()):
-            self.fail(f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx)
-        return int(number)
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:  # noqa: ARG002 - signature of click
-        """Shown in the help page."""
-        return "N"
-
-
 @click.command("disperse")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to disperse; default the recommended one.")
-@click.option("--schedule", metavar="FILE", help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
 @click.option("--samples", type=Count(), default=100_000, show_default=True, help="Dispersed truths to fly.")
 @click.option(
@@ -69,10 +50,10 @@ class Count(click.ParamType["int"]):
 @click.option(
     "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
 )
-@click.option("--csv", metavar="FILE", help="Write inputs and outcome of every case.")
-@click.option("--json", metavar="FILE", help="Write percentiles, requirement, tolerance budget, worst cases.")
-@click.option("--plot", metavar="FILE", help="Draw histograms and CDFs (.png, .svg, .pdf; needs the extra plot).")
-@click.option("--resume", metavar="FILE", help="Keep what is done in this file, and go on from it if it is there.")
+@click.option("--csv", type=FILE, help="Write inputs and outcome of every case.")
+@click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
+@click.option("--plot", type=FILE, help="Draw histograms and CDFs (.png, .svg, .pdf; needs the extra plot).")
+@click.option("--resume", type=FILE, help="Keep what is done in this file, and go on from it if it is there.")
 @quiet_option
 def command(
     spacecraft: str | None,

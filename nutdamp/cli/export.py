@@ -9,7 +9,6 @@ import click
 from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
-    Quantity,
     expect_places,
     load,
     plan_or_read,
@@ -19,6 +18,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
+from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
 from nutdamp.schemes import NAMES, Options
 
@@ -35,10 +35,10 @@ from nutdamp.schemes import NAMES, Options
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
-@click.option("--schedule", metavar="FILE", help="Export the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
-@click.option("-o", "--output", metavar="FILE", default="-", help="Where to write it; default standard output.")
+@click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
 @quiet_option
 def command(
     spacecraft: str | None,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import click
 
 from nutdamp.cli.common import one_stdout, quiet_option, remarks, write_all
+from nutdamp.cli.parameters import FILE
 
 
 @click.command("import")
 @click.argument("form", type=click.Choice(["apm"]), metavar="apm")
-@click.argument("file")
-@click.option("-o", "--output", metavar="FILE", default="-", help="Spacecraft file to write; default standard output.")
-@click.option("--schedule", metavar="FILE", help="Write the manoeuvres as a schedule for `simulate --schedule`.")
+@click.argument("file", type=FILE)
+@click.option("-o", "--output", type=FILE, default="-", help="Spacecraft file to write; default standard output.")
+@click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
 def command(form: str, file: str, output: str, schedule: str | None, quiet: bool) -> None:  # noqa: ARG001 - one form
     """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN or XML).

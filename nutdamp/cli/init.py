@@ -5,10 +5,11 @@ from __future__ import annotations
 import click
 
 from nutdamp.cli.common import DEFAULT_FILE, quiet_option, remarks
+from nutdamp.cli.parameters import FILE
 
 
 @click.command("init")
-@click.argument("file", default=DEFAULT_FILE, metavar="[FILE]")
+@click.argument("file", type=FILE, default=DEFAULT_FILE, metavar="[FILE]")
 @click.option("--force", is_flag=True, help="Replace a file that is already there.")
 @quiet_option
 def command(file: str, force: bool, quiet: bool) -> None:

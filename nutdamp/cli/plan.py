@@ -24,6 +24,7 @@ from nutdamp.cli.common import (
     tell_unread,
     write_all,
 )
+from nutdamp.cli.parameters import FILE
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
 @click.option(
     "--robust", is_flag=True, help="Pick among the schemes and their variants by what dispersed truths leave (99.7 %)."
 )
-@click.option("--csv", metavar="FILE", help="Write the pulses of the recommended plan, or the one named.")
-@click.option("--json", metavar="FILE", help="Write all plans with their residuals.")
+@click.option("--csv", type=FILE, help="Write the pulses of the recommended plan, or the one named.")
+@click.option("--json", type=FILE, help="Write all plans with their residuals.")
 @plot_options
 @quiet_option
 def command(

@@ -21,7 +21,8 @@ from nutdamp.cli.common import (
     tell_unread,
     write_all,
 )
-from nutdamp.cli.disperse import Count, fly
+from nutdamp.cli.disperse import fly
+from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.progress import working
 from nutdamp.schemes import PLANNED, Options
 
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--output",
-    metavar="FILE",
+    type=FILE,
     default="report.html",
     show_default=True,
     help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",

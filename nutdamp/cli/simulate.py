@@ -6,7 +6,6 @@ import click
 
 from nutdamp.cli.common import (
     Aim,
-    Quantity,
     expect_picture,
     expect_places,
     load,
@@ -20,21 +19,22 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
+from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.schemes import NAMES, Options
 
 
 @click.command("simulate")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
-@click.option("--schedule", metavar="FILE", help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option("--until", type=Quantity("time"), help="End; default last pulse + one inertial period.")
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
 )
-@click.option("--csv", metavar="FILE", help="Write the track.")
-@click.option("--json", metavar="FILE", help="Write pulses, residuals and extremes.")
+@click.option("--csv", type=FILE, help="Write the track.")
+@click.option("--json", type=FILE, help="Write pulses, residuals and extremes.")
 @plot_options
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option

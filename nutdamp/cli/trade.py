@@ -9,7 +9,6 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE
 from nutdamp.cli.common import (
     Aim,
-    Quantity,
     expect_picture,
     expect_places,
     load,
@@ -22,6 +21,7 @@ from nutdamp.cli.common import (
     tell_unread,
     write_all,
 )
+from nutdamp.cli.parameters import FILE, FOLDER, Quantity
 from nutdamp.schemes import Options
 
 
@@ -44,10 +44,10 @@ class Allowance(Quantity):
 )
 @click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
 @scheme_options
-@click.option("--csv", metavar="FILE", help="Write the points.")
-@click.option("--json", metavar="FILE", help="Write the points with their pulses.")
-@click.option("--plot", metavar="FILE", help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
-@click.option("--schedules", metavar="FOLDER", help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@click.option("--csv", type=FILE, help="Write the points.")
+@click.option("--json", type=FILE, help="Write the points with their pulses.")
+@click.option("--plot", type=FILE, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
+@click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
 @quiet_option
 def command(
     spacecraft: str | None,

@@ -20,15 +20,16 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     write_all,
 )
+from nutdamp.cli.parameters import FILE
 from nutdamp.schemes import NAMES, Options
 
 
 @click.command("verify")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to verify; default the recommended one.")
-@click.option("--schedule", metavar="FILE", help="Verify the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
-@click.option("--json", metavar="FILE", help="Write methods, differences and error budget.")
+@click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def command(
     spacecraft: str | None,

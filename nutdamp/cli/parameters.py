@@ -1,0 +1,111 @@
+"""Kinds of parameters that several commands take: files, quantities, directions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    ParamType = click.ParamType
+else:
+
+    class ParamType(click.ParamType):
+        """`click.ParamType`, which takes the type of its values in brackets from click 8.4 on only."""
+
+        def __class_getitem__(cls, _: object) -> type[ParamType]:
+            return cls
+
+
+class FileName(ParamType[str]):
+    """A file name as it stands, which shells complete; whether it can be read or written is seen when it is."""
+
+    name = "file"
+    completed_as = "file"
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - signature of click
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Leaves it to the shell to complete the name."""
+        return [CompletionItem(incomplete, type=self.completed_as)]
+
+
+class FolderName(FileName):
+    """The same for a folder."""
+
+    name = "folder"
+    completed_as = "dir"
+
+
+FILE = FileName()
+FOLDER = FolderName()
+
+
+class Quantity(ParamType[float]):
+    """A number in SI or a text with a unit, as in a spacecraft file."""
+
+    name = "quantity"
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The SI value; a usage error for anything else."""
+        from nutdamp.units import parse
+
+        try:
+            return parse(value, self.kind, bare=True)
+        except ValueError as wrong:
+            self.fail(str(wrong), param, ctx)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
+        """Shown in the help page; click gives a context from 8.2 on."""
+        return self.kind.upper()
+
+
+class FinalSpin(Quantity):
+    """A rate, or ``keep``."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The rate in rad/s, or ``keep`` as it stands."""
+        return value if value == "keep" else super().convert(value, param, ctx)
+
+
+class Direction(ParamType[tuple[float, float]]):
+    """Two angles with a comma between them."""
+
+    name = "angle,angle"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Both in rad; a usage error for anything else."""
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).split(",")
+        if len(parts) != 2:
+            self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
+        first, second = (Quantity("angle").convert(part.strip(), param, ctx) for part in parts)
+        return first, second
+
+
+class Count(ParamType[int]):
+    """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
+
+    name = "count"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; a usage error for anything else."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not (1.0 <= number <= 1e12 and number.is_integer()):
+            self.fail(f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx)
+        return int(number)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
+        """Shown in the help page."""
+        return "N"

@@ -1,0 +1,172 @@
+"""Runs every command of an installed nutdamp once, in a temporary folder, with nothing but the standard library.
+
+    python tests/smoke.py [NUTDAMP]
+
+NUTDAMP is the program to run, by default the one beside this Python. Prints what went wrong and leaves with 1 where an
+exit status is not the one expected, a traceback or a warning is printed, or a file is missing or not of its kind.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+SPACECRAFT = """
+name: Smoke
+mass: 250 kg
+inertia: {tensor: [[120, 0.2, 0], [0.2, 119, 0], [0, 0, 80]]}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}
+thrusters:
+  - {name: +M1, position: [0, 0.3 m, 0.8 m], direction: [0, -1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: -M1, position: [0, -0.3 m, 0.8 m], direction: [0, 1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: +M2, torque: [0, 8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms, max_on_time: 2 s}
+  - {name: -M2, torque: [0, -8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms, max_on_time: 2 s}
+disturbances:
+  - {name: leak, torque: [2 mN m, 0, 0]}
+dispersions:
+  A: {normal: 0.5 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 2 %}
+  timing: {uniform: 5 ms}
+"""
+
+BROKEN = "name: Broken\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 0]\ncolour: red\n"
+
+CALLS = """
+--version
+--help
+init
+init; 1
+check
+check smoke.yaml --json check.json
+check broken.yaml; 2
+schema -o schema.json
+explain
+plan
+plan smoke.yaml --json plan.json --csv pulses.csv --plot plan.png
+plan smoke.yaml --scheme optimal --csv optimal.csv
+plan smoke.yaml --scheme optimal --free-axis --least time
+plan smoke.yaml --target 30deg,80deg --json target.json
+plan --robust --json robust.json; 0 4
+plan --target 10deg,45deg --scheme half-cone
+plan missing.yaml; 1
+plan broken.yaml; 2
+plan --colour red; 2
+plan smoke.yaml --scheme half-cone; 3
+simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.png --show
+simulate smoke.yaml --schedule pulses.csv --flown --plot motion.svg --figure motion
+simulate smoke.yaml --scheme none --until 60s --plot history.pdf --figure history
+trade --points 2 --csv trade.csv --json trade.json --plot trade.png --schedules folder
+disperse smoke.yaml --samples 2000 --csv cases.csv --json disperse.json --plot disperse.png --resume study.npz
+disperse smoke.yaml --samples 3000 --resume study.npz
+disperse smoke.yaml --schedule pulses.csv --samples 2000 --flown
+disperse smoke.yaml --case 7 --json case.json
+verify smoke.yaml --scheme two-pulse --json verify.json
+report smoke.yaml -o report.html
+report -o report.md --disperse 2000; 0 4
+animate smoke.yaml --seconds 0.5 --fps 8 --width 320 -o film.gif
+export smoke.yaml --format apm -o out.apm
+export smoke.yaml --format apm -o out.xml
+export smoke.yaml --format aem --until 5s -o out.aem
+export smoke.yaml --format stk --until 5s -o out.a
+export smoke.yaml --format basilisk -o out.py
+export smoke.yaml --format json -o out.json
+import apm out.apm -o again.yaml --schedule again.csv
+import apm out.xml -o again-xml.yaml
+check again.yaml again-xml.yaml
+""".strip().splitlines()
+"""One call a line; behind a semicolon the exit statuses that are right, where that is not 0."""
+
+BEGINNINGS = {
+    ".png": b"\x89PNG",
+    ".pdf": b"%PDF",
+    ".gif": b"GIF8",
+    ".svg": b"<?xml",
+    ".npz": b"PK",
+    ".html": b"<!doctype",
+}
+"""How a file of a kind begins."""
+
+
+def main() -> int:
+    """Run all; 1 where something is wrong."""
+    program = str(Path(sys.argv[1]).absolute() if sys.argv[1:] else Path(sys.executable).with_name("nutdamp"))
+    with tempfile.TemporaryDirectory() as folder:
+        faults = list(_faults(program, Path(folder)))
+    for fault in faults:
+        print(f"FAILED: {fault}", file=sys.stderr)
+    print(f"smoke test of {program}: {len(CALLS)} calls, {len(faults)} faults")
+    return int(bool(faults))
+
+
+def _faults(program: str, folder: Path) -> Iterator[str]:
+    """What is wrong with each call, and with the files that are there in the end."""
+    (folder / "smoke.yaml").write_text(SPACECRAFT, encoding="utf-8")
+    (folder / "broken.yaml").write_text(BROKEN, encoding="utf-8")
+
+    def run(arguments: str) -> subprocess.CompletedProcess[str]:
+        environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONUTF8": "1"}
+        return subprocess.run(
+            [program, *shlex.split(arguments)],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=600,
+        )
+
+    for line in CALLS:
+        arguments, _, statuses = line.partition("; ")
+        done = run(arguments)
+        if str(done.returncode) not in (statuses or "0").split():
+            yield f"nutdamp {arguments}: exit status {done.returncode}, expected {statuses or 0}\n{done.stderr}"
+        elif re.search(r"Traceback|Warning", done.stderr):
+            yield f"nutdamp {arguments}:\n{done.stderr}"
+        for name in re.findall(r"(?:--json|--csv|--plot|--resume|--schedules|-o) (\S+)", arguments):
+            if done.returncode in (0, 4):
+                yield from _file_faults(folder / name, arguments)
+    yield from _untried(run)
+
+
+def _file_faults(path: Path, arguments: str) -> Iterator[str]:
+    """What is wrong with a file that a call should have written."""
+    if path.is_dir():
+        if not any(path.iterdir()):
+            yield f"nutdamp {arguments}: nothing in {path.name}"
+        return
+    content = path.read_bytes() if path.exists() else b""
+    if not content.lower().startswith(BEGINNINGS.get(path.suffix, b"").lower()) or not content:
+        yield f"nutdamp {arguments}: {path.name} begins with {content[:20]!r}"
+    elif path.suffix == ".json":
+        try:
+            json.loads(content)
+        except ValueError as wrong:
+            yield f"nutdamp {arguments}: {path.name}: {wrong}"
+
+
+def _untried(run: Callable[[str], subprocess.CompletedProcess[str]]) -> Iterator[str]:
+    """Commands that this script does not know, and help pages that fail."""
+    _, _, listed = run("--help").stdout.partition("Commands:\n")
+    names = re.findall(r"^  (\w+) ", listed.partition("\n\n")[0], re.MULTILINE)
+    tried = {line.split()[0].rstrip(";") for line in CALLS}
+    if not names:
+        yield "nutdamp --help lists no commands"
+    for name in names:
+        if name not in tried:
+            yield f"nutdamp {name} is not tried here"
+        done = run(f"{name} --help")
+        if done.returncode != 0 or "Usage:" not in done.stdout:
+            yield f"nutdamp {name} --help: exit status {done.returncode}\n{done.stderr}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
