@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
@@ -360,11 +360,15 @@ class Comparison:
         return _html(comparison_sheet(self.core))
 
 
-def load(path: str | PathLike[str]) -> Spacecraft:
-    """The spacecraft in a file (YAML or JSON); raises CannotRead, or FaultyFile with everything wrong in it."""
+def load(path: str | PathLike[str], *, set: Mapping[str, object] | None = None) -> Spacecraft:  # noqa: A002 - as --set
+    """The spacecraft in a file (YAML or JSON); raises CannotRead, or FaultyFile with everything wrong in it.
+
+    ``set`` changes keys of the file as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
+    """
+    from nutdamp.files.settings import settings_of
     from nutdamp.files.spacecraft_file import load_spacecraft
 
-    return Spacecraft(load_spacecraft(fspath(path)))
+    return Spacecraft(load_spacecraft(fspath(path), settings_of(set or {})))
 
 
 def read(text: str, name: str = "text") -> Spacecraft:

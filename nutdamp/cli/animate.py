@@ -6,6 +6,7 @@ import click
 
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_places,
     load,
     plan_or_read,
@@ -34,7 +35,7 @@ from nutdamp.schemes import NAMES, Options
 )
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     scheme: str | None,
     schedule: str | None,
     options: Options,

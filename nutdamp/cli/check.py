@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
-from nutdamp.cli.common import load, one_stdout, quiet_option, remarks, show
+from nutdamp.cli.common import Input, load, one_stdout, quiet_option, remarks, set_option, show
 from nutdamp.cli.parameters import FILE
+
+if TYPE_CHECKING:
+    from nutdamp.files.settings import Setting
 
 
 @click.command("check")
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
+@set_option
 @click.option("--json", type=FILE, help="Write derived quantities and faults.")
 @quiet_option
-def command(files: tuple[str, ...], json: str | None, quiet: bool) -> None:
+def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, quiet: bool) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, FaultyFile
 
@@ -25,7 +29,7 @@ def command(files: tuple[str, ...], json: str | None, quiet: bool) -> None:
     failures: set[int] = set()
     for name in files or (None,):
         try:
-            spacecraft = load(name, remarks(quiet))
+            spacecraft = load(Input(name, settings), remarks(quiet))
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.files.check_json import failed_json
 

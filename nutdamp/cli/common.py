@@ -15,6 +15,7 @@ from nutdamp.schemes import LEAST, Options
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from nutdamp.files.settings import Setting
     from nutdamp.planning import Plan
     from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -35,8 +36,46 @@ dispersions:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-spacecraft_argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
+
+
+class Input(NamedTuple):
+    """The spacecraft that a command line names: the ``path`` of a file, and what ``--set`` changes in it."""
+
+    path: str | None
+    settings: tuple[Setting, ...] = ()
+
+
+def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
+    if not texts:
+        return ()
+    from nutdamp.files.settings import parse_setting
+
+    try:
+        return tuple(parse_setting(text) for text in texts)
+    except ValueError as wrong:
+        raise click.BadParameter(str(wrong), ctx, param) from None
+
+
+set_option = click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_settings,
+    help="Change a key of the spacecraft file, such as limits.horizon=300s; repeatable.",
+)
+
+
+def spacecraft_argument(command: Command) -> Command:
+    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`Input`) for `load`."""
+
+    @functools.wraps(command)
+    def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
+        return command(*args, spacecraft=Input(spacecraft, settings), **parameters)
+
+    argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
+    return cast(Command, argument(set_option(gathered)))
 
 
 class Aim(NamedTuple):
@@ -203,14 +242,14 @@ def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
     figures.ending(path)
 
 
-def load(path: str | None, remark: Callable[[str], None], aim: Aim | None = None) -> Spacecraft:
+def load(given: Input, remark: Callable[[str], None], aim: Aim | None = None) -> Spacecraft:
     """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example.
 
     ``aim`` takes the place of the goal in the file.
     """
     from nutdamp.files.spacecraft_file import read_spacecraft
 
-    body = read_spacecraft(*source(path, remark))
+    body = read_spacecraft(*source(given.path, remark), given.settings)
     return body if aim is None else aim.applied(body)
 
 

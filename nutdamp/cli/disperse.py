@@ -12,6 +12,7 @@ import click
 from nutdamp.cli.boundary import INTERRUPTED, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_picture,
     expect_places,
     load,
@@ -56,7 +57,7 @@ SAVED_EVERY = 30.0
 @click.option("--resume", type=FILE, help="Keep what is done in this file, and go on from it if it is there.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     scheme: str | None,
     schedule: str | None,
     options: Options,

@@ -9,6 +9,7 @@ import click
 from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_places,
     load,
     plan_or_read,
@@ -41,7 +42,7 @@ from nutdamp.schemes import NAMES, Options
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     form: str,
     xml: bool,
     scheme: str | None,

@@ -10,6 +10,7 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_picture,
     expect_places,
     load,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 @plot_options
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     names: tuple[str, ...],
     options: Options,
     aim: Aim,

@@ -11,6 +11,7 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_places,
     quiet_option,
     remarks,
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 @click.option("--disperse", type=Count(), help="Fly the recommended schedule with so many dispersed truths.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     names: tuple[str, ...],
     options: Options,
     aim: Aim,
@@ -63,14 +64,16 @@ def command(
 
     form = form_of(output)
     remark = remarks(quiet)
-    text, name = source(spacecraft, remark)
+    text, name = source(spacecraft.path, remark)
 
     from nutdamp.files.spacecraft_file import read_spacecraft
+    from nutdamp.files.yaml_tree import dotted
     from nutdamp.planning import compare, usual
     from nutdamp.report.page.content import Repeat, report_page
 
-    repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text)
-    body = aim.applied(read_spacecraft(text, name))
+    set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
+    repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
+    body = aim.applied(read_spacecraft(text, name, spacecraft.settings))
     expect_places(output)
     if disperse is not None:
         require_dispersions(body)

@@ -6,6 +6,7 @@ import click
 
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_picture,
     expect_places,
     load,
@@ -39,7 +40,7 @@ from nutdamp.schemes import NAMES, Options
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     scheme: str | None,
     schedule: str | None,
     options: Options,

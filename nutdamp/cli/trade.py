@@ -9,6 +9,7 @@ import click
 from nutdamp.cli.boundary import INFEASIBLE
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_picture,
     expect_places,
     load,
@@ -50,7 +51,7 @@ class Allowance(Quantity):
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     allow: tuple[float, ...],
     points: int,
     options: Options,

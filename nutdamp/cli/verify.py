@@ -9,6 +9,7 @@ import click
 from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
     Aim,
+    Input,
     expect_places,
     load,
     one_stdout,
@@ -32,7 +33,7 @@ from nutdamp.schemes import NAMES, Options
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def command(
-    spacecraft: str | None,
+    spacecraft: Input,
     scheme: str | None,
     schedule: str | None,
     options: Options,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -19,13 +19,19 @@ from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.facts import Finding
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.rules import findings
+from nutdamp.files.settings import Setting, overlay
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 
 
-def read_contents(text: str, name: str) -> SpacecraftFile:
-    """The checked contents of a spacecraft file; raises `FaultyFile` with all its faults, sorted by place."""
+def read_contents(text: str, name: str, settings: Sequence[Setting] = ()) -> SpacecraftFile:
+    """The checked contents of a spacecraft file with ``settings`` in place of what it says.
+
+    Raises `FaultyFile` with all faults, sorted by place.
+    """
     root, faults = read_tree(text, name)
+    root, unplaced = overlay(root, settings)
+    faults += unplaced
     found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root)]
     try:
         contents = SpacecraftFile.model_validate(root.plain())
@@ -47,23 +53,25 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
         place = root.key_place_of(path[:-1])
     else:
         place = root.place_of(path)
-    return Fault(name, *place, dotted(path), finding.problem)
+    return place.fault(name, dotted(path), finding.problem)
 
 
 def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
     """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
 
-    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too;
-    any other unknown key is dropped. ``named``: the keys may also be names, of entries of the ``model``.
+    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too; any
+    other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
+    names, of entries of the ``model``.
     """
     fields = model.model_fields if model else {}
     named = named and isinstance(node.value, dict) and by_name(node.value)
     if fields and isinstance(node.value, dict) and not named:
         for key in [key for key in node.value if key not in fields]:
             dropped = node.value.pop(key)
-            meant = _meant(key, [field for field in fields if field not in node.value])
+            beside = bool(node.keys[key].setting)
+            meant = _meant(key, [field for field in fields if beside or field not in node.value])
             cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
-            if meant:
+            if meant and meant not in node.value:
                 node.value[meant], node.keys[meant] = dropped, node.keys[key]
             elif ":" in key:
                 cure = "put a space behind the colon"

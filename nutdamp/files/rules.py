@@ -79,8 +79,9 @@ def _names(facts: Facts) -> Iterator[Finding]:
     for path in entries:
         name = facts.text(*path)
         if name is not None and (other := first.setdefault((path[0], name), path)) != path:
-            line = facts.root.place_of(other)[0]
-            yield Finding(path, f"duplicate name; {dotted(other[:2])} has it already (line {line}); take another")
+            place = facts.root.place_of(other)
+            where = place.setting or f"line {place.line}"
+            yield Finding(path, f"duplicate name; {dotted(other[:2])} has it already ({where}); take another")
 
 
 def _inertia(facts: Facts) -> Iterator[Finding]:

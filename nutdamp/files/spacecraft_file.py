@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pkgutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from nutdamp.files.models import (
     json_schema,
 )
 from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
+from nutdamp.files.settings import Setting
 from nutdamp.files.yaml_tree import read_text
 from nutdamp.physics import attitude
 from nutdamp.physics.inertia import principal_axes
@@ -46,17 +48,17 @@ __all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spac
 Vector = NDArray[np.float64]
 
 
-def load_spacecraft(path: str | Path) -> Spacecraft:
+def load_spacecraft(path: str | Path, settings: Sequence[Setting] = ()) -> Spacecraft:
     """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
-    return read_spacecraft(read_text(Path(path)), str(path))
+    return read_spacecraft(read_text(Path(path)), str(path), settings)
 
 
-def read_spacecraft(text: str, name: str) -> Spacecraft:
+def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = ()) -> Spacecraft:
     """The spacecraft in the text of a file; ``name`` stands for the file in messages.
 
-    Raises `FaultyFile` with everything that is wrong in it.
+    ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
     """
-    contents = read_contents(text, name)
+    contents = read_contents(text, name, settings)
     inertia = _inertia(contents.inertia)
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 from yaml.parser import Parser
@@ -27,8 +27,24 @@ MAX_NODES = 10_000
 """Values in a file, those that aliases repeat counted each time."""
 MAX_DEPTH = 32
 
-Place = tuple[int, int]
-"""Line and column, both from 1."""
+
+class Place(NamedTuple):
+    """Line and column of a value, both from 1; 0 where there are none.
+
+    What does not come from the file but is set beside it says so in ``setting``, as messages name it.
+    """
+
+    line: int = 0
+    column: int = 0
+    setting: str = ""
+
+    def __str__(self) -> str:
+        return self.setting or f"line {self.line}, column {self.column}"
+
+    def fault(self, name: str, where: str, problem: str) -> Fault:
+        """A fault here; ``name`` is that of the file."""
+        return Fault(self.setting or name, self.line, self.column, where, problem)
+
 
 KeyPath = tuple[str | int, ...]
 """Keys and list positions that lead from the root to a value."""
@@ -109,7 +125,7 @@ def decode(data: bytes, name: str) -> str:
 
     def fault(position: int, problem: str) -> FaultyFile:
         before = data[:position].decode(errors="replace")
-        return FaultyFile([Fault(name, *_place(before, len(before)), "", problem)])
+        return FaultyFile([_place(before, len(before)).fault(name, "", problem)])
 
     if len(data) > MAX_BYTES:
         raise FaultyFile([Fault(name, 0, 0, "", "larger than 1 MiB; that is no spacecraft file")])
@@ -132,7 +148,20 @@ def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
     Raises `FaultyFile` where it is not one document with one mapping, of core values only, of sensible size.
     """
     builder = _Builder(text.removeprefix("\ufeff"), name)
-    return builder.document(), builder.faults
+    root = builder.document("a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft")
+    if not isinstance(root.value, dict):
+        problem = f"{shown(root.plain())} stands here; a mapping with name, inertia, … is wanted"
+        raise builder.fatal(root.place, problem)
+    return root, builder.faults
+
+
+def read_value(text: str, name: str) -> tuple[Node, list[Fault]]:
+    """Any one value in a YAML text, such as ``8 deg`` or ``[[10 s, 20 s]]``, and its faults, as `read_tree` gives them.
+
+    Raises `FaultyFile` where it is not one value.
+    """
+    builder = _Builder(text, name)
+    return builder.document("expected a value", "expected one value"), builder.faults
 
 
 class _Events(Reader, Scanner, Parser):
@@ -167,7 +196,7 @@ class _Builder:
 
     def fatal(self, place: Place, problem: str, path: KeyPath = ()) -> FaultyFile:
         """A fault after which reading on makes no sense, together with those found so far."""
-        return FaultyFile([*self.faults, Fault(self.name, *place, dotted(path), problem)])
+        return FaultyFile([*self.faults, place.fault(self.name, dotted(path), problem)])
 
     def next(self) -> yaml.Event:
         """The next event; raises `FaultyFile` where the text is not YAML."""
@@ -176,25 +205,22 @@ class _Builder:
         except yaml.MarkedYAMLError as error:
             raise self.fatal(*_syntax_fault(error)) from None
         except (ValueError, OverflowError):  # such as "\UFFFFFFFF", which is no character
-            place = (self.events.line + 1, self.events.column + 1)
+            place = Place(self.events.line + 1, self.events.column + 1)
             raise self.fatal(place, "not YAML: a number here is out of range") from None
         return event
 
-    def document(self) -> Node:
-        """The only document of the stream."""
+    def document(self, wanted: str, single: str) -> Node:
+        """The only document of the stream; ``wanted`` and ``single`` say what to do about none and about several."""
         self.next()
         event = self.next()
         if isinstance(event, yaml.StreamEndEvent):
             what = "only comments" if self.text.strip() else "empty"
-            raise self.fatal((1, 1), f"{what}; a spacecraft file is a mapping with name, inertia, …")
+            raise self.fatal(Place(1, 1), f"{what}; {wanted}")
         root = self.node(self.next(), ())
         self.next()
-        if not isinstance(root.value, dict):
-            problem = f"{shown(root.plain())} stands here; a mapping with name, inertia, … is wanted"
-            raise self.fatal(root.place, problem)
         event = self.next()
         if not isinstance(event, yaml.StreamEndEvent):
-            raise self.fatal(_start(event), "a second document begins; one file holds one spacecraft")
+            raise self.fatal(_start(event), f"a second document begins; {single}")
         return root
 
     def node(self, event: yaml.Event, path: KeyPath) -> Node:
@@ -259,9 +285,8 @@ class _Builder:
                 self.anchors[key.anchor] = Node(text, place)
             value = self.node(self.next(), (*path, text))
             if text in values:
-                line, column = keys[text]
-                problem = f"duplicate key; it stands already at line {line}, column {column}; remove one of them"
-                self.faults.append(Fault(self.name, *place, dotted((*path, text)), problem))
+                problem = f"duplicate key; it stands already at {keys[text]}; remove one of them"
+                self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place
         return Node(values, _start(event), keys, 1 + sum(node.size for node in values.values()))
@@ -361,9 +386,9 @@ def _start(event: yaml.Event) -> Place:
 
 def _mark_place(mark: Any) -> Place:
     """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
-    return (0, 0) if mark is None else (mark.line + 1, mark.column + 1)
+    return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
 
 
 def _place(text: str, position: int) -> Place:
     before = text[:position]
-    return before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1
+    return Place(before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)

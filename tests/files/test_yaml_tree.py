@@ -8,7 +8,17 @@ from pathlib import Path
 import pytest
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.yaml_tree import MAX_BYTES, MAX_DEPTH, MAX_NODES, decode, dotted, read_text, read_tree, resolve
+from nutdamp.files.yaml_tree import (
+    MAX_BYTES,
+    MAX_DEPTH,
+    MAX_NODES,
+    Place,
+    decode,
+    dotted,
+    read_text,
+    read_tree,
+    resolve,
+)
 
 
 def plain(text: str) -> object:
@@ -81,19 +91,19 @@ def test_tabs_that_do_not_indent_are_space() -> None:
 
 def test_places_count_from_one() -> None:
     root, _ = read_tree("# c\na:\n  b: [1, {x: 2}]\n", "f.yaml")
-    assert root.key_place_of(("a",)) == (2, 1)
-    assert root.place_of(("a", "b")) == (3, 6)
-    assert root.place_of(("a", "b", 1, "x")) == (3, 14)
-    assert root.key_place_of(("a", "b", 1, "x")) == (3, 11)
-    assert root.key_place_of(("a", "b", 0)) == (3, 7)
-    assert root.place_of(("a", "nowhere", 3)) == (3, 3)
-    assert root.key_place_of(()) == (2, 1)
+    assert root.key_place_of(("a",)) == Place(2, 1)
+    assert root.place_of(("a", "b")) == Place(3, 6)
+    assert root.place_of(("a", "b", 1, "x")) == Place(3, 14)
+    assert root.key_place_of(("a", "b", 1, "x")) == Place(3, 11)
+    assert root.key_place_of(("a", "b", 0)) == Place(3, 7)
+    assert root.place_of(("a", "nowhere", 3)) == Place(3, 3)
+    assert root.key_place_of(()) == Place(2, 1)
 
 
 def test_byte_order_mark_and_line_ends_leave_the_places() -> None:
     root, _ = read_tree("\ufeffa: 1\r\nb: 2\r\n", "f.yaml")
     assert root.plain() == {"a": 1, "b": 2}
-    assert root.place_of(("b",)) == (2, 4)
+    assert root.place_of(("b",)) == Place(2, 4)
     assert decode(b"\xef\xbb\xbfa: 1", "f.yaml") == "a: 1"
 
 

@@ -34,11 +34,15 @@ if TYPE_CHECKING:  # few reports disperse
 
 
 class Repeat(NamedTuple):
-    """What it takes to make the page again: the command, and the input file by name and text."""
+    """What it takes to make the page again: the command, and the input file by name and text.
+
+    ``settings``: keys that the command sets in place of what the file says, and their values.
+    """
 
     command: str
     name: str
     text: str
+    settings: tuple[tuple[str, str], ...] = ()
 
 
 def report_page(
@@ -164,6 +168,7 @@ def _dispersion(chosen: Plan, dispersed: Results, *, pictured: bool) -> Section:
 
 
 def _repeat(repeat: Repeat) -> Section:
+    changed = (Facts("Set in place of what the file says", repeat.settings),) if repeat.settings else ()
     return Section(
         "repeat",
         "To repeat it",
@@ -171,6 +176,7 @@ def _repeat(repeat: Repeat) -> Section:
             Listing("Command", repeat.command, "console"),
             Facts("Versions", tuple(_versions())),
             Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"),
+            *changed,
         ),
     )
 
