@@ -110,10 +110,15 @@ class Plan:
             return ()
         gap = 100.0 * (spent / bounds.first_order - 1.0)
         beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: that holds for small angles"
+        proof = (
+            ""
+            if bounds.rigorous is None
+            else f"; no schedule of the channels that leaves as little takes less than "
+            f"{_down(scale * bounds.rigorous):.4g} {unit}"
+        )
         return (
             f"{scale * spent:.4g} {unit}; first-order least within {bounds.within:.4g} s "
-            f"{scale * bounds.first_order:.4g} {unit} ({beside}); "
-            f"no schedule at all below {scale * bounds.rigorous:.4g} {unit}",
+            f"{scale * bounds.first_order:.4g} {unit} ({beside}){proof}",
         )
 
     def _remainder(self) -> tuple[str, ...]:
@@ -149,6 +154,14 @@ class Plan:
             f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
             f"and would leave {_degrees(without)} if both were their mean",
         )
+
+
+def _down(value: float) -> float:
+    """The largest number of four digits that is not above ``value``: a bound must not be rounded up."""
+    if value <= 0.0 or not math.isfinite(value):
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return math.floor(value / step * (1.0 + 1e-12)) * step
 
 
 def _degrees(angle: float) -> str:
@@ -209,6 +222,8 @@ def known(spacecraft: Spacecraft, options: schemes.Options) -> Spacecraft:
 
 def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes.Options) -> Plan:
     """The plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
+    if spacecraft.disturbances:  # which the scheme need not have known
+        made = made.without_proof
     flown = Plan(spacecraft, scheme, made, options=options)
     left = flown.flown
     broken = broken_limits(spacecraft, made)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -87,14 +87,14 @@ def steerable_pulse(
 
 
 class Bounds(NamedTuple):
-    """Costs that other schedules of the same channels and limits cannot go below, in ``unit`` (kg or N m s).
+    """Costs that other schedules of the channels cannot go below ``within`` so many s, in ``unit`` (kg or N m s).
 
-    ``first_order`` is the optimum of the small-angle program ``within`` so many s; ``rigorous`` holds at any angle for
-    a symmetric body.
+    ``first_order`` is that of the small-angle program. ``rigorous`` holds at any angle for all schedules that leave no
+    more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation, disturbances.
     """
 
     first_order: float
-    rigorous: float
+    rigorous: float | None
     unit: str
     within: float
 
@@ -115,6 +115,11 @@ class Schedule:
 
     def __iter__(self) -> Iterator[Pulse]:
         return iter(self.pulses)
+
+    @property
+    def without_proof(self) -> Schedule:
+        """The same without its rigorous bound: for a motion that the bound was not derived for."""
+        return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
 
     @property
     def cost(self) -> float:

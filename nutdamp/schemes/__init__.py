@@ -87,6 +87,8 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
     from nutdamp.schemes import trim
 
     made = model.translate(made)
+    if not model.exact:
+        made = made.without_proof
     if model.truth.goal.axis is not None and name not in POINTING and made.pulses:
         made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
     if model.exact or options.coarse or options.literal or not made.pulses:

@@ -2,8 +2,8 @@
 
 The linear program of `program` finds the burns, at first with small angles. The schedule is flown, the program's
 equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
-and on-times are polished on it. Two bounds go with the plan: the program's first least cost, of first order, and the
-rigorous one of the nutation alone.
+and on-times are polished on it. Two bounds go with the plan: the program's first least cost, of first order, and a
+rigorous one.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ import numpy as np
 from nutdamp import flight
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Bounds, Schedule
-from nutdamp.schemes import Options, influence
+from nutdamp.schemes import Options, bounds, influence
 from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.bounds import Left
 from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.influence import Equations
 from nutdamp.schemes.polish import polish
@@ -288,21 +289,16 @@ class _Search:
         """The schedule with what any other must cost."""
         body = self.spacecraft
         first = first or self.program().solve()
-        if any(channel.axial for channel in self.channels):  # the spin, and so the phases, may change
-            rigorous = self.cheapest() * body.least_impulse
-        else:
-            nutation = influence.small_angles(body, Equations(shift=False))
-            rigorous = 0.0
-            if np.any(nutation.goal):
-                rigorous = Program(body, self.channels, self.costs, nutation, ideal=True).solve().cost
-            if self.equations.shift and self.options.shift is None:
-                rigorous = max(rigorous, self.cheapest() * body.turning_impulse)
-        return Schedule(made.pulses, made.notes, Bounds(first.cost, min(rigorous, first.cost), self.unit, body.horizon))
+        left = self.leaves(flight.flown(body, made))
+        rigorous = bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
+        return Schedule(made.pulses, made.notes, Bounds(first.cost, rigorous, self.unit, body.horizon))
 
-    def cheapest(self) -> float:
-        """Least cost of one N m s of transverse impulse."""
-        strengths = np.array([abs(channel.transverse) for channel in self.channels])
-        return float(np.min(self.costs[strengths > 0.0] / strengths[strengths > 0.0]))
+    def prices(self) -> dict[str, float]:
+        """Cost per second, in the unit of the bounds, of every channel of which it is known."""
+        flows = {channel.name: channel.mass_flow for channel in self.spacecraft.channels}
+        if self.unit == "kg":
+            return {name: flow for name, flow in flows.items() if flow is not None}
+        return {channel.name: float(np.linalg.norm(channel.torque)) for channel in self.spacecraft.channels}
 
     def price(self, made: Schedule) -> float:
         """What a schedule costs by the program's own prices."""
@@ -311,10 +307,14 @@ class _Search:
 
     def left(self, flown: flight.Flight) -> float:
         """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
+        nutation, off, spin = self.leaves(flown)
+        return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
+
+    def leaves(self, flown: flight.Flight) -> Left:
+        """What a flight leaves of what is asked for."""
         residual, goal = flown.residual, self.spacecraft.goal
-        off = max(residual.axis_error - (self.options.shift or 0.0), 0.0) if self.equations.shift else 0.0
-        spin = 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0)
-        return max(residual.nutation, off, spin)
+        off = residual.axis_error if self.equations.shift else 0.0
+        return Left(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
     def cure(self) -> str:
         """Why the program has no solution, and which limit to relax."""

@@ -76,7 +76,8 @@ def test_flown_schedules_leave_nothing_at_that_cost(
     assert max(made.flown.nutation, made.flown.momentum_shift) < MICRODEGREE
     assert made.pulses.total_impulse / spacecraft.least_impulse == pytest.approx(cost, rel=0.01)
     assert made.pulses.bounds is not None
-    assert made.pulses.bounds.rigorous <= made.pulses.bounds.first_order
+    assert made.pulses.bounds.rigorous is not None
+    assert made.pulses.bounds.rigorous <= made.pulses.bounds.first_order * (1 + 1e-9)
 
 
 def dense(spacecraft: Spacecraft, costs: np.ndarray, points: int) -> float:
@@ -151,6 +152,7 @@ def test_real_thrusters_keep_their_limits_and_leave_nothing(A: float, C: float, 
     assert bounds is not None
     assert made.pulses.propellant is not None
     assert bounds.unit == "kg"
+    assert bounds.rigorous is not None
     assert bounds.rigorous <= made.pulses.propellant
     assert made.pulses.propellant <= bounds.first_order * 1.02
 
@@ -175,7 +177,7 @@ def test_an_impossible_deadline_says_what_to_relax() -> None:
 def test_the_plan_carries_its_proof() -> None:
     spacecraft = spinner(channels=channels(8.0, min_on_time=0.02, max_on_time=2.0))
     remarks = plan(spacecraft, "optimal").remarks
-    assert any("first-order least within" in text and "no schedule at all below" in text for text in remarks)
+    assert any("first-order least within" in text and "leaves as little takes less than" in text for text in remarks)
 
 
 def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent() -> None:
@@ -224,6 +226,7 @@ def flies(seed: int, dearest: float) -> None:
     assert flown.shift < TEN_MICRODEGREE
     assert made.pulses.propellant is not None
     bounds = made.schedule.bounds
+    assert bounds.rigorous is not None
     assert bounds.rigorous <= made.pulses.propellant * (1 + 1e-9)
     assert made.pulses.propellant <= dearest * bounds.first_order
 

@@ -50,9 +50,12 @@ def trade_figure(spacecraft: Spacecraft, found: Sequence[Front]) -> Figure:
                 color=colour, fontsize=style.SMALL,
             )  # fmt: skip
         number += len(front.points)
-    rigorous = [scale_of(point.bounds.unit) * point.bounds.rigorous for front in found for point in front.points]
-    if rigorous:
-        axes.axhline(min(rigorous), color=GREY, linewidth=0.9, linestyle=":", label="no schedule at all below")
+    points = [point for front in found for point in front.points]
+    proved = [point.bounds.rigorous for point in points]
+    if points:
+        if None not in proved:
+            least = min(scale_of(unit) * value for value in proved if value is not None)
+            axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
         axes.set_xscale("log")
         axes.set_xlim(right=spacecraft.horizon)
         axes.margins(y=0.12)
