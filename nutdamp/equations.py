@@ -56,12 +56,11 @@ MAGNUS = (
         "general solution, complex and real",
         f"{_PHYSICS}.forced.stepwise_torque",
         "physics/test_forced.py::test_real_form_9_is_the_complex_one",
-        "also for sampled torques: sampled_torque",
     ),
     Equation(
         "M(11)",
         "constant torque, pole cone",
-        f"{_PHYSICS}.forced.pole_cone",
+        f"{_PHYSICS}.forced.rotating_torques",
         "physics/test_forced.py::test_constant_torque_11_circles_the_centre_of_its_pole_cone",
     ),
     Equation(
@@ -171,14 +170,14 @@ KREISEL = (
     Equation(
         "K(14)",
         "precession, torque fixed in the body",
-        f"{_PHYSICS}.stability.precession_body",
+        f"{_PHYSICS}.forced.steady_response",
         "test_equations.py::test_precession_k14_k15",
         "needs M_z = 0; last line must read (J_z - J_xy)",
     ),
     Equation(
         "K(15)",
         "precession, torque fixed in the despun frame",
-        f"{_PHYSICS}.stability.precession_despun",
+        f"{_PHYSICS}.forced.steady_response",
         "test_equations.py::test_precession_k14_k15",
         "needs M_z = 0; its third component is 0",
     ),

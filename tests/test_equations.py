@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from nutdamp import flight
 from nutdamp.equations import EQUATIONS, Equation
-from nutdamp.physics import attitude, cones, damping, inertia, rates, stability
+from nutdamp.physics import attitude, cones, damping, forced, inertia, rates, stability
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import Options
 from nutdamp.schemes.one_pulse import schedule as one_pulse
@@ -186,8 +186,8 @@ def test_precession_k14_k15() -> None:
     """Started at the steady rate, ω stands still in its frame; flown by DOP853 with the torque of that frame."""
     A, C, spin, torque = 120.0, 80.0, 3.0, 4.0 - 2.0j
     for rate, omega in (
-        (0.0, stability.precession_body(A, C, spin, torque)),
-        (-spin, stability.precession_despun(C, spin, torque)),
+        (0.0, forced.steady_response(A, C, spin, torque)),
+        (-spin, forced.steady_response(A, C, spin, torque, -spin)),
     ):
 
         def slope(t: float, y: np.ndarray, rate: float = rate) -> list[float]:

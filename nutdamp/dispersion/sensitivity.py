@@ -8,17 +8,16 @@ outcome over equally likely intervals of each input (the correlation ratio, Pear
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.inputs import Input
-from nutdamp.dispersion.kernel import ClosedForm, Ends
+from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
-from nutdamp.dispersion.truth import Model, Truth
+from nutdamp.dispersion.truth import Model
 
 Array = NDArray[np.float64]
 
@@ -83,12 +82,6 @@ def first_order(model: Model) -> FirstOrder:
         vectors(model, ClosedForm(model)(model.truth(draws)), out)  # type: ignore[arg-type]
         jacobian = out.imag / steps
     return FirstOrder(inputs, jacobian)
-
-
-def nominal(model: Model, fly: Callable[[Truth], Ends], draws: Draws | None = None) -> tuple[Truth, Ends]:
-    """One case: the estimate itself, or the one with these ``draws``."""
-    truth = model.truth(draws or {})
-    return truth, fly(truth)
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

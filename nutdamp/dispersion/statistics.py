@@ -104,11 +104,6 @@ class Sketch:
             self.counts[lowest : lowest + len(found)] += found
             self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
 
-    def merge(self, other: Sketch) -> None:
-        """Count all that ``other`` has counted."""
-        self.counts += other.counts
-        self.minimum, self.maximum = min(self.minimum, other.minimum), max(self.maximum, other.maximum)
-
     def quantiles(self, probabilities: Array) -> Array:
         """Quantiles to 0.05 %."""
         below = np.cumsum(self.counts)

@@ -56,7 +56,10 @@ def body_cone(omega: float, spin: float) -> float: ...
 @overload
 def body_cone(omega: Array, spin: Array) -> Array: ...
 def body_cone(omega: float | Array, spin: float | Array) -> float | Array:
-    """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|."""
+    """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|.
+
+    The form of (18), for symmetric bodies; flights take their cones from `momentary`.
+    """
     return np.arctan2(omega, np.abs(spin))
 
 
@@ -65,7 +68,7 @@ def space_cone(A: float, C: float, omega: float, spin: float) -> float: ...
 @overload
 def space_cone(A: float, C: float, omega: Array, spin: Array) -> Array: ...
 def space_cone(A: float, C: float, omega: float | Array, spin: float | Array) -> float | Array:
-    """Half-angle λ of the space cone ("Spurkegel") in rad, signed: negative for oblate bodies.
+    """Half-angle λ of the space cone ("Spurkegel") in rad, signed: negative for oblate bodies; the form of (20).
 
     Magnus 1970 (20), whose print has a minus in the denominator and ω1² for |ω|²: with tan(λ + μ) = A|ω|/(C|ω3|) and
     tan μ = |ω|/|ω3| the difference of angles gives tan λ = (A - C)|ω||ω3| / (C ω3² + A|ω|²).

@@ -19,12 +19,6 @@ ComplexArray = NDArray[np.complex128]
 PANEL = 2.0
 """Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
 
-FRESNEL_FROM = 60.0
-"""Phase in rad from which Fresnel functions are cheaper than panels."""
-
-FRESNEL_REACH = 100.0
-"""Largest slope/sqrt(bend) for Fresnel functions: beyond it they differ from 1/2 by too few digits."""
-
 
 @functools.cache
 def _gauss() -> tuple[Array, Array]:
@@ -34,38 +28,13 @@ def _gauss() -> tuple[Array, Array]:
 
 
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
-    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding.
+    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by Gauss-Legendre panels.
 
-    Fresnel's integrals where the phase is long and bent (Bödewadt's solution for constant torques with axial part),
-    Gauss-Legendre panels elsewhere, which include bend -> 0 without cancellation.
+    Bödewadt writes it with Fresnel's integrals, which cancel as bend -> 0.
     """
     slope, bend, length = (np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length))
     # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
     variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
-    fresnel = (variation > FRESNEL_FROM) & (np.square(slope) < FRESNEL_REACH**2 * np.abs(bend))
-    result = np.empty(slope.shape, dtype=complex)
-    if fresnel.any():
-        result[fresnel] = _by_fresnel(slope[fresnel], bend[fresnel], length[fresnel])
-    rest = ~fresnel
-    if rest.any():
-        result[rest] = _by_panels(slope[rest], bend[rest], length[rest], variation[rest])
-    return result
-
-
-def _by_fresnel(slope: Array, bend: Array, length: Array) -> ComplexArray:
-    """Completing the square: bend (s + slope/(2 bend))² - slope²/(4 bend)."""
-    from scipy.special import fresnel  # only where it is needed: loading it takes longer than a plan
-
-    size = np.abs(bend)
-    scale = np.sqrt(0.5 * math.pi / size)
-    offset = 0.5 * slope / bend
-    sine_end, cosine_end = fresnel((length + offset) / scale)
-    sine_start, cosine_start = fresnel(offset / scale)
-    spread = (cosine_end - cosine_start) + 1j * np.sign(bend) * (sine_end - sine_start)
-    return np.asarray(scale * np.exp(-1j * bend * np.square(offset)) * spread)
-
-
-def _by_panels(slope: Array, bend: Array, length: Array, variation: Array) -> ComplexArray:
     counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
     owner = np.repeat(np.arange(len(counts)), counts)
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -83,8 +52,9 @@ def stepwise_torque(
 ) -> tuple[ComplexArray, Array]:
     """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
 
-    ``times`` (n,) s in [edges[0], edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s)
-    begins at edges[0]; ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
+    The form of these equations; schedules fly their pulses by `rates` and `rigid`. ``times`` (n,) s in [edges[0],
+    edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s) begins at edges[0];
+    ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
     """
     edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
     times = np.asarray(times, dtype=float)
@@ -105,39 +75,6 @@ def stepwise_torque(
     spin = spins[step] + spin_rates[step] * since
     alpha = alphas[step] + 0.5 * (spins[step] + spin) * since
     return (sums[step] + gained(step, since)) * np.exp(-1j * a * alpha), spin
-
-
-def sampled_torque(
-    times: Array, omega0: complex, spin0: float, A: float, C: float, torques: Array
-) -> tuple[ComplexArray, Array]:
-    """General solution, Magnus 1970 (8)-(10), for torques sampled at ``times`` and linear in between.
-
-    ``times`` (n,) s ascending, the motion begins at times[0]; ``torques`` (n, 3) N m. Returns ω (n,) and ω3 (n,).
-    """
-    times, torques = np.asarray(times, dtype=float), np.asarray(torques, dtype=float)
-    a = (A - C) / A
-    lengths = np.diff(times)
-    first, last = torques[:-1, 2] / C, torques[1:, 2] / C
-    spins = spin0 + np.concatenate([[0.0], np.cumsum(0.5 * (first + last) * lengths)])
-    turns = (spins[:-1] + (2.0 * first + last) / 6.0 * lengths) * lengths
-    alphas = np.concatenate([[0.0], np.cumsum(turns)])
-    fastest = np.maximum(np.abs(spins[:-1]), np.abs(spins[1:])) + np.maximum(np.abs(first), np.abs(last)) * lengths
-    counts = np.maximum(np.ceil(abs(a) * fastest * lengths / PANEL), 1.0).astype(int)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    width = (lengths / counts)[owner]
-    nodes, weights = _gauss()
-    s = (np.arange(len(owner)) - firsts[owner] + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
-    share = s / lengths[owner][:, None]
-    growth = (last - first)[owner][:, None]
-    alpha = alphas[owner][:, None] + s * (
-        spins[owner][:, None] + s * (0.5 * first[owner][:, None] + growth * share / 6.0)
-    )
-    transverse = torques[:, 0] + 1j * torques[:, 1]
-    torque = transverse[owner][:, None] * (1.0 - share) + transverse[owner + 1][:, None] * share
-    panels = 0.5 * width * ((torque * np.exp(1j * a * alpha)) @ weights) / A
-    sums = omega0 + np.concatenate([[0.0], np.cumsum(np.add.reduceat(panels, firsts))])
-    return sums * np.exp(-1j * a * alphas), spins
 
 
 def rotating_torques(
@@ -163,26 +100,15 @@ def rotating_torques(
 def steady_response(A: float, C: float, spin: float, torque: complex, rate: float = 0.0) -> complex:
     """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
 
-    For r = 0 the permanent rotation Magnus 1970 (13), K(14); for r = -ω3 the forced term of (27), K(15). Infinite at
-    resonance, r = -aω3.
+    For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11) and K(14), (M2 -
+    iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the despun frame is K(15), iM/(Cω3).
+    K(14) and K(15) hold without axial torque: the third component of K(15) is 0, and the last line of K(14) must read
+    M = ω_P × ω_z (J_z - J_xy). Infinite at resonance, r = -aω3, and for r = 0 on a sphere.
     """
     detuning = (A - C) / A * spin + rate
     if detuning == 0.0:
         return complex(math.inf)
     return -1j * torque / (A * detuning)
-
-
-class PoleCone(NamedTuple):
-    """Oblique circular cone ("Polkegel") of ω under a constant transverse torque: ω circles ``centre``, rad/s."""
-
-    centre: complex
-    radius: float
-
-
-def pole_cone(A: float, C: float, omega0: complex, spin: float, torque: complex) -> PoleCone:
-    """Base circle of the pole cone under a constant torque, Magnus 1970 after (11)."""
-    centre = steady_response(A, C, spin, torque)
-    return PoleCone(centre, abs(omega0 - centre))
 
 
 class PermanentRotation(NamedTuple):
@@ -198,7 +124,8 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> Perm
     """The permanent rotation that a constant body torque allows, Magnus 1970 (13), and its Euler angles (14).
 
     tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
-    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
+    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
+    need no more than `steady_response`.
     """
     omega = steady_response(A, C, spin, torque)
     rate = math.hypot(abs(omega), spin)

@@ -1,6 +1,6 @@
-"""Stability of spin about a principal axis, the nutation seen in three frames, precession under steady torques.
+"""Stability of spin about a principal axis, and the nutation seen in three frames.
 
-"Kreisel-Bewegungen" is cited as K(n): its J_xy is A, its J_z is C, its L is H. K(14) and K(15) need M_z = 0.
+"Kreisel-Bewegungen" is cited as K(n): its J_xy is A, its J_z is C, its L is H.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nutdamp.physics import cones, forced, inertia
+from nutdamp.physics import cones, inertia
 
 AxisClass = Literal["minimum", "maximum", "intermediate", "degenerate", "sphere"]
 
@@ -85,22 +85,3 @@ def nutation_rates(A: float, C: float, omega: float, spin: float) -> NutationRat
     always positive; its K(12) is a small-angle form. ``omega`` is |ω|, ``spin`` ω3 in rad/s.
     """
     return NutationRates((C - A) / A * spin, C / A * spin, cones.inertial_rate(A, C, omega, spin))
-
-
-def precession_body(A: float, C: float, spin: float, torque: complex) -> complex:
-    """Steady ω in rad/s under a torque M1 + iM2 fixed in the body, K(14): (M2 - iM1)/((A - C)ω3).
-
-    In body axes; without axial torque. The last line of K(14) as printed has the wrong sign: it must read
-    M = ω_P × ω_z (J_z - J_xy). Infinite for a sphere.
-    """
-    return forced.steady_response(A, C, spin, torque)
-
-
-def precession_despun(C: float, spin: float, torque: complex) -> complex:
-    """Steady precession ω in rad/s under a torque M1 + iM2 fixed in the despun frame, K(15): iM/(Cω3).
-
-    In axes of the despun frame, which turns with ω1, ω2 only: A dω/dt - iCω3 ω = M. The third component of K(15) is
-    0, where ∫M_z/J_z dt is printed; ω3 itself is constant only for M_z = 0. Infinite without spin.
-    """
-    # In the body this torque turns at -ω3. The moment A drops out of the response, so that any value serves.
-    return forced.steady_response(C, C, spin, torque, rate=-spin)

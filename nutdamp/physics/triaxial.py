@@ -101,16 +101,6 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
 
 
-def polhode_extremes(moments: ArrayLike, rates0: ArrayLike) -> tuple[float, float]:
-    """Least and largest nutation angle in rad, between H and the spin axis σ·e3, σ the sign of ω3 at t = 0.
-
-    For motion about axis 3 they come where ω_b = 0 and where ω_a = 0. Motion that goes about another axis turns axis
-    3 over and back: the largest angle is then π less the least. On the separatrix the largest is a bound, π/2.
-    """
-    least, largest = _extreme_cones(moments, rates0)
-    return least.nutation, largest.nutation
-
-
 def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
     """The cone angles at the instant of the motion through ``rates0`` at which the nutation angle is largest.
 
