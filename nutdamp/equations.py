@@ -82,7 +82,7 @@ MAGNUS = (
         "sum of impulses",
         f"{_PHYSICS}.rates.impulse_sum",
         "test_equations.py::test_impulse_sum_17",
-        "with axial impulses and dissipation; the lines before (17) want +i",
+        "with axial impulses; the lines before (17) want +i",
     ),
     Equation("M(18)", "body cone", f"{_PHYSICS}.cones.body_cone", "test_equations.py::test_cones_18_19_20"),
     Equation("M(19)", "nutation angle", f"{_PHYSICS}.cones.nutation_angle", "test_equations.py::test_cones_18_19_20"),
@@ -187,6 +187,13 @@ KREISEL = (
         f"{_PHYSICS}.stability.growth",
         "test_equations.py::test_stability_24_4",
         "prints p² <= 0: with p = 0 it grows linearly",
+    ),
+    Equation(
+        "energy sink",
+        "coast with energy dissipation",
+        f"{_PHYSICS}.energy_sink.arc",
+        "physics/test_energy_sink.py::test_200_s_agree_with_dop853",
+        "tan θ = tan θ0 e^{±t/τ} with H at rest in space; in none of the sources",
     ),
 )
 

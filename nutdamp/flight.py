@@ -15,9 +15,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics import attitude, rates, rigid
+from nutdamp.physics import attitude, energy_sink, rates, rigid
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.physics.rigid import NOTHING, Forcing, Piece
+from nutdamp.physics.rigid import Forcing, Piece
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import Track, make_track, widest
@@ -49,20 +49,35 @@ class Path(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Torque-free motion of a symmetric body in closed form, from ``state`` at ``start`` s."""
+    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s; ``growth`` 1/s: `energy_sink`'s κ."""
 
     A: float
     C: float
     start: float
     state: SpinState
+    growth: float = 0.0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
         since = np.asarray(times) - self.start
         state = self.state
+        if self.growth != 0.0:
+            omega, spin, quaternion = energy_sink.arc(
+                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since
+            )
+            return np.column_stack([omega.real, omega.imag, spin]), quaternion
         omega = state.omega * np.exp(-1j * (self.A - self.C) / self.A * state.spin * since)
         quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since)
         return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
+
+    def end(self, time: float) -> SpinState:
+        """The motion at ``time`` s."""
+        A, C, state, since = self.A, self.C, self.state, time - self.start
+        if self.growth != 0.0:
+            return SpinState(*energy_sink.arc_end(A, C, self.growth, state.quaternion, state.omega, state.spin, since))
+        turned = cmath.exp(-1j * (A - C) / A * state.spin * since)
+        quaternion = attitude.arc_end(A, C, state.quaternion, state.omega, state.spin, since)
+        return SpinState(state.omega * turned, state.spin, quaternion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,21 +208,16 @@ class Setting:
 
     @property
     def free(self) -> bool:
-        """Whether coasts are torque-free arcs of a symmetric body, known in closed form."""
-        return self.moments[0] == self.moments[1] and not self.constant.any() and self.forcing == NOTHING
+        """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
+        return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
 
     def path(
         self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = ()
     ) -> tuple[Path, SpinState]:
         """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in."""
         if end == start or (self.free and not torques):
-            arc = Arc(self.moments[0], self.moments[2], start, state)
-            if end == start:
-                return arc, state
-            A, _, C = self.moments
-            turned = cmath.exp(-1j * (A - C) / A * state.spin * (end - start))
-            quaternion = attitude.arc_end(A, C, state.quaternion, state.omega, state.spin, end - start)
-            return arc, SpinState(state.omega * turned, state.spin, quaternion)
+            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
+            return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         pieces = rigid.integrate(self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing)
         rates_, quaternion_ = pieces[-1].final
@@ -219,8 +229,8 @@ class Setting:
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
-def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
-    """What is flown: the true principal moments; dissipation keeps |H| where ``true``, else it is the linear law."""
+def make_setting(spacecraft: Spacecraft) -> Setting:
+    """What is flown: the true principal moments, and what acts besides the pulses."""
     disturbances = spacecraft.disturbances
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
     transverse = sum(disturbance.transverse for disturbance in fixed)
@@ -230,7 +240,6 @@ def make_setting(spacecraft: Spacecraft, *, true: bool) -> Setting:
         forcing=Forcing(
             turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
             growth=spacecraft.growth,
-            keep_momentum=true or spacecraft.growth == 0.0,
         ),
     )
 
@@ -239,10 +248,10 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     """The impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
     Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
-    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation (by its
-    linear law) act between the pulses. The last leg reaches at least to ``until`` s.
+    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
+    between the pulses as in `flown`. The last leg reaches at least to ``until`` s.
     """
-    setting, state = make_setting(spacecraft, true=False), spacecraft.initial
+    setting, state = make_setting(spacecraft), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
     for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
@@ -282,10 +291,10 @@ def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np
 def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """Euler's equations through the real pulse widths, with the true principal moments.
 
-    Coasts of symmetric bodies left alone are exact arcs, everything else Taylor series at rounding accuracy. The last
-    leg reaches at least to ``until`` s. Raises Infeasible where dissipation drives the body into flat spin.
+    Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
+    series at rounding accuracy. The last leg reaches at least to ``until`` s.
     """
-    setting, state = make_setting(spacecraft, true=True), spacecraft.initial
+    setting, state = make_setting(spacecraft), spacecraft.initial
     pulses, over = schedule.pulses, schedule.end
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T

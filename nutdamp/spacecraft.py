@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
-from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
@@ -207,17 +206,12 @@ class Spacecraft:
 
     @property
     def growth(self) -> float:
-        """Rate 1/τ (1/s) at which energy dissipation lets the nutation grow: prolate positive, oblate negative.
+        """Rate κ (1/s) at which energy dissipation lets a small nutation grow: prolate positive, oblate negative.
 
-        Raises BadRequest where that is faster than the nutation itself.
+        A sphere has no energy to give: zero. See `physics.energy_sink`.
         """
         if self.dissipation is None or self.inertia.a == 0.0:
             return 0.0
-        if self.dissipation < self.inertial_period:
-            raise BadRequest(
-                f"dissipation.time_constant: {self.dissipation:.4g} s is shorter than one nutation period "
-                f"({self.inertial_period:.4g} s), within which dissipation must be small"
-            )
         return math.copysign(1.0 / self.dissipation, self.inertia.a)
 
     @property
@@ -326,5 +320,5 @@ class Spacecraft:
 
     @property
     def least_impulse(self) -> float:
-        """A |ω0| in N m s: no schedule can remove the nutation with less."""
+        """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without dissipation with less."""
         return self.inertia.A * self.transverse_rate

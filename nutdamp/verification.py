@@ -101,11 +101,11 @@ def _motion(flown: Flight, times: Vector) -> tuple[Vector, Vector]:
 def _closed_form(
     spacecraft: Spacecraft, schedule: Schedule, end: float, times: Vector, reference: tuple[Vector, Vector]
 ) -> Method:
-    """Attitude by exact arcs between effective impulses, rates by the impulse sum (17) written out."""
+    """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
     arcs = flight.by_impulses(spacecraft, schedule, end)
     body, quaternion = _motion(arcs, times)
     inertia = spacecraft.inertia
-    if inertia.symmetric and not spacecraft.disturbances:
+    if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0:
         omega, spin = rates.impulse_sum(
             times,
             complex(spacecraft.omega0[0], spacecraft.omega0[1]),
@@ -115,7 +115,6 @@ def _closed_form(
             np.array([pulse.t for pulse in schedule]),
             flight.effective_impulses(spacecraft, schedule),
             np.array([pulse.impulse[2] for pulse in schedule]),
-            spacecraft.growth,
         )
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.start) | (times >= pulse.end) for pulse in schedule], axis=0)
@@ -151,9 +150,10 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
             def derivative(t: float, y: Vector, torque: _Torque = torque) -> Vector:
                 body, q = y[:3], y[3:]
                 momentum = tensor @ body
-                drive = axes @ _sink(spacecraft, axes.T @ momentum)
+                drive = _sink(spacecraft, momentum)
                 spin = inverse @ (torque(t) + drive - np.cross(body, momentum))
-                slip = np.cross(drive, momentum) / (momentum @ momentum)
+                # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
+                slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
                 turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
                 return np.concatenate([spin, turning])
 
@@ -184,15 +184,17 @@ class _Torque:
 
 
 def _sink(spacecraft: Spacecraft, momentum: Vector) -> Vector:
-    """What energy dissipation adds to dH/dt in principal body axes: H1 and H2 grow, H3 gives way, |H| stays.
+    """What energy dissipation adds to dH/dt in the body, (3,) N m in the axes of the file, from H there.
 
-    Nothing inside a body can turn H in space, so the body must slip against it at the rate that undoes this turn.
+    It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space. So
+    in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to H.
     """
-    growth = spacecraft.growth
-    if growth == 0.0:
+    axis, size = spacecraft.inertia.axes[:, 2], float(np.linalg.norm(momentum))
+    if spacecraft.growth == 0.0 or size == 0.0:
         return np.zeros(3)
-    first, second, third = momentum
-    return growth * np.array([first, second, -(first**2 + second**2) / third])
+    direction = momentum / size
+    across = direction * (direction @ axis) - axis  # of length sin θ
+    return np.asarray(spacecraft.growth * size * (direction @ axis) * across)
 
 
 def _body_torque(spacecraft: Spacecraft, schedule: Schedule, start: float, end: float) -> _Torque:

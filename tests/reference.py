@@ -6,6 +6,12 @@ Euler's equations and the rotation matrix R (body -> inertial) of a rigid body,
 
 from one edge of a pulse to the next by DOP853. Torques and impulses are fixed in the body. Angles are compared by
 the chord between unit vectors, which is exact at both ends of the scale.
+
+With energy dissipation it is H in space that is integrated, where dissipation cannot change it, and the attitude:
+
+    dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH + s]×,
+
+s the turn of axis 3 away from H at κ sin θ cos θ. No torque of dissipation stands in these equations.
 """
 
 from __future__ import annotations
@@ -117,8 +123,50 @@ def coast(moments: Sequence[float], motion: Motion, torque: Array, times: Array)
     return [Motion(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
 
 
+def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Array, growth: float) -> list[Motion]:
+    """`coast` of a body in which energy dissipation lets a small nutation grow at the rate ``growth`` κ, 1/s."""
+    moments_ = np.asarray(moments, dtype=float)
+
+    def slope(_: float, y: Array) -> Array:
+        h, rotation = y[:3], y[3:].reshape(3, 3)
+        w = rotation.T @ h / moments_
+        axis, towards = rotation[:, 2], h / np.linalg.norm(h)
+        w = w + growth * (towards @ axis) * (rotation.T @ np.cross(towards, axis))
+        cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        return np.concatenate([rotation @ torque, (rotation @ cross).ravel()])
+
+    h0 = momentum(moments, motion)
+    y0 = np.concatenate([h0, motion.rotation.ravel()])
+    atol = np.array([RTOL * float(np.linalg.norm(h0))] * 3 + [RTOL] * 9)
+    solution = solve_ivp(slope, (0.0, float(times[-1])), y0, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * atol)
+    assert solution.success
+    found = [(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
+    return [Motion(rotation.T @ h / moments_, rotation) for h, rotation in found]
+
+
+def euler_angles(A: float, C: float, size: float, growth: float, start: Array, times: Array) -> Array:
+    """φ about H, θ and ψ about axis 3 (n, 3) rad of a symmetric body with |H| = ``size`` and dissipation, from
+    ``start`` (3,) rad, by DOP853 on the equations of the angles themselves.
+    """
+
+    def slope(_: float, y: Array) -> Array:
+        tilt = float(y[1])
+        return size * vector(1 / A, growth / size * math.sin(tilt) * math.cos(tilt), (1 / C - 1 / A) * math.cos(tilt))
+
+    solution = solve_ivp(
+        slope, (0.0, float(times[-1])), start, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * RTOL
+    )
+    assert solution.success
+    return np.asarray(solution.y.T)
+
+
 def fly(
-    moments: Sequence[float], rates: Array, events: Iterable[Push | Kick], until: float, rotation: Array | None = None
+    moments: Sequence[float],
+    rates: Array,
+    events: Iterable[Push | Kick],
+    until: float,
+    rotation: Array | None = None,
+    growth: float = 0.0,
 ) -> Motion:
     """The motion at ``until`` s, kicks at that moment included; restarts at every edge of a torque."""
     events = list(events)
@@ -132,7 +180,9 @@ def fly(
             middle = 0.5 * (now + edge)
             pushing = [e.torque for e in events if isinstance(e, Push) and e.start < middle < e.end]
             torque = np.sum(pushing, axis=0) if pushing else np.zeros(3)
-            motion, now = coast(moments, motion, torque, np.array([edge - now]))[0], edge
+            span = np.array([edge - now])
+            found = sinking(moments, motion, torque, span, growth) if growth else coast(moments, motion, torque, span)
+            motion, now = found[0], edge
         for event in events:
             if isinstance(event, Kick) and event.t == edge:
                 motion = Motion(motion.rates + event.impulse / np.asarray(moments), motion.rotation)

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import spinner
 from process import Run
 
 from nutdamp import flight, planning
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.verification import AGREE, integrate, verify
 
@@ -105,17 +106,36 @@ def test_dissipation_keeps_the_momentum_and_drains_energy() -> None:
     assert np.linalg.norm(momentum, axis=1) == pytest.approx(np.linalg.norm(momentum[0]), rel=1e-12)
     energy = rates**2 @ np.asarray(body.inertia.moments)
     assert energy[1] < energy[0]
-    assert np.hypot(*rates[1, :2]) / np.hypot(*rates[0, :2]) == pytest.approx(math.exp(30 / 600), rel=1e-11)
+    slopes = np.hypot(rates[:, 0], rates[:, 1]) / rates[:, 2]  # tan θ, but for a factor
+    assert slopes[1] / slopes[0] == pytest.approx(math.exp(30 / 600), rel=1e-11)
+
+
+@pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (123.0, 117.0, 80.0)])
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
+    moments: tuple[float, float, float], spin: float
+) -> None:
+    """At 40 degrees of nutation, through real widths: exact arcs and series against the torque law."""
+    body = replace(spinner(moments=moments, spin=spin, degrees=40.0), channels=EXAMPLE.channels, dissipation=60.0)
+    pulses = [channel_pulse(EXAMPLE.channels[index], t, 0.8) for index, t in ((0, 2.0), (2, 21.0), (1, 50.0))]
+    found = verify(body, Schedule(tuple(pulses)))
+    dop853 = found.methods[2]
+    assert max(dop853.axis or 1, dop853.momentum or 1, dop853.rate or 1) < 1e-10
+    assert found.agree
 
 
 def test_the_course_example_of_dissipation() -> None:
-    """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: 3.01° and 4.96° with H kept, 3.00° and 4.95°
-    with the spin kept."""
+    """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in DOP853."""
     body = Spacecraft("x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0)
-    for time, kept_h, kept_spin in ((50.0, 3.01, 3.00), (100.0, 4.96, 4.95)):
-        for fly, expected in ((flight.flown, kept_h), (flight.by_impulses, kept_spin)):
-            angle = math.degrees(fly(body, Schedule(), time).track(2, time).nutation[-1])
-            assert angle == pytest.approx(expected, abs=0.006)
+    times = np.array([0.0, 50.0, 100.0, 200.0, 300.0, 345.0, 600.0])
+    rates, _ = integrate(body, Schedule(), times)
+    by_torque = np.degrees(np.arctan2(2.0 * np.hypot(rates[:, 0], rates[:, 1]), rates[:, 2]))
+    assert by_torque[:-2] == pytest.approx([1.82, 3.00, 4.95, 13.24, 32.59], abs=0.005)
+    assert by_torque[-2:] == pytest.approx([45.0, 85.5], abs=0.1)
+    for fly in (flight.flown, flight.by_impulses):
+        body_rates, _ = fly(body, Schedule(), 600.0).motion(times)
+        angles = np.degrees(np.arctan2(2.0 * np.hypot(body_rates[:, 0], body_rates[:, 1]), body_rates[:, 2]))
+        assert angles == pytest.approx(by_torque, abs=1e-9)
 
 
 def test_verify_command_prints_both_tables(run: Run) -> None:

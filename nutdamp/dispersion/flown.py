@@ -29,7 +29,7 @@ class RealWidths:
 
     @cached_property
     def _setting(self) -> flight.Setting:
-        return flight.make_setting(self.model.spacecraft, true=True)
+        return flight.make_setting(self.model.spacecraft)
 
     def __call__(self, truth: Truth) -> Ends:
         """How the cases of ``truth`` end. Raises Infeasible for motions too long to be integrated."""

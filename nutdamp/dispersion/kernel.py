@@ -3,7 +3,8 @@
 Between pulses a symmetric body is free, and two facts make the arcs cheap. Seen in the frame that turns with the
 nutation, by the phase aα with α = ∫ω3 dt, the angular momentum stands still: its transverse part is
 AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A)
-R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; no angle is taken before the end.
+R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; no angle is taken before the end. Energy
+dissipation draws H away from axis 3 in that frame, along an arc that `energy_sink` knows.
 
 Nothing here takes an absolute value or compares: the same code runs on complex arrays, which gives derivatives to
 rounding (`nutdamp.dispersion.sensitivity`).
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.truth import TINY, Cases, Model, Triple, Truth, plus, rotated, times
+from nutdamp.physics import energy_sink
 from nutdamp.physics.many import cos_sin
 
 FAR = 8.0
@@ -51,7 +53,10 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Flies truths of ``model`` by the impulse sum; disturbances, dissipation and I1 ≠ I2 are left out."""
+    """Flies truths of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
+
+    Dissipation acts as the estimate has it, whatever the truth's moments are.
+    """
 
     model: Model
 
@@ -60,11 +65,12 @@ class ClosedForm:
         on_times = self.model.on_times
         nodes = self._nodes
         mixed = _out_of_order(truth.starts, on_times)
-        ends = _fly(truth, on_times, nodes)
+        growth = self.model.spacecraft.growth
+        ends = _fly(truth, on_times, nodes, growth)
         if mixed is None:
             return ends
         # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
-        return _replaced(ends, mixed, _fly(*_reordered(truth, on_times, mixed), (max(nodes),) * len(nodes)))
+        return _replaced(ends, mixed, _fly(*_reordered(truth, on_times, mixed), (max(nodes),) * len(nodes), growth))
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
@@ -79,8 +85,8 @@ class ClosedForm:
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...]) -> Ends:
-    """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse."""
+def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...], growth: float) -> Ends:
+    """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse, ``growth`` κ in 1/s."""
     A, C = truth.A, truth.C
     a, per_A = 1.0 - C / A, 1.0 / A
     x, y = truth.moments[0] * truth.omega0[0], truth.moments[1] * truth.omega0[1]  # H is the true one, I1 ≠ I2 or not
@@ -95,8 +101,14 @@ def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...]) -> Ends:
         centre = start + 0.5 * on_time
         coast = centre - now
         turn = _turned_on(turn, (x, y, z), coast * per_A)
-        phase = phase + a * spin * coast
-        along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number])
+        if growth == 0.0:
+            phase = phase + a * spin * coast
+        else:
+            found, turn = _slipped(turn, (x, y, z), growth, coast)
+            phase = phase + a * spin * found.turned
+            x, y, spin = x * found.transverse, y * found.transverse, spin * found.axial
+            z = C * spin
+        along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number], growth)
         cosine, sine = cos_sin(phase)
         x = x + along * cosine - across * sine
         y = y + along * sine + across * cosine
@@ -134,6 +146,19 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
     )
 
 
+def _slipped(
+    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
+) -> tuple[energy_sink.Course, tuple[Cases, ...]]:
+    """What dissipation does in ``time`` s, and ``turn`` with the slip against ``momentum``, of the course's start."""
+    x, y, z = momentum
+    across = x * x + y * y
+    size = np.sqrt(across + z * z) + TINY
+    found = energy_sink.courses(growth, z / size, across / (size * size), time)
+    w, i, j = found.cosine, found.sine * y / size, -found.sine * x / size
+    p, a, b, c = turn
+    return found, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
+
+
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
     """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit length."""
     w, a, b, c = turn
@@ -148,12 +173,12 @@ def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
 
 
 def _effective(
-    impulse: Triple, a: Cases, spin: Cases, C: Cases, on_time: Cases, nodes: int
+    impulse: Triple, a: Cases, spin: Cases, C: Cases, on_time: Cases, nodes: int, growth: float
 ) -> tuple[Cases, Cases, Cases]:
     """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `rates.width_factor`.
 
-    Without axial part the factor is sinc(aω3τ/2). With it, the spin runs through the pulse and the factor is the mean
-    of exp(i(φx + β(1 + x²))) over |x| <= 1, φ = a(ω3 + J3/2C)τ/2, β = aJ3τ/8C, by ``nodes`` Gauss-Legendre nodes.
+    The spin runs through the pulse, and the factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ =
+    a(ω3 + J3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(aω3τ/2) without J3 and κ.
     """
     along, across, axial = impulse
     if isinstance(on_time, float) and on_time == 0.0:
@@ -161,18 +186,33 @@ def _effective(
     half = 0.5 * on_time
     if isinstance(axial, float) and axial == 0.0:
         angle = a * spin * half + TINY
-        tangent = np.tan(0.5 * angle)
-        factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
-        return times(along, factor), times(across, factor), 0.0
+        if growth == 0.0:
+            tangent = np.tan(0.5 * angle)
+            factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
+            return times(along, factor), times(across, factor), 0.0
+        (cosine, sine), grown = cos_sin(angle), growth * half
+        level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
+        scale = 1.0 / (angle * angle + grown * grown)
+        return _turned(
+            along, across, (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale, 0.0
+        )
     gained = axial / C
     slope, bend = a * (spin + 0.5 * gained) * half, 0.25 * a * gained * half
     real: Cases = 0.0
     imaginary: Cases = 0.0
     for node, weight in _legendre(nodes):
-        level = weight * cos_sin(slope * node)[0]
+        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
+        level, slant = cos_sin(slope * node)
+        grown = np.exp(growth * half * node)
+        level, slant = 0.5 * weight * level * (grown + 1.0 / grown), 0.5 * weight * slant * (grown - 1.0 / grown)
         cosine, sine = cos_sin(bend * (1.0 + node * node))
-        real = real + level * cosine
-        imaginary = imaginary + level * sine
+        real = real + level * cosine + slant * sine
+        imaginary = imaginary + level * sine - slant * cosine
+    return _turned(along, across, real, imaginary, axial)
+
+
+def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
+    """The complex number ``along``, ``across`` times another, and ``axial``."""
     return (
         plus(times(along, real), times(-1.0, times(across, imaginary))),
         plus(times(along, imaginary), times(across, real)),

@@ -1,8 +1,9 @@
 """Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
 
 Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
-between two edges is a torque-free arc in closed form where the body is symmetric and left alone; else a Taylor series,
-as in `rigid`, of an order and a number of steps common to a block of cases that stays in the cache.
+between two edges is an arc in closed form where the body is symmetric and no torque from outside acts, with energy
+dissipation too; else a Taylor series, as in `rigid`, of an order and a number of steps common to a block of cases that
+stays in the cache.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics.rigid import FLAT, LONGEST, NOTHING, Forcing
+from nutdamp.physics import energy_sink
+from nutdamp.physics.rigid import AT_REST, LONGEST, NOTHING, Forcing
 
 Array = NDArray[np.float64]
 
@@ -43,8 +45,8 @@ class Bodies:
 
     @property
     def free(self) -> bool:
-        """Whether a coast is a torque-free arc of a symmetric body for every case."""
-        alone = not self.constant.any() and self.forcing == NOTHING
+        """Whether a coast is an arc of a symmetric body without torque from outside for every case."""
+        alone = not self.constant.any() and not self.forcing.turning
         return alone and bool(np.array_equal(self.moments[0], self.moments[1]))
 
     def some(self, cases: Any) -> Bodies:
@@ -87,8 +89,8 @@ def fly(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> tupl
     """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
 
     ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0. Exact to some 1e-13 rad for each hundred radians flown. Pulses
-    may overlap and come in any order, in each case its own. A case that dissipation drives into flat spin stays there.
-    Raises Infeasible for motions over more than `rigid.LONGEST` rad.
+    may overlap and come in any order, in each case its own. Raises Infeasible for motions over more than
+    `rigid.LONGEST` rad.
     """
     count = rates.shape[1]
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
@@ -159,7 +161,7 @@ def _advance(
     if not duration.any():
         return
     if torque is None and bodies.free:
-        _arc(bodies.moments, rates, quaternion, duration)
+        _arc(bodies.moments, bodies.forcing.growth, rates, quaternion, duration)
         return
     acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
     _integrate(bodies, rates, quaternion, now, duration, acceleration)
@@ -175,8 +177,8 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
     return 2.0 * scale - 1.0, 2.0 * half * scale
 
 
-def _arc(moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
-    """The exact torque-free arc of symmetric bodies, in place; see `attitude.arc`.
+def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duration: Array) -> None:
+    """The exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` where ``growth`` is not 0.
 
     R(t) = R(0) Rot(H(0)/A t) Rot3(aω3 t), with H in body axes: the body turns about H at |H|/A and about its own axis
     at aω3.
@@ -197,6 +199,23 @@ def _arc(moments: Array, rates: Array, quaternion: Array, duration: Array) -> No
     # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
     cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
     rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
+    if growth != 0.0:
+        _slip(growth, (1.0 - C / A) * rates[2], size, axial, rates, quaternion, duration)
+
+
+def _slip(
+    growth: float, rate: Array, size: Array, axial: Array, rates: Array, quaternion: Array, duration: Array
+) -> None:
+    """What dissipation does to the ends of free arcs, in place; ``rate`` is aω3, ``size`` |H|/A, ``axial`` H3/A."""
+    moving = np.where(size > 0.0, size, 1.0)
+    cosine = np.where(size > 0.0, axial / moving, 1.0)
+    h1, h2 = rates[0] / moving, rates[1] / moving
+    found = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
+    behind = rate * (found.turned - duration)
+    quaternion[:] = _product(quaternion, energy_sink.slip(found, h1, h2, behind, cos_sin))
+    cosine, sine = cos_sin(behind)
+    x, y = rates[0] * found.transverse, rates[1] * found.transverse
+    rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * found.axial
 
 
 def _product(left: Sequence[Array] | Array, right: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
@@ -235,11 +254,6 @@ def _step(
     bodies: Bodies, rates: Array, quaternion: Array, now: Array, step: Array, acceleration: Array, halvings: int = 12
 ) -> None:
     """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
-    forcing = bodies.forcing
-    if forcing.growth > 0.0 and forcing.keep_momentum:
-        momentum = rates * bodies.moments
-        flat = np.abs(momentum[2]) < FLAT * np.sqrt(np.sum(momentum * momentum, axis=0))
-        step = np.where(flat, 0.0, step)
     series = _Series(bodies, rates, quaternion, now, step, acceleration)
     if series.converges():
         rates[:], quaternion[:] = series.end()
@@ -269,7 +283,7 @@ class _Series:
         self.turns = np.empty((LARGEST_ORDER + 1, 4, count))
         self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in bodies.forcing.turning]
-        self.sink = None if bodies.forcing.growth == 0.0 else _Sink(bodies, count)
+        self.sink = None if bodies.forcing.growth == 0.0 else _Sink(bodies, acceleration, rates, step)
         self.order = 0
 
     def converges(self) -> bool:
@@ -309,7 +323,7 @@ class _Series:
             self.turning[index] = (size * turn / (k + 1), turn)
         speeds = rates[:, :3]
         if self.sink is not None:
-            following += self.sink.acceleration(rates, k) / self.moments
+            following += self.sink.acceleration(rates[k, :3], k) / self.moments
             speeds = rates[: k + 1, :3] + self.sink.slip[: k + 1]
         following *= scale
         rates[k + 1, 3:] = following[:2]
@@ -325,34 +339,28 @@ class _Series:
 
 
 class _Sink:
-    """Energy dissipation as series, see `rigid._Sink`: what it does to H, and how the body slips against it.
+    """Energy dissipation as series, see `rigid._Sink`: what it does to H, and how the body slips against it."""
 
-    Vectors hold their components as 1, 2, 3, 1, 2, so that a cross product is two products of slices.
-    """
-
-    def __init__(self, bodies: Bodies, count: int) -> None:
-        self.moments, self.forcing = bodies.moments, bodies.forcing
-        self.momentum = np.zeros((LARGEST_ORDER, 5, count))
-        self.drive = np.zeros((LARGEST_ORDER, 5, count))  # D
-        self.slip = np.zeros((LARGEST_ORDER, 3, count))  # D × H/|H|²
-        self.lost = np.zeros((LARGEST_ORDER, count))  # (H1² + H2²)/H3
+    def __init__(self, bodies: Bodies, acceleration: Array, rates: Array, step: Array) -> None:
+        self.moments, self.growth = bodies.moments, bodies.forcing.growth
+        count = len(step)
+        self.momentum = np.zeros((LARGEST_ORDER, 3, count))
         self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
+        self.quotient = np.zeros((LARGEST_ORDER, count))  # H3/|H|²
+        self.slip = np.zeros((LARGEST_ORDER, 3, count))
+        largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
+        self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
 
     def acceleration(self, rates: Array, k: int) -> Array:
-        """Coefficient k of D, (3, n) N m; makes that of ``slip`` on the way."""
-        momentum, drive = self.momentum, self.drive
-        momentum[k, :3] = rates[k, :3] * self.moments
-        momentum[k, 3:] = momentum[k, :2]
-        squared = np.einsum("kcn,kcn->cn", momentum[: k + 1, :3], momentum[k::-1, :3])
-        drive[k, :2] = self.forcing.growth * momentum[k, :2]
-        if self.forcing.keep_momentum:
-            before = np.einsum("kn,kn->n", momentum[1 : k + 1, 2], self.lost[:k][::-1])
-            self.lost[k] = (squared[0] + squared[1] - before) / momentum[0, 2]
-            drive[k, 2] = -self.forcing.growth * self.lost[k]
-        drive[k, 3:] = drive[k, :2]
-        self.squares[k] = squared.sum(axis=0)
-        crossed = np.einsum("kcn,kcn->cn", drive[: k + 1, 1:4], momentum[k::-1, 2:5])
-        crossed -= np.einsum("kcn,kcn->cn", drive[: k + 1, 2:5], momentum[k::-1, 1:4])
-        before = np.einsum("kn,kcn->cn", self.squares[1 : k + 1], self.slip[:k][::-1])
-        self.slip[k] = (crossed - before) / self.squares[0]
-        return np.asarray(drive[k, :3])
+        """Coefficient k of H × s, (3, n) N m; makes that of ``slip`` s on the way. ``rates`` (3, n): coefficient k."""
+        momentum, slip = self.momentum, self.slip
+        momentum[k] = rates * self.moments
+        self.squares[k] = np.einsum("kcn,kcn->n", momentum[: k + 1], momentum[k::-1])
+        if k == 0:
+            self.squares[0] += np.where(self.squares[0] + self.floor > 0.0, self.floor, 1.0)
+        before = np.einsum("kn,kn->n", self.squares[1 : k + 1], self.quotient[:k][::-1])
+        self.quotient[k] = (momentum[k, 2] - before) / self.squares[0]
+        slip[k, 0] = self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 1])
+        slip[k, 1] = -self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 0])
+        by_first, by_second = (np.einsum("kcn,kn->cn", momentum[: k + 1], slip[k::-1, axis]) for axis in (0, 1))
+        return np.stack([-by_second[2], by_first[2], by_second[0] - by_first[1]])

@@ -13,6 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.physics import energy_sink
+
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
@@ -32,13 +34,12 @@ def impulse_sum(
     pulse_times: Array,
     transverse: ComplexArray,
     axial: Array,
-    growth: float = 0.0,
 ) -> tuple[ComplexArray, Array]:
     """Rates after a sum of impulses, Magnus 1970 (17), exact at any angle for symmetric bodies.
 
     ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
-    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. Energy
-    dissipation (``growth`` = 1/τ in 1/s, by the linear law dω/dt = (-iaω3 + 1/τ)ω) adds e^{t/τ}.
+    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. With
+    energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`flight.by_impulses`).
 
     ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.
     Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
@@ -47,11 +48,11 @@ def impulse_sum(
     spins = spin0 + np.concatenate([[0.0], np.cumsum(axial)]) / C
     knots = np.concatenate([[0.0], pulse_times])
     turned = np.concatenate([[0.0], np.cumsum(spins[:-1] * np.diff(knots))])
-    before = np.exp(1j * a * turned[1:] - growth * pulse_times)
+    before = np.exp(1j * a * turned[1:])
     sums = omega0 + np.concatenate([[0.0], np.cumsum(transverse * before)]) / A
     given = np.searchsorted(pulse_times, times, side="right")
     alpha = turned[given] + spins[given] * (times - knots[given])
-    return sums[given] * np.exp(growth * times - 1j * a * alpha), spins[given]
+    return sums[given] * np.exp(-1j * a * alpha), spins[given]
 
 
 def width_factor(
@@ -62,10 +63,12 @@ def width_factor(
     For a constant body torque with axial part, ω3 = spin + spin_rate·(time since start) with spin_rate = M3/C, the
     pulse acts on ω exactly as an impulse M τ F at its centre, when ω3 jumps there by spin_rate·τ:
     F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial part this is
-    sinc(a ω3 τ/2), sinc x = sin x / x. Energy dissipation (``growth`` = 1/τ, 1/s) turns a ω3 into a ω3 + i/τ;
+    sinc(a ω3 τ/2), sinc x = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns a ω3 into
+    a ω3 + iκ, by its small-angle part: during the pulse alone, where what is neglected is of order κτ a ω3 τ θ²/12.
     ``drift`` (rad/s²) is a spin acceleration that goes on after the pulse.
     """
     half = 0.5 * on_time
+    growth = math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
     if spin_rate == 0.0 and drift == 0.0:
         angle = (a * spin + 1j * growth) * half
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 ORDER = 22
 """Order of the series; near -ln(eps)/2 the work per radian is least for rounding accuracy."""
 
-FLAT = 0.02
-"""Cosine of the nutation angle below which dissipation counts as having reached flat spin (88.9°)."""
+AT_REST = 1e-9
+"""Share of the largest |H| of a motion below which H counts as at rest for energy dissipation."""
 
 LONGEST = 3e5
 """Radians that one integration may run over: some two hundred thousand steps."""
@@ -36,13 +36,11 @@ class Forcing(NamedTuple):
     """What acts on a body besides a constant torque.
 
     ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
-    ``growth``: rate 1/τ in 1/s at which energy dissipation lets H1 and H2 grow (negative: decay). ``keep_momentum``:
-    internal dissipation cannot change |H|, so H3 gives way; False is the linear law of the closed forms, ω3 constant.
+    ``growth``: rate κ in 1/s at which energy dissipation lets a small nutation grow (negative: decay), `energy_sink`.
     """
 
     turning: tuple[tuple[complex, float], ...] = ()
     growth: float = 0.0
-    keep_momentum: bool = True
 
 
 NOTHING = Forcing()
@@ -85,17 +83,17 @@ def integrate(
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    Raises Infeasible where dissipation drives the body into flat spin, and for motions over more than `LONGEST` rad.
+    Raises Infeasible for motions over more than `LONGEST` rad, and where a step would be too short to be one.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
+    floor = (AT_REST * size) ** 2
     now = start
     while now < end:
-        if forcing.growth > 0.0 and forcing.keep_momentum:
-            _refuse_flat_spin(inertia * rates, now)
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
         pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
         if pace * (end - now) > LONGEST:
@@ -104,10 +102,12 @@ def integrate(
                 f"integrated; shorten the time, or look for a torque or rate that is too large"
             )
         unit = 1.0 / pace if pace > 0.0 else end - now
-        series = _series(moments, acceleration, forcing, now, np.concatenate([rates, quaternion]), unit)
+        series = _series(moments, acceleration, forcing, floor, now, np.concatenate([rates, quaternion]), unit)
         step = min(_reach(series, unit) * unit, end - now)
         if end - now - step < 1e-3 * step:  # no sliver of a step at the end
             step = end - now
+        if now + step == now or len(pieces) > LONGEST:
+            raise Infeasible(f"the motion changes too fast to be integrated at {now:.10g} s")
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
         piece = Piece(now, step, scaled[:, :3], scaled[:, 3:])
         pieces.append(piece)
@@ -116,13 +116,14 @@ def integrate(
     return pieces
 
 
-def _refuse_flat_spin(momentum: Array, now: float) -> None:
-    if abs(momentum[2]) < FLAT * float(np.linalg.norm(momentum)):
-        raise Infeasible(f"energy dissipation drives the body into flat spin within {now:.4g} s")
-
-
 def _series(
-    moments: tuple[float, float, float], acceleration: Array, forcing: Forcing, now: float, state: Array, unit: float
+    moments: tuple[float, float, float],
+    acceleration: Array,
+    forcing: Forcing,
+    floor: float,
+    now: float,
+    state: Array,
+    unit: float,
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
@@ -134,7 +135,7 @@ def _series(
     series = np.zeros((ORDER + 1, 7))
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
-    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing)
+    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing.growth, floor)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -150,7 +151,7 @@ def _series(
             following[1] += step * size.imag / second
             turning[index] = (size * turn / (k + 1), turn)
         if sink is not None:
-            following[:3] += step * sink.acceleration(series, k, w)
+            following[:3] += step * sink.acceleration(series[k, :3], k)
             w = series[: k + 1].T @ (series[k::-1, :3] + sink.slip[k::-1])
         following[3] = -0.5 * step * (w[4, 0] + w[5, 1] + w[6, 2])
         following[4] = 0.5 * step * (w[3, 0] + w[5, 2] - w[6, 1])
@@ -160,31 +161,35 @@ def _series(
 
 
 class _Sink:
-    """Energy dissipation inside the body, as series: what it does to H in body axes, and how the body turns under it.
+    """`energy_sink` as series: what dissipation does to H in body axes, and how the body slips under it.
 
-    D = (H1, H2, -(H1² + H2²)/H3)/τ is added to dH/dt in the body (the linear law drops its third part). An internal
-    process cannot turn H in space: the body slips against it at D × H/|H|², beside ω = H/I.
+    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body: products of series but
+    for q. ``floor`` keeps q regular where torques from outside bring H to rest: there is nothing to dissipate there.
     """
 
-    def __init__(self, moments: Array, forcing: Forcing) -> None:
-        self.moments, self.forcing = moments, forcing
-        self.drive = np.zeros((ORDER, 3))  # D
-        self.slip = np.zeros((ORDER, 3))  # D × H/|H|²
-        self.lost = np.zeros(ORDER)  # (H1² + H2²)/H3
+    def __init__(self, moments: Array, growth: float, floor: float) -> None:
+        self.moments, self.growth, self.floor = moments, growth, floor
+        self.momentum = np.zeros((ORDER, 3))
+        self.squares = np.zeros(ORDER)  # |H|²
+        self.quotient = np.zeros(ORDER)  # q
+        self.slip = np.zeros((ORDER, 3))  # s
 
-    def acceleration(self, series: Array, k: int, w: Array) -> Array:
-        """Coefficient k of D/I, (3,); makes that of ``slip`` on the way. ``w`` as in `_series`."""
-        first, second = self.moments[:2]
-        momentum = series[: k + 1, :3] * self.moments
-        self.drive[k, :2] = self.forcing.growth * momentum[k, :2]
-        if self.forcing.keep_momentum:
-            transverse = first**2 * w[0, 0] + second**2 * w[1, 1]
-            self.lost[k] = (transverse - momentum[1:, 2] @ self.lost[k - 1 :: -1][:k]) / momentum[0, 2]
-            self.drive[k, 2] = -self.forcing.growth * self.lost[k]
-        crossed = np.cross(self.drive[: k + 1], momentum[::-1]).sum(axis=0)
-        squares = np.array([momentum[: j + 1].ravel() @ momentum[j::-1].ravel() for j in range(k + 1)])
-        self.slip[k] = (crossed - squares[1:] @ self.slip[k - 1 :: -1][:k]) / squares[0]
-        return np.asarray(self.drive[k] / self.moments)
+    def acceleration(self, rates: Array, k: int) -> Array:
+        """Coefficient k of (H × s)/I, (3,); makes that of ``slip`` on the way. ``rates`` (3,): coefficient k of ω."""
+        momentum, slip = self.momentum, self.slip
+        momentum[k] = self.moments * rates
+        self.squares[k] = momentum[: k + 1].ravel() @ momentum[k::-1].ravel()
+        if k == 0:
+            self.squares[0] += self.floor
+            self.quotient[0] = momentum[0, 2] / self.squares[0] if self.squares[0] > 0.0 else 0.0
+        elif self.squares[0] > 0.0:
+            before = self.squares[1 : k + 1] @ self.quotient[k - 1 :: -1]
+            self.quotient[k] = (momentum[k, 2] - before) / self.squares[0]
+        first, second = self.growth * (self.quotient[k::-1] @ momentum[: k + 1, :2])
+        slip[k] = (second, -first, 0.0)
+        products = momentum[: k + 1].T @ slip[k::-1]
+        drive = np.array([-products[2, 1], products[2, 0], products[0, 1] - products[1, 0]])
+        return np.asarray(drive / self.moments)
 
 
 def _reach(series: Array, unit: float) -> float:

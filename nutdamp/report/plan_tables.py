@@ -53,12 +53,13 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
-    alone = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
-    floor = "no schedule needs less" if alone else "the floor of a symmetric body left alone"
+    beyond = _beyond_floors(spacecraft)
+    floor = f"no bound with {beyond}" if beyond else "no schedule needs less"
     table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:
         turning = quantity(_turning(spacecraft), "N m s")
-        table.add_row("target", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}, the least to turn H")
+        least = "" if beyond else ", the least to turn H"
+        table.add_row("target", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}{least}")
     if spacecraft.goal.spin is not None:
         final = spacecraft.goal.spin
         table.add_row("final spin", f"{final * 30 / math.pi:.4g} rpm ({quantity(final, 'rad/s')})")
@@ -66,6 +67,16 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     for name, value in more:
         table.add_row(name, value)
     return table
+
+
+def _beyond_floors(spacecraft: Spacecraft) -> str:
+    """What the floors A|ω0| and C|ω3|β do not hold with, in words; empty where they hold."""
+    found = [
+        *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
+    return " and ".join(found)
 
 
 def _turning(spacecraft: Spacecraft) -> float:

@@ -20,6 +20,10 @@ LEFT_OVER_BY_TICKS = 0.5
 """The same where the resolution of commands may be to blame."""
 
 
+ROUNDING = 1e-12
+"""rad; where the spin axis is that near the target already, no pulses are needed."""
+
+
 class Journey:
     """The pulses chosen so far, and the spacecraft as it is after them.
 
@@ -82,7 +86,7 @@ class Journey:
 def tolerable(spacecraft: Spacecraft) -> float:
     """What a schedule may leave, rad, and still count as having reached the target: more where commands have ticks."""
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
-    return share * (spacecraft.nutation + spacecraft.to_turn)
+    return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
 def _after(spacecraft: Spacecraft, pulse: Pulse) -> Spacecraft:

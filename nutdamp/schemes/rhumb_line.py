@@ -22,7 +22,7 @@ from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, approach
 from nutdamp.schemes.advice import no_channels, no_target
-from nutdamp.schemes.journey import Journey, tolerable
+from nutdamp.schemes.journey import ROUNDING, Journey, tolerable
 from nutdamp.schemes.windows import Windows, usable
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -79,6 +79,8 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
     journey.fire(approach.damping(journey.here))
+    if journey.left <= ROUNDING:
+        return journey.schedule("what damps the nutation brings H to the target already: no train is needed")
     return _best(journey, _Train(journey.here, options))
 
 

@@ -65,8 +65,10 @@ def refine(
 
     Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
     brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the spin to the
-    rate asked for.
+    rate asked for. A schedule without pulses stays as it is.
     """
+    if not made.pulses:
+        return made
     chosen = sorted({index % len(made) for index in chosen})
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
     knobs = [_Knob(spacecraft, made.pulses[index]) for index in chosen]

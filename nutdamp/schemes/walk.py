@@ -7,16 +7,13 @@ import math
 
 import numpy as np
 
-from nutdamp.physics import damping, forced, rates
+from nutdamp.physics import damping, energy_sink, forced, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.windows import SLACK, Windows
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft, Steerable
 
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
-
-FOR_EVER = 300.0
-"""Exponent at which a growing nutation has lost all meaning, short of overflow."""
 
 
 class Walk:
@@ -61,16 +58,24 @@ class Walk:
     @property
     def uniform(self) -> bool:
         """Whether ω turns in the body at a constant rate between pulses."""
-        return not self.spacecraft.disturbances
+        return not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
+
+    def _coast(self, time: float) -> tuple[complex, float]:
+        """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
+        since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
+        omega, spin, turned = self.omega, self.spin, since
+        if growth != 0.0:
+            found = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
+            omega, spin, turned = omega * found.transverse, spin * found.axial, found.turned
+        angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
+        return omega * cmath.exp(-1j * angle), spin + drift * since
 
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
-        since = time - self.now
-        angle = self.a * (self.spin + 0.5 * self.spacecraft.spin_drift * since) * since
-        grown = min(self.spacecraft.growth * since, FOR_EVER)
-        free = self.omega * cmath.exp(grown - 1j * angle)
-        if self.uniform:
+        free, _ = self._coast(time)
+        if not self.spacecraft.disturbances:
             return free
+        since = time - self.now
         return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)
 
     def _driven(self, disturbance: Disturbance, since: float) -> complex:
@@ -86,10 +91,14 @@ class Walk:
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
         axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
-        drift = self.spacecraft.spin_drift
-        spin = self.spin + drift * (pulse.start - self.now)
+        _, spin = self._coast(pulse.start)
         factor = rates.width_factor(
-            self.a, spin, axial / self.C, pulse.on_time, growth=self.spacecraft.growth, drift=drift
+            self.a,
+            spin,
+            axial / self.C,
+            pulse.on_time,
+            growth=self.spacecraft.growth,
+            drift=self.spacecraft.spin_drift,
         )
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
@@ -103,8 +112,8 @@ class Walk:
 
     def fire(self, pulse: Pulse) -> None:
         """Take ``pulse`` into the schedule."""
-        self.omega = self.omega_at(pulse.t) + self.acts(pulse) / self.A
-        self.spin += float(pulse.impulse[2]) / self.C + self.spacecraft.spin_drift * (pulse.t - self.now)
+        omega, (_, spin) = self.omega_at(pulse.t) + self.acts(pulse) / self.A, self._coast(pulse.t)
+        self.omega, self.spin = omega, spin + float(pulse.impulse[2]) / self.C
         self.now = pulse.t
         self.ready = pulse.end + self.spacecraft.limits.gap
         self.pulses.append(pulse)
@@ -148,10 +157,14 @@ class Walk:
         return channel_pulse(channel, centre, on_time) if self.windows.allows(start, on_time, self.ready) else None
 
     def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
-        """Moment near ``centre`` at which a disturbed ω opposes the pulse: each step mends the angle still missing."""
+        """Moment near ``centre`` at which ω opposes the pulse where it does not turn evenly.
+
+        Each step mends the angle still missing, by the rate at which ω turns there.
+        """
         for _ in range(20):
             turn = damping.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
-            centre += turn / (self.a * self.spin)
+            _, spin = self._coast(centre)
+            centre += turn / (self.a * (spin or self.spin))
             if abs(turn) < ALIGNED:
                 break
         return centre
