@@ -63,10 +63,10 @@ def by_name(value: Mapping[str, object]) -> bool:
 class ToleranceSection(Section):
     """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
 
-    normal: Any = None
-    uniform: Any = None
-    triangular: Any = None
-    bias: Any = None
+    normal: Any = Field(default=None, description="One sigma of a normal distribution.")
+    uniform: Any = Field(default=None, description="Half the width of a uniform distribution.")
+    triangular: Any = Field(default=None, description="Half the width of a triangular distribution.")
+    bias: Any = Field(default=None, description="Fixed offset, signed.")
 
     def tolerance(self, key: str) -> Tolerance:
         """The checked tolerance, which stands at ``key`` of the dispersions."""
@@ -123,34 +123,46 @@ class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
 
     A: Annotated[ToleranceSection, Shown("A")] | None = Field(
-        default=None, description="Of the transverse moment of inertia, kg m² or %."
+        default=None, description="Of the transverse moment of inertia, kg m² or %.", examples=[{"normal": "2 %"}]
     )
     C: Annotated[ToleranceSection, Shown("C")] | None = Field(
-        default=None, description="Of the moment of inertia about the spin axis, kg m² or %."
+        default=None,
+        description="Of the moment of inertia about the spin axis, kg m² or %.",
+        examples=[{"normal": "1.6 kg m^2"}],
     )
     omega0: Annotated[_Three, Shown("omega0")] | None = Field(
-        default=None, description="Of each body rate at t = 0, rad/s or %; or a list of three."
+        default=None,
+        description="Of each body rate at t = 0, rad/s or %; or a list of three.",
+        examples=[{"normal": "0.1 deg/s"}],
     )
     thrust: Annotated[_ByThruster, Shown("thrust")] | None = Field(
-        default=None, description="Of each thruster, the same in all its pulses, % or N; or by name."
+        default=None,
+        description="Of each thruster, the same in all its pulses, % or N; or by name.",
+        examples=[{"normal": "3 %"}],
     )
     thrust_per_pulse: Annotated[ToleranceSection, Shown("thrust_per_pulse")] | None = Field(
-        default=None, description="Of the thrust, in each pulse anew, %."
+        default=None, description="Of the thrust, in each pulse anew, %.", examples=[{"normal": "1 %"}]
     )
     thrust_direction: Annotated[_ByThruster, Shown("thrust_direction")] | None = Field(
-        default=None, description="Tilt of each force about two axes across it, rad; or by name."
+        default=None,
+        description="Tilt of each force about two axes across it, rad; or by name.",
+        examples=[{"normal": "0.5 deg"}],
     )
     position: Annotated[_ByThruster, Shown("position")] | None = Field(
-        default=None, description="Of each thruster's position, each component, m; or by name."
+        default=None,
+        description="Of each thruster's position, each component, m; or by name.",
+        examples=[{"normal": "5 mm"}],
     )
     timing: Annotated[ToleranceSection, Shown("timing")] | None = Field(
-        default=None, description="Shift of each pulse, s."
+        default=None, description="Shift of each pulse, s.", examples=[{"uniform": "5 ms"}]
     )
     timing_offset: Annotated[ToleranceSection, Shown("timing_offset")] | None = Field(
-        default=None, description="One shift of the whole schedule, s."
+        default=None, description="One shift of the whole schedule, s.", examples=[{"bias": "2 ms"}]
     )
     attitude: Annotated[ToleranceSection, Shown("attitude")] | None = Field(
-        default=None, description="Of the direction of the spin axis at t = 0, about two axes across it, rad."
+        default=None,
+        description="Of the direction of the spin axis at t = 0, about two axes across it, rad.",
+        examples=[{"normal": "0.2 deg"}],
     )
 
 

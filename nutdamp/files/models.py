@@ -72,31 +72,45 @@ class InertiaSection(Section):
         json_schema_extra={"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
     )
 
-    A: Moment | None = Field(default=None, description="Transverse moment of inertia, kg m².")
-    C: Moment | None = Field(default=None, description="Moment of inertia about the spin axis 3, kg m²; at most 2 A.")
+    A: Moment | None = Field(default=None, description="Transverse moment of inertia, kg m².", examples=["120 kg m^2"])
+    C: Moment | None = Field(
+        default=None, description="Moment of inertia about the spin axis 3, kg m²; at most 2 A.", examples=["80 kg m^2"]
+    )
     tensor: Tensor | None = Field(
         default=None,
         description="Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
+        examples=[[[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]]],
     )
 
 
 class StateSection(Section):
     """The motion at t = 0 by spin and nutation angle."""
 
-    spin: Rate = Field(description="Spin rate about axis 3, signed, rad/s; not zero.")
+    spin: Rate = Field(description="Spin rate about axis 3, signed, rad/s; not zero.", examples=["30 rpm"])
     nutation: Nutation = Field(
-        description="Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg."
+        description="Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.",
+        examples=["5 deg"],
     )
-    phase: Angle = Field(default=0.0, description="Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.")
+    phase: Angle = Field(
+        default=0.0,
+        description="Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.",
+        examples=["20 deg"],
+    )
 
 
 class AttitudeSection(Section):
     """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
 
-    quaternion: Quaternion = Field(description="Turn from body to frame, scalar first; normalised when read.")
-    epoch: Epoch | None = Field(default=None, description="Date and time of t = 0, ISO 8601; without a zone it is UTC.")
+    quaternion: Quaternion = Field(
+        description="Turn from body to frame, scalar first; normalised when read.", examples=[[1, 0, 0, 0]]
+    )
+    epoch: Epoch | None = Field(
+        default=None,
+        description="Date and time of t = 0, ISO 8601; without a zone it is UTC.",
+        examples=["2026-03-01T12:00:00Z"],
+    )
     frame: Literal["EME2000", "J2000", "GCRF"] | None = Field(
-        default=None, description="Inertial frame of the quaternion."
+        default=None, description="Inertial frame of the quaternion.", examples=["EME2000"]
     )
 
 
@@ -112,45 +126,62 @@ class ThrusterSection(Section):
         }
     )
 
-    name: Name = Field(description="Name of the thruster, used by channels and in schedules.")
-    position: Position | None = Field(default=None, description="Where the force acts, from the centre of mass, m.")
-    direction: Direction | None = Field(
-        default=None, description="Direction of the force on the spacecraft (against the plume), any length but zero."
+    name: Name = Field(description="Name of the thruster, used by channels and in schedules.", examples=["T1"])
+    position: Position | None = Field(
+        default=None, description="Where the force acts, from the centre of mass, m.", examples=[[0, "0.5 m", "0.8 m"]]
     )
-    force: Force | None = Field(default=None, description="Thrust, N.")
+    direction: Direction | None = Field(
+        default=None,
+        description="Direction of the force on the spacecraft (against the plume), any length but zero.",
+        examples=[[1, 0, 0]],
+    )
+    force: Force | None = Field(default=None, description="Thrust, N.", examples=["10 N"])
     torque: Torques | None = Field(
         default=None,
         description="Torque about the centre of mass, N m; instead of position, direction and force.",
+        examples=[[0, "-8 N m", 0]],
     )
     lever_arm: Lever | None = Field(
-        default=None, description="Lever arm, m, that gives the thrust of a torque, for the propellant."
+        default=None,
+        description="Lever arm, m, that gives the thrust of a torque, for the propellant.",
+        examples=["0.8 m"],
     )
-    isp: PositiveTime | None = Field(default=None, description="Specific impulse, s, for the propellant.")
-    min_on_time: Time = Field(default=0.0, description="Shortest firing, s; default 0.")
-    max_on_time: PositiveTime | None = Field(default=None, description="Longest firing, s; default: no limit.")
+    isp: PositiveTime | None = Field(
+        default=None, description="Specific impulse, s, for the propellant.", examples=["220 s"]
+    )
+    min_on_time: Time = Field(default=0.0, description="Shortest firing, s; default 0.", examples=["20 ms"])
+    max_on_time: PositiveTime | None = Field(
+        default=None, description="Longest firing, s; default: no limit.", examples=["2 s"]
+    )
 
 
 class SteerableSection(Section):
     """A torquer for any transverse axis; body-fixed during one pulse."""
 
     torque: Torque | None = Field(
-        default=None, description="Its torque, N m; left out: an ideal impulse without width."
+        default=None, description="Its torque, N m; left out: an ideal impulse without width.", examples=["20 N m"]
     )
-    isp: PositiveTime | None = Field(default=None, description="Specific impulse, s, for the propellant.")
-    lever_arm: Lever | None = Field(default=None, description="Lever arm, m, for the propellant.")
+    isp: PositiveTime | None = Field(
+        default=None, description="Specific impulse, s, for the propellant.", examples=["220 s"]
+    )
+    lever_arm: Lever | None = Field(default=None, description="Lever arm, m, for the propellant.", examples=["1 m"])
 
 
 class RequirementSection(Section):
     """What a plan must reach at its end."""
 
     nutation: AcuteAngle | None = Field(
-        default=None, description="Largest nutation angle, rad, above 0 and below 90 deg."
+        default=None, description="Largest nutation angle, rad, above 0 and below 90 deg.", examples=["0.5 deg"]
     )
     momentum_shift: AcuteAngle | None = Field(
-        default=None, description="Largest turn of the angular momentum, rad, above 0 and below 90 deg."
+        default=None,
+        description="Largest turn of the angular momentum, rad, above 0 and below 90 deg.",
+        examples=["0.2 deg"],
     )
     probability: Probability | None = Field(
-        default=None, description="How surely dispersed flights must meet it, above 0 and below 1 (or in %)."
+        default=None,
+        description="How surely dispersed flights must meet it, above 0 and below 1 (or in %).",
+        examples=["99.7 %"],
     )
 
 
@@ -158,31 +189,43 @@ class GoalSection(Section):
     """Where the motion is to end; without it the angular momentum stays where it is, and the spin as it comes."""
 
     tilt: Tilt | None = Field(
-        default=None, description="Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg."
+        default=None,
+        description="Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.",
+        examples=["10 deg"],
     )
     azimuth: Angle | None = Field(
-        default=None, description="Its direction about it, rad, from the side to which the spin axis leans at t = 0."
+        default=None,
+        description="Its direction about it, rad, from the side to which the spin axis leans at t = 0.",
+        examples=["45 deg"],
     )
-    right_ascension: Angle | None = Field(default=None, description="Of the target axis in the attitude's frame, rad.")
+    right_ascension: Angle | None = Field(
+        default=None, description="Of the target axis in the attitude's frame, rad.", examples=["83.6 deg"]
+    )
     declination: Declination | None = Field(
-        default=None, description="Of the target axis in the attitude's frame, rad."
+        default=None, description="Of the target axis in the attitude's frame, rad.", examples=["22 deg"]
     )
-    spin: Rate | None = Field(default=None, description="Spin rate about axis 3 at the end, rad/s, signed.")
+    spin: Rate | None = Field(
+        default=None, description="Spin rate about axis 3 at the end, rad/s, signed.", examples=["31 rpm"]
+    )
 
 
 class LimitsSection(Section):
     """What every schedule keeps."""
 
     horizon: PositiveTime | None = Field(
-        default=None, description="End of the planning time, s; default: 20 nutation periods."
+        default=None, description="End of the planning time, s; default: 20 nutation periods.", examples=["120 s"]
     )
-    earliest: Time = Field(default=0.0, description="No pulse begins before, s; default 0.")
-    gap: Time = Field(default=0.0, description="Least time between two pulses, s; default 0.")
+    earliest: Time = Field(default=0.0, description="No pulse begins before, s; default 0.", examples=["5 s"])
+    gap: Time = Field(default=0.0, description="Least time between two pulses, s; default 0.", examples=["0.5 s"])
     tick: PositiveTime | None = Field(
-        default=None, description="Resolution of commanded starts and on-times, s; default: none."
+        default=None, description="Resolution of commanded starts and on-times, s; default: none.", examples=["1 ms"]
     )
-    max_pulses: Count | None = Field(default=None, description="Largest number of pulses; default: no limit.")
-    blackout: list[Window] = Field(default=[], description="Windows [begin, end], s, in which no pulse may be on.")
+    max_pulses: Count | None = Field(
+        default=None, description="Largest number of pulses; default: no limit.", examples=[8]
+    )
+    blackout: list[Window] = Field(
+        default=[], description="Windows [begin, end], s, in which no pulse may be on.", examples=[[["10 s", "20 s"]]]
+    )
 
 
 _TURNING = [{"required": ["rate"]}, {"required": ["fixed_in"]}]
@@ -199,21 +242,27 @@ class DisturbanceSection(Section):
 
     model_config = ConfigDict(json_schema_extra={"oneOf": _KINDS})
 
-    name: Name | None = Field(default=None, description="Name of the disturbance, for reports.")
+    name: Name | None = Field(default=None, description="Name of the disturbance, for reports.", examples=["leak"])
     kind: Literal["constant", "rotating", "axial"] | None = Field(
         default=None,
         description="constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
         "Default: rotating where rate or fixed_in is given, else constant.",
+        examples=["rotating"],
     )
     torque: DisturbingTorques = Field(
         description="Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
-        "of an axial one a single torque."
+        "of an axial one a single torque.",
+        examples=[["20 mN m", 0, 0]],
     )
     rate: Rate | None = Field(
-        default=None, description="Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s."
+        default=None,
+        description="Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.",
+        examples=["-3 rad/s"],
     )
     fixed_in: Literal["inertial"] | None = Field(
-        default=None, description="inertial: a rotating torque nearly fixed in space; its rate is minus the spin."
+        default=None,
+        description="inertial: a rotating torque nearly fixed in space; its rate is minus the spin.",
+        examples=["inertial"],
     )
 
 
@@ -221,7 +270,8 @@ class DissipationSection(Section):
     """Energy dissipation within the body, by flexible parts or liquids."""
 
     time_constant: PositiveTime = Field(
-        description="Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e."
+        description="Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e.",
+        examples=["600 s"],
     )
 
 
@@ -233,32 +283,67 @@ class SpacecraftFile(Section):
         json_schema_extra={"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]},
     )
 
-    name: Name = Field(description="Name of the spacecraft.")
-    mass: Mass | None = Field(default=None, description="Mass, kg; without it no velocity change is worked out.")
-    inertia: InertiaSection = Field(description="Moments of inertia: A and C, or tensor, kg m².")
-    omega0: Rates | None = Field(default=None, description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.")
+    name: Name = Field(description="Name of the spacecraft.", examples=["Sounder-1"])
+    mass: Mass | None = Field(
+        default=None, description="Mass, kg; without it no velocity change is worked out.", examples=["250 kg"]
+    )
+    inertia: InertiaSection = Field(
+        description="Moments of inertia: A and C, or tensor, kg m².", examples=[{"A": "120 kg m^2", "C": "80 kg m^2"}]
+    )
+    omega0: Rates | None = Field(
+        default=None,
+        description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.",
+        examples=[[0.12, "2 deg/s", "30 rpm"]],
+    )
     state: StateSection | None = Field(
-        default=None, description="Motion at t = 0 by spin and nutation; or instead omega0."
+        default=None,
+        description="Motion at t = 0 by spin and nutation; or instead omega0.",
+        examples=[{"spin": "30 rpm", "nutation": "5 deg"}],
     )
-    attitude: AttitudeSection | None = Field(default=None, description="Attitude at t = 0.")
+    attitude: AttitudeSection | None = Field(
+        default=None, description="Attitude at t = 0.", examples=[{"quaternion": [1, 0, 0, 0], "frame": "EME2000"}]
+    )
     object_id: Name | None = Field(
-        default=None, description="International designator, such as 1998-001A, for messages to flight dynamics."
+        default=None,
+        description="International designator, such as 1998-001A, for messages to flight dynamics.",
+        examples=["1998-001A"],
     )
-    thrusters: list[ThrusterSection] = Field(default=[], description="Body-fixed thrusters.")
+    thrusters: list[ThrusterSection] = Field(
+        default=[],
+        description="Body-fixed thrusters.",
+        examples=[[{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}]],
+    )
     channels: Annotated[dict[str, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)] | None = Field(
         default=None,
         description="Names of thrusters that fire together; without it each thruster is a channel of its own.",
+        examples=[{"+M1": ["T1", "T2"]}],
     )
-    steerable: SteerableSection | None = Field(default=None, description="A torquer for any transverse axis.")
-    disturbances: list[DisturbanceSection] = Field(default=[], description="Torques that nobody commands.")
+    steerable: SteerableSection | None = Field(
+        default=None, description="A torquer for any transverse axis.", examples=[{"torque": "20 N m"}]
+    )
+    disturbances: list[DisturbanceSection] = Field(
+        default=[],
+        description="Torques that nobody commands.",
+        examples=[[{"name": "leak", "torque": ["20 mN m", 0, 0]}]],
+    )
     dissipation: DissipationSection | None = Field(
-        default=None, description="Energy dissipation; without it the body is rigid."
+        default=None,
+        description="Energy dissipation; without it the body is rigid.",
+        examples=[{"time_constant": "600 s"}],
     )
-    requirement: RequirementSection | None = Field(default=None, description="What a plan must reach.")
-    limits: LimitsSection | None = Field(default=None, description="Limits that every schedule keeps.")
-    goal: GoalSection | None = Field(default=None, description="Where axis and spin are to end.")
+    requirement: RequirementSection | None = Field(
+        default=None, description="What a plan must reach.", examples=[{"nutation": "0.5 deg"}]
+    )
+    limits: LimitsSection | None = Field(
+        default=None, description="Limits that every schedule keeps.", examples=[{"horizon": "120 s"}]
+    )
+    goal: GoalSection | None = Field(
+        default=None, description="Where axis and spin are to end.", examples=[{"tilt": "10 deg", "azimuth": "45 deg"}]
+    )
     dispersions: DispersionsSection | None = Field(
-        default=None, description="How far the truth may be off what the file says."
+        default=None,
+        description="How far the truth may be off what the file says.",
+        examples=[{"A": {"normal": "2 %"}}],
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from nutdamp.files.spacecraft_file import built_in_example_text, json_schema
+from nutdamp.files.spacecraft_file import built_in_example_text, json_schema, read_spacecraft
 from nutdamp.files.yaml_tree import read_tree
 
 SCHEMA = json_schema()
@@ -172,3 +172,19 @@ def test_every_key_is_explained() -> None:
 
 def test_no_key_takes_null() -> None:
     assert not any(node.get("type") == "null" or node.get("default", 0) is None for node in nodes(SCHEMA))
+
+
+def test_every_key_has_an_example_that_is_valid() -> None:
+    """Each example alone, and all of those of the root that go together."""
+    sections = [SCHEMA, *SCHEMA["$defs"].values()]
+    keys = [(key, schema) for section in sections for key, schema in section["properties"].items()]
+    assert len(keys) > 60
+    for key, schema in keys:
+        validator = Draft202012Validator({**schema, "$defs": SCHEMA["$defs"]})
+        assert schema["examples"], key
+        for example in schema["examples"]:
+            validator.validate(example)
+    root = {
+        key: schema["examples"][0] for key, schema in SCHEMA["properties"].items() if key not in ("omega0", "channels")
+    }
+    assert read_spacecraft(json.dumps(root), "examples").name == root["name"]
