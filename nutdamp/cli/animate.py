@@ -7,6 +7,7 @@ import click
 from nutdamp.cli.common import (
     Aim,
     Input,
+    deliver,
     expect_places,
     load,
     plan_or_read,
@@ -14,7 +15,6 @@ from nutdamp.cli.common import (
     remarks,
     scheme_options,
     spacecraft_argument,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.progress import progress
@@ -75,6 +75,6 @@ def command(
         )
     with progress("filming", timed.frames, quiet=quiet) as step:
         content = animation.film(flight.flown(body, pulses, end), timed, output, width, step)
-    write_all([(output, content)])
+    deliver([(output, content)])
     if output != "-":
         remark(f"wrote {output}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")

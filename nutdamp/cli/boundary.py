@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -14,12 +16,19 @@ UNREADABLE = 1
 BAD_INPUT = 2
 INFEASIBLE = 3
 REQUIREMENT_MISSED = 4
-INTERRUPTED = 130
+INTERRUPTED = 128 + signal.SIGINT
+TERMINATED = 128 + signal.SIGTERM
+
+
+class Terminated(BaseException):
+    """SIGTERM came: the run ends in order, so that no temporary file stays behind."""
 
 
 def run(group: click.Group) -> None:
     """Run ``group`` on the arguments of the process and leave with its exit status."""
     _open_streams()
+    if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _terminate)
     try:
         status = group.main(standalone_mode=False)
         sys.stdout.flush()
@@ -31,6 +40,9 @@ def run(group: click.Group) -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         status = INTERRUPTED
+    except Terminated:
+        click.echo("terminated", err=True)
+        status = TERMINATED
     except BrokenPipeError:
         # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
         _silence_stdout()
@@ -45,6 +57,16 @@ def run(group: click.Group) -> None:
     except Exception as wrong:
         status = _explain(wrong)
     sys.exit(status if isinstance(status, int) else DONE)
+
+
+def interruption(number: int) -> BaseException:
+    """What ends a run after a signal."""
+    return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one would interrupt the clearing up
+    raise Terminated
 
 
 def _open_streams() -> None:

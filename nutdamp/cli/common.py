@@ -15,6 +15,7 @@ from nutdamp.schemes import LEAST, Options
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from nutdamp.errors import CannotWrite
     from nutdamp.files.settings import Setting
     from nutdamp.planning import Plan
     from nutdamp.spacecraft import Spacecraft, Vector
@@ -33,6 +34,9 @@ dispersions:
   thrust: {normal: 3 %}
   timing: {uniform: 5 ms}"""
 """What is said of a file that should have dispersions."""
+
+Output = tuple[str, str | bytes]
+"""Path and content of a file to write."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -339,13 +343,28 @@ def expect_places(*paths: str | None) -> None:
             check_place(path)
 
 
-def write_all(outputs: list[tuple[str, str | bytes]]) -> None:
-    """Write the files asked for, once all of their contents are made."""
+def deliver(outputs: Sequence[Output], *screens: RenderableType, unsaved: Sequence[CannotWrite] = ()) -> None:
+    """Write the files asked for, and show results on standard output.
+
+    A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
+    those that are ``unsaved`` already. Raises CannotWrite.
+    """
+    failures = list(unsaved)
     if outputs:
+        from nutdamp.errors import CannotWrite
         from nutdamp.files.output import write_whole
 
         for path, content in outputs:
-            write_whole(path, content)
+            try:
+                write_whole(path, content)
+            except CannotWrite as wrong:
+                failures.append(wrong)
+    for screen in screens:
+        show(screen)
+    for failure in failures[:-1]:
+        click.echo(f"nutdamp: {failure}", err=True)
+    if failures:
+        raise failures[-1]
 
 
 def show(renderable: RenderableType) -> None:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from nutdamp.cli.boundary import INTERRUPTED, REQUIREMENT_MISSED
+from nutdamp.cli.boundary import REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
     Aim,
     Input,
+    Output,
+    deliver,
     expect_picture,
     expect_places,
     load,
@@ -22,15 +25,17 @@ from nutdamp.cli.common import (
     remarks,
     require_dispersions,
     scheme_options,
-    show,
     spacecraft_argument,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE, Count
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
-    from nutdamp.dispersion.study import Results, Study
+    from rich.console import RenderableType
+
+    from nutdamp.dispersion.statistics import Array
+    from nutdamp.dispersion.study import Collect, Results, Study
+    from nutdamp.errors import CannotWrite
 
 SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
@@ -102,8 +107,8 @@ def command(
     if case is not None:
         _one_case(study, case - 1, plan.scheme, json, silent)
         return
-    results = fly(study, samples, threads, csv, resume, quiet)
-    outputs: list[tuple[str, str | bytes]] = []
+    results, unsaved, stopped_by = fly(study, samples, threads, csv, resume, quiet)
+    outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.dispersion_json import dispersion_json
         from nutdamp.files.output import json_text
@@ -113,53 +118,92 @@ def command(
         from nutdamp.report import figures
 
         outputs.append((plot, figures.rendered(figures.dispersion_figure(results, scheme=plan.scheme), plot)))
-    write_all(outputs)
+    screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.dispersion_tables import dispersion_screen
 
-        show(dispersion_screen(results, scheme=plan.scheme, worst=worst))
-    if results.done < results.asked:
+        screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst))
+    deliver(outputs, *screens, unsaved=unsaved)
+    if stopped_by is not None and results.done < results.asked:
         click.echo(f"interrupted: {results.done} of {results.asked} cases are done", err=True)
-        sys.exit(INTERRUPTED)
+        sys.exit(128 + stopped_by)
     if results.meets_requirement is False:
         sys.exit(REQUIREMENT_MISSED)
 
 
-def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Results:
-    """Fly the cases, with a bar, until they are done or somebody interrupts."""
+class Flown(NamedTuple):
+    """A study after its run: the results, the files that could not be saved, and the signal that ended it, if any."""
+
+    results: Results
+    unsaved: tuple[CannotWrite, ...]
+    stopped_by: int | None
+
+
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Flown:
+    """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.dispersion.study import Results, run, threads_here
+    from nutdamp.errors import CannotWrite
+    from nutdamp.files.study_file import load_results, save_results
 
-    results = Results(study, samples)
-    if resume is not None:
-        from nutdamp.files.study_file import load_results, save_results
-
-        results = load_results(resume, study, samples)
-    with ExitStack() as stack:
-        collect = None
-        if csv is not None:
-            from nutdamp.files.output import whole_file
-            from nutdamp.files.samples_csv import SamplesWriter, check_room
-
-            check_room(csv, study, samples)
-            collect = SamplesWriter(stack.enter_context(whole_file(csv)), study).write
-        stopped = stack.enter_context(stoppable())
-        told = stack.enter_context(progress("flying", samples, quiet=quiet, done=results.done))
+    results = Results(study, samples) if resume is None else load_results(resume, study, samples)
+    unsaved: list[CannotWrite] = []
+    with stoppable() as stopped, progress("flying", samples, quiet=quiet, done=results.done) as told:
         saved = time.monotonic()
 
         def watch(done: int) -> None:
             nonlocal saved
             told(done)
             if resume is not None and time.monotonic() - saved > SAVED_EVERY:
-                save_results(resume, results)
+                with suppress(CannotWrite):  # the last time tells
+                    save_results(resume, results)
                 saved = time.monotonic()
 
-        run(results, threads=threads or threads_here(), watch=watch, stopped=stopped, collect=collect)
-        if not results.done:
-            raise click.Abort  # so that no file is written
+        def fly_all(collect: Collect | None) -> None:
+            run(results, threads=threads or threads_here(), watch=watch, stopped=stopped, collect=collect)
+            if not results.done and stopped.number is not None:
+                raise interruption(stopped.number)  # so that no file is written
+
+        try:
+            _fly_into(csv, study, samples, fly_all)
+        except CannotWrite as wrong:
+            if results.done < samples and not stopped():
+                raise  # it never began
+            unsaved.append(wrong)
         if resume is not None:
-            save_results(resume, results)
-    return results
+            try:
+                save_results(resume, results)
+            except CannotWrite as wrong:
+                unsaved.append(wrong)
+    return Flown(results, tuple(unsaved), stopped.number)
+
+
+def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Collect | None], None]) -> None:
+    """Fly the cases and write them to a file, if one is named; raises CannotWrite, after the flight if it can."""
+    if csv is None:
+        fly_all(None)
+        return
+    from nutdamp.files.output import whole_file
+    from nutdamp.files.samples_csv import SamplesWriter, check_room
+
+    check_room(csv, study, samples)
+    full: OSError | None = None
+    with whole_file(csv) as stream:
+        writer = SamplesWriter(stream, study)
+
+        def collect(first: int, values: Array) -> None:
+            nonlocal full
+            try:
+                if full is None:
+                    writer.write(first, values)
+            except BrokenPipeError:
+                raise
+            except OSError as reason:
+                full = reason
+
+        fly_all(collect)
+        if full is not None:
+            raise full
 
 
 def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bool) -> None:
@@ -167,12 +211,15 @@ def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bo
     from nutdamp.dispersion.single import flown_outputs
 
     draws = study.draws_of(case)
+    outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.dispersion_json import case_json
         from nutdamp.files.output import json_text
 
-        write_all([(json, json_text({"scheme": scheme, "seed": study.seed, **case_json(study, case, draws)}))])
+        outputs.append((json, json_text({"scheme": scheme, "seed": study.seed, **case_json(study, case, draws)})))
+    screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.dispersion_tables import case_screen
 
-        show(case_screen(study, case, draws, flown_outputs(study.model, draws), scheme=scheme))
+        screens.append(case_screen(study, case, draws, flown_outputs(study.model, draws), scheme=scheme))
+    deliver(outputs, *screens)

@@ -10,6 +10,7 @@ from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     Input,
+    deliver,
     expect_places,
     load,
     plan_or_read,
@@ -17,7 +18,6 @@ from nutdamp.cli.common import (
     remarks,
     scheme_options,
     spacecraft_argument,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
@@ -67,7 +67,7 @@ def command(
     expect_places(output)
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
-    write_all([(output, export_text(plan, form, xml=notation, until=until))])
+    deliver([(output, export_text(plan, form, xml=notation, until=until))])
     if output != "-":
         remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
     if plan.meets_requirement is False and scheme != "none":

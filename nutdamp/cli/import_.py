@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from nutdamp.cli.common import one_stdout, quiet_option, remarks, write_all
+from nutdamp.cli.common import Output, deliver, one_stdout, quiet_option, remarks
 from nutdamp.cli.parameters import FILE
 
 
@@ -30,10 +30,10 @@ def command(form: str, file: str, output: str, schedule: str | None, quiet: bool
 
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
-    outputs: list[tuple[str, str | bytes]] = [(output, text)]
+    outputs: list[Output] = [(output, text)]
     if schedule is not None:
         outputs.append((schedule, pulses_csv(flown(body, pulses))))
-    write_all(outputs)
+    deliver(outputs)
     remark = remarks(quiet)
     for entry in contents.remarks:
         remark(f"{file}: {entry}")

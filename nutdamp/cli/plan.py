@@ -11,6 +11,8 @@ from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     Input,
+    Output,
+    deliver,
     expect_picture,
     expect_places,
     load,
@@ -20,15 +22,15 @@ from nutdamp.cli.common import (
     remarks,
     require_dispersions,
     scheme_options,
-    show,
     spacecraft_argument,
     tell_unread,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from nutdamp.planning import Comparison
     from nutdamp.robust import RobustComparison
 
@@ -88,7 +90,7 @@ def command(
     else:
         chosen = None if dispersed.chosen is None else dispersed.chosen.plan
         met = dispersed.meets_requirement
-    outputs: list[tuple[str, str | bytes]] = []
+    outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.plan_json import comparison_json
@@ -110,15 +112,16 @@ def command(
     for path in (csv, plot):
         if path is not None and chosen is None:
             click.echo(f"{path} was not written: no plan is feasible", err=True)
-    write_all(outputs)
+    screens: list[RenderableType] = []
     if not silent and dispersed is not None:
         from nutdamp.report.robust_tables import robust_screen
 
-        show(robust_screen(dispersed))
+        screens.append(robust_screen(dispersed))
     elif not silent:
         from nutdamp.report.plan_tables import comparison_screen
 
-        show(comparison_screen(compared))
+        screens.append(comparison_screen(compared))
+    deliver(outputs, *screens)
     if chosen is None:
         sys.exit(INFEASIBLE)
     if met is False:

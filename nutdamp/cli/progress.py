@@ -102,23 +102,32 @@ class _Bar:
             self.bar.stop()
 
 
+class Stop:
+    """Whether a run was asked to stop, and by which signal."""
+
+    number: int | None = None
+
+    def __call__(self) -> bool:
+        """Whether it was."""
+        return self.number is not None
+
+
 @contextmanager
-def stoppable() -> Iterator[Callable[[], bool]]:
-    """A function that tells whether the run was asked to stop, by Ctrl-C or SIGTERM, so that it can end in order.
+def stoppable() -> Iterator[Stop]:
+    """Tells whether the run was asked to stop, by Ctrl-C or SIGTERM, so that it can end in order.
 
     A second Ctrl-C interrupts at once.
     """
-    asked = False
+    stop = Stop()
 
     def ask(number: int, _: FrameType | None) -> None:
-        nonlocal asked
-        if asked and number == signal.SIGINT:
+        if stop() and number == signal.SIGINT:
             raise KeyboardInterrupt
-        asked = True
+        stop.number = number
 
     before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield lambda: asked
+        yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
+from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
     Aim,
     Input,
+    deliver,
     expect_places,
     quiet_option,
     remarks,
@@ -20,7 +21,6 @@ from nutdamp.cli.common import (
     source,
     spacecraft_argument,
     tell_unread,
-    write_all,
 )
 from nutdamp.cli.disperse import fly
 from nutdamp.cli.parameters import FILE, Count
@@ -86,7 +86,7 @@ def command(
     with working("writing the page", quiet=quiet):
         page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed)
         content = form.write(page, output)
-    write_all([(output, content)])
+    deliver([(output, content)])
     if output != "-":
         remark(f"wrote {output}")
     if chosen is None:
@@ -99,7 +99,9 @@ def _dispersed(chosen: Plan, samples: int, *, quiet: bool) -> Results:
     """The recommended schedule in many truths, flown as the rest of the report; interrupted, nothing is written."""
     from nutdamp.dispersion import study_of
 
-    results = fly(study_of(chosen.spacecraft, chosen.pulses, flown=True), samples, None, None, None, quiet)
-    if results.done < samples:
-        raise click.Abort
+    results, _, stopped_by = fly(
+        study_of(chosen.spacecraft, chosen.pulses, flown=True), samples, None, None, None, quiet
+    )
+    if stopped_by is not None and results.done < samples:
+        raise interruption(stopped_by)
     return results

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from nutdamp.cli.common import (
     Aim,
     Input,
+    Output,
+    deliver,
     expect_picture,
     expect_places,
     load,
@@ -16,12 +20,13 @@ from nutdamp.cli.common import (
     quiet_option,
     remarks,
     scheme_options,
-    show,
     spacecraft_argument,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.schemes import NAMES, Options
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 @click.command("simulate")
@@ -81,7 +86,7 @@ def command(
     residual, flown = (one.residual for one in flights)
     chosen = flights[real]
     track = chosen.track(samples, end)
-    outputs: list[tuple[str, str | bytes]] = []
+    outputs: list[Output] = []
     if csv is not None:
         from nutdamp.files.track_csv import track_csv
 
@@ -95,13 +100,14 @@ def command(
         from nutdamp.report import figures
 
         outputs.append((plot, figures.picture(figure, chosen, track, plot)))
-    write_all(outputs)
+    screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.simulate_tables import simulation_screen
 
-        how = "real pulse widths" if real else "impulse sum (17)"
-        show(simulation_screen(chosen, track, residual, flown, how=f"{plan.scheme}, propagated by the {how}"))
+        how = f"{plan.scheme}, propagated by the {'real pulse widths' if real else 'impulse sum (17)'}"
+        screens.append(simulation_screen(chosen, track, residual, flown, how=how))
     if drawn:
         from nutdamp.report.terminal import motion_drawing
 
-        show(motion_drawing(chosen, track))
+        screens.append(motion_drawing(chosen, track))
+    deliver(outputs, *screens)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,8 @@ from nutdamp.cli.boundary import INFEASIBLE
 from nutdamp.cli.common import (
     Aim,
     Input,
+    Output,
+    deliver,
     expect_picture,
     expect_places,
     load,
@@ -17,13 +20,16 @@ from nutdamp.cli.common import (
     quiet_option,
     remarks,
     scheme_options,
-    show,
     spacecraft_argument,
     tell_unread,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE, FOLDER, Quantity
 from nutdamp.schemes import Options
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from nutdamp.errors import CannotWrite
 
 
 class Allowance(Quantity):
@@ -86,7 +92,7 @@ def command(
     shifts = allow or (0.0, trade.EVERYWHERE)
     with progress("searching", points * len(set(shifts)), quiet=quiet) as step:
         found = trade.fronts(body, options, count=points, shifts=shifts, progress=step)
-    outputs: list[tuple[str, str | bytes]] = []
+    outputs: list[Output] = []
     if csv is not None or json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.trade_files import trade_csv, trade_json
@@ -99,16 +105,22 @@ def command(
         from nutdamp.report import figures
 
         outputs.append((plot, figures.rendered(figures.trade_figure(body, found), plot)))
+    unsaved: list[CannotWrite] = []
     if schedules is not None:
+        from nutdamp.errors import CannotWrite
         from nutdamp.files.output import make_folder
         from nutdamp.files.trade_files import schedule_files
 
-        make_folder(schedules)
-        outputs.extend(schedule_files(found, schedules))
-    write_all(outputs)
+        try:
+            make_folder(schedules)
+            outputs.extend(schedule_files(found, schedules))
+        except CannotWrite as wrong:
+            unsaved.append(wrong)
+    screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.trade_tables import trade_screen
 
-        show(trade_screen(body, found))
+        screens.append(trade_screen(body, found))
+    deliver(outputs, *screens, unsaved=unsaved)
     if not any(front.points for front in found):
         sys.exit(INFEASIBLE)

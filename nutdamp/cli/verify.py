@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,8 @@ from nutdamp.cli.boundary import UNREADABLE
 from nutdamp.cli.common import (
     Aim,
     Input,
+    Output,
+    deliver,
     expect_places,
     load,
     one_stdout,
@@ -17,12 +20,13 @@ from nutdamp.cli.common import (
     quiet_option,
     remarks,
     scheme_options,
-    show,
     spacecraft_argument,
-    write_all,
 )
 from nutdamp.cli.parameters import FILE
 from nutdamp.schemes import NAMES, Options
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 @click.command("verify")
@@ -58,15 +62,18 @@ def command(
     plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
     with working("verifying", quiet=quiet):
         found = verify(body, plan.pulses, None if schedule else unrounded(plan))
+    outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.verification_json import verification_json
 
-        write_all([(json, json_text(verification_json(body, plan.scheme, found)))])
+        outputs.append((json, json_text(verification_json(body, plan.scheme, found))))
+    screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.verify_tables import verification_screen
 
-        show(verification_screen(body, plan.scheme, found))
+        screens.append(verification_screen(body, plan.scheme, found))
+    deliver(outputs, *screens)
     if not found.agree:
         click.echo("nutdamp: the flown motion and DOP853 do not agree; please report this", err=True)
         sys.exit(UNREADABLE)

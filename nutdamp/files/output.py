@@ -10,20 +10,32 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
 from nutdamp.errors import CannotWrite
 
+if sys.platform != "win32":
+    import fcntl
+
 STDOUT = "-"
 """File name that stands for standard output."""
 
+PREFIX, SUFFIX = ".nutdamp-", ".part"
+"""How the names of temporary files begin and end."""
+
+ATTEMPTS = 10
+"""Temporary files that are made before giving up, where others remove them."""
+
 
 def write_whole(path: str, content: str | bytes) -> None:
-    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output. Raises CannotWrite."""
+    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output. Raises CannotWrite.
+
+    Text becomes UTF-8; what has no place there, such as a byte of a file name that is not UTF-8, becomes \\udcff.
+    """
     with whole_file(path) as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
+        stream.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
 
 
 @contextmanager
@@ -78,22 +90,57 @@ def make_folder(path: str) -> None:
 
 @contextmanager
 def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    remove_abandoned(target.parent)
+    handle, temporary = _locked_file(target.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-        if target.exists():
-            Path(temporary).chmod(target.stat().st_mode & 0o7777)
-        else:
-            mask = os.umask(0)
-            os.umask(mask)
-            Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(target)
+            if target.exists():
+                temporary.chmod(target.stat().st_mode & 0o7777)
+            else:
+                mask = os.umask(0)
+                os.umask(mask)
+                temporary.chmod(0o666 & ~mask)
+            if sys.platform == "win32":
+                stream.close()  # there an open file cannot be renamed; here it keeps its lock until it is
+            temporary.replace(target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
+
+
+def _locked_file(folder: Path) -> tuple[int, Path]:
+    """A new temporary file in ``folder``, open, and locked until it is closed or the process ends."""
+    for _ in range(ATTEMPTS):
+        handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)
+        with suppress(OSError):  # of a file system that knows no locks
+            _lock(handle)
+        if Path(name).exists():
+            return handle, Path(name)
+        os.close(handle)  # another run took it for abandoned just before it was locked
+    raise FileNotFoundError(f"temporary files in {folder} are removed as soon as they are made")
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files of runs that were killed: those that no process has locked."""
+    if sys.platform == "win32":
+        return
+    for path in folder.glob(f"{PREFIX}*{SUFFIX}"):
+        with suppress(OSError):
+            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                _lock(handle)
+                path.unlink()
+            finally:
+                os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock an open file until it is closed or the process ends. Raises OSError, also where another process has."""
+    if sys.platform != "win32":
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def number(value: float | None) -> str:
