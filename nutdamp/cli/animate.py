@@ -17,6 +17,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import progress
 from nutdamp.schemes import NAMES, Options
 
@@ -56,6 +57,7 @@ def command(
         raise click.UsageError("name what to show: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+    expect_outputs(spacecraft, schedule, output=output)
     from nutdamp.report.figures import animation
 
     animation.film_format(output)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
-from nutdamp.cli.common import Input, load, one_stdout, quiet_option, remarks, set_option, show
+from nutdamp.cli.common import Input, load, quiet_option, remarks, set_option, show
 from nutdamp.cli.parameters import FILE
+from nutdamp.cli.places import expect_outputs
 
 if TYPE_CHECKING:
     from nutdamp.files.settings import Setting
@@ -24,7 +25,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, FaultyFile
 
-    silent = one_stdout(json=json)
+    silent = expect_outputs(*(Input(file) for file in files or (None,)), json=json)
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
     for name in files or (None,):

@@ -326,14 +326,6 @@ def remarks(quiet: bool) -> Callable[[str], None]:
     return (lambda _: None) if quiet else (lambda text: click.echo(text, err=True))
 
 
-def one_stdout(**files: str | None) -> bool:
-    """Whether an output file is standard output, so that nothing else may go there; a usage error if two are."""
-    taken = [name for name, path in files.items() if path == "-"]
-    if len(taken) > 1:
-        raise click.UsageError(f"--{taken[0]} and --{taken[1]} cannot both go to standard output")
-    return bool(taken)
-
-
 def expect_places(*paths: str | None) -> None:
     """Say at once, not after the work, that a file cannot be written where it is to be."""
     from nutdamp.files.output import check_place

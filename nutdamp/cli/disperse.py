@@ -19,7 +19,6 @@ from nutdamp.cli.common import (
     expect_picture,
     expect_places,
     load,
-    one_stdout,
     plan_or_read,
     quiet_option,
     remarks,
@@ -28,6 +27,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Count
+from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def command(
         raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
     if resume == "-":
         raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
-    silent = one_stdout(csv=csv, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, schedule, csv=csv, json=json, plot=plot, resume=resume)
     expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)

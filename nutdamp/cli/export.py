@@ -20,6 +20,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.places import expect_outputs
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
 from nutdamp.schemes import NAMES, Options
 
@@ -62,6 +63,7 @@ def command(
         raise click.UsageError("name what to export: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+    expect_outputs(spacecraft, schedule, output=output)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(output)

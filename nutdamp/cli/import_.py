@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import click
 
-from nutdamp.cli.common import Output, deliver, one_stdout, quiet_option, remarks
+from nutdamp.cli.common import Output, deliver, quiet_option, remarks
 from nutdamp.cli.parameters import FILE
+from nutdamp.cli.places import expect_outputs
 
 
 @click.command("import")
@@ -21,7 +22,7 @@ def command(form: str, file: str, output: str, schedule: str | None, quiet: bool
     manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for
     standard input.
     """
-    one_stdout(output=output, schedule=schedule)
+    expect_outputs(file, output=output, schedule=schedule)
 
     from nutdamp.files.apm_import import imported
     from nutdamp.files.ccsds.apm_reader import read_apm

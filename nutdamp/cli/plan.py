@@ -16,7 +16,6 @@ from nutdamp.cli.common import (
     expect_picture,
     expect_places,
     load,
-    one_stdout,
     plot_options,
     quiet_option,
     remarks,
@@ -26,6 +25,7 @@ from nutdamp.cli.common import (
     tell_unread,
 )
 from nutdamp.cli.parameters import FILE
+from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def command(
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
-    silent = one_stdout(csv=csv, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot)
     expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)

@@ -24,6 +24,7 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.disperse import fly
 from nutdamp.cli.parameters import FILE, Count
+from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
 from nutdamp.schemes import PLANNED, Options
 
@@ -63,6 +64,7 @@ def command(
     from nutdamp.report.page.formats import form_of
 
     form = form_of(output)
+    expect_outputs(spacecraft, output=output)
     remark = remarks(quiet)
     text, name = source(spacecraft.path, remark)
 

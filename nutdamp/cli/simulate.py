@@ -14,7 +14,6 @@ from nutdamp.cli.common import (
     expect_picture,
     expect_places,
     load,
-    one_stdout,
     plan_or_read,
     plot_options,
     quiet_option,
@@ -23,6 +22,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def command(
         raise click.UsageError("name what to propagate: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
-    silent = one_stdout(csv=csv, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, schedule, csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
     expect_picture(plot, figure)

@@ -16,7 +16,6 @@ from nutdamp.cli.common import (
     expect_picture,
     expect_places,
     load,
-    one_stdout,
     quiet_option,
     remarks,
     scheme_options,
@@ -24,6 +23,7 @@ from nutdamp.cli.common import (
     tell_unread,
 )
 from nutdamp.cli.parameters import FILE, FOLDER, Quantity
+from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
@@ -79,18 +79,22 @@ def command(
         raise click.UsageError("time is traded against propellant or impulse: --least is one of these here")
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
-    silent = one_stdout(csv=csv, json=json, plot=plot)
+    from nutdamp import trade
+    from nutdamp.files.trade_files import schedule_files, schedule_path
+
+    shifts = allow or (0.0, trade.EVERYWHERE)
+    most = points * len(set(shifts))
+    written = [] if schedules is None else [schedule_path(schedules, index) for index in range(1, most + 1)]
+    silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot, schedules=written)
     expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
     tell_unread(("optimal",), options, body, remark)
 
-    from nutdamp import trade
     from nutdamp.cli.progress import progress
 
-    shifts = allow or (0.0, trade.EVERYWHERE)
-    with progress("searching", points * len(set(shifts)), quiet=quiet) as step:
+    with progress("searching", most, quiet=quiet) as step:
         found = trade.fronts(body, options, count=points, shifts=shifts, progress=step)
     outputs: list[Output] = []
     if csv is not None or json is not None:
@@ -109,7 +113,6 @@ def command(
     if schedules is not None:
         from nutdamp.errors import CannotWrite
         from nutdamp.files.output import make_folder
-        from nutdamp.files.trade_files import schedule_files
 
         try:
             make_folder(schedules)

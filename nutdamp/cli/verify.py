@@ -15,7 +15,6 @@ from nutdamp.cli.common import (
     deliver,
     expect_places,
     load,
-    one_stdout,
     plan_or_read,
     quiet_option,
     remarks,
@@ -23,6 +22,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE
+from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def command(
     """
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to verify: either --scheme or --schedule")
-    silent = one_stdout(json=json)
+    silent = expect_outputs(spacecraft, schedule, json=json)
     body = load(spacecraft, remarks(quiet), aim)
     expect_places(json)
 

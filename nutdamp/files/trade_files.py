@@ -66,6 +66,9 @@ def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]
 
 def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str | bytes]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    return [
-        (str(Path(folder) / f"point-{index}.csv"), pulses_csv(point.plan.flight)) for index, _, point in numbered(found)
-    ]
+    return [(schedule_path(folder, index), pulses_csv(point.plan.flight)) for index, _, point in numbered(found)]
+
+
+def schedule_path(folder: str, index: int) -> str:
+    """Where the pulses of the point ``index`` (from 1) go."""
+    return str(Path(folder) / f"point-{index}.csv")
