@@ -128,7 +128,7 @@ def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
     on: set[int] = set()
     for edge in order.tolist():
         torque = np.sum(turns[sorted(on)], axis=0) if on else None
-        _advance(bodies, rates, quaternion, now, edges[edge] - now, torque)
+        advance(bodies, rates, quaternion, now, edges[edge] - now, torque)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         if pulses.on_times[number] == 0.0:
@@ -148,15 +148,13 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for edge, turn, kick in zip(edges, turns, kicks, strict=True):
-        _advance(bodies, rates, quaternion, now, edge - now, torque)
+        advance(bodies, rates, quaternion, now, edge - now, torque)
         now = edge
         torque = torque + turn
         rates += kick / bodies.moments
 
 
-def _advance(
-    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, torque: Array | None
-) -> None:
+def advance(bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, torque: Array | None) -> None:
     """Move on by ``duration`` (n,) s from ``now`` under a ``torque`` (3, n) N m, in place; None is no torque."""
     if not duration.any():
         return

@@ -60,7 +60,7 @@ class Influence:
 def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
     """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H."""
     inertia, spin, goal = spacecraft.inertia, spacecraft.spin, spacecraft.goal
-    shift = -_square_to_target(spacecraft) @ spacecraft.momentum
+    shift = -square_to_target(spacecraft) @ spacecraft.momentum
     if np.any(shift):  # as long as the way there is on the sphere
         shift *= spacecraft.turning_impulse / np.linalg.norm(shift)
     final = spin if goal.spin is None else goal.spin
@@ -80,7 +80,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
 
     That a firing also turns the body under the pulses that follow is neglected; ``step`` s is for `Influence.of`.
     """
-    across = _square_to_target(flight.spacecraft)
+    across = square_to_target(flight.spacecraft)
 
     def rows(times: Vector) -> Vector:
         _, quaternions = flight.motion(times)
@@ -99,7 +99,7 @@ def misses(flight: Flight, equations: Equations) -> Vector:
     nutation = body.inertia.A * end.omega * back
     momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.moments))
     final = end.spin if body.goal.spin is None else body.goal.spin
-    shift = _square_to_target(body) @ momentum
+    shift = square_to_target(body) @ momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
 
 
@@ -107,7 +107,7 @@ def _turning(spacecraft: Spacecraft) -> Vector:
     return np.repeat([spacecraft.inertia.a * spacecraft.spin, spacecraft.spin, 0.0], [2, 2, 1])
 
 
-def _square_to_target(spacecraft: Spacecraft) -> Vector:
+def square_to_target(spacecraft: Spacecraft) -> Vector:
     """Two inertial unit vectors (2, 3) square to the target axis: body axes 1 and 2 at t = 0 as seen along it."""
     axis, body = spacecraft.target_axis, attitude.matrix(spacecraft.initial.quaternion)
     sense = np.sign(axis @ body[:, 2]) or 1.0

@@ -2,8 +2,9 @@
 
 The linear program of `program` finds the burns, at first with small angles. The schedule is flown, the program's
 equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
-and on-times are polished on it. Two bounds go with the plan: the program's first least cost, of first order, and a
-rigorous one.
+and on-times are polished on it. Where that finds nothing, where the horizon is no longer than a few nutation periods
+and where the schedule is dear, `optimal_starts` looks for a cheaper one from very many starts. Two bounds go with the
+plan: the program's first least cost, of first order, and a rigorous one.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ import numpy as np
 from nutdamp import flight
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Bounds, Schedule
-from nutdamp.schemes import Options, bounds, influence
+from nutdamp.schemes import Options, bounds, influence, optimal_starts
 from nutdamp.schemes.advice import no_channels
 from nutdamp.schemes.bounds import Left
 from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.influence import Equations
+from nutdamp.schemes.optimal_descent import Task
 from nutdamp.schemes.polish import polish
 from nutdamp.schemes.program import Burn, Program, Solution
+from nutdamp.schemes.trim import keeps_limits
 from nutdamp.schemes.windows import usable
 from nutdamp.spacecraft import Spacecraft
 
@@ -46,6 +49,12 @@ DEARER = 0.03
 
 WAYS = 3
 """Schedules of other schemes that are corrected to cost less."""
+
+SHORT = 4.0
+"""Inertial nutation periods up to which very many starts are tried."""
+
+PROVED = 0.002
+"""Share above the rigorous bound below which they are not: there is little to be saved."""
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
@@ -179,8 +188,21 @@ class _Search:
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        if first.unmet > UNMET:
+        solved = first.unmet <= UNMET
+        best = self.programmed(first) if solved else None
+        if self.doubtful(best, first):
+            best = self.cheaper(best, self.descended(best))
+        if best is None and not solved:
             raise Infeasible(self.cure())
+        if best is None:
+            raise Infeasible(
+                "not found: the program has solutions, but on the true motion the search did not settle on one that "
+                "keeps on-times, gap and max_pulses; another horizon may help"
+            )
+        return self.with_bounds(best, first) if solved else best
+
+    def programmed(self, first: Solution) -> Schedule | None:
+        """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
         best, horizon = self.settled(first.cost), self.spacecraft.horizon
         halvings = 0
         while self.dear(best, first.cost) and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period:
@@ -193,17 +215,47 @@ class _Search:
             best = self.cheaper(best, shorter.settled(first.cost))
         if self.dear(best, first.cost):
             best = self.cheaper(best, self.others(first.cost))
-        if best is None:
-            raise Infeasible(
-                "not found: the program has solutions, but on the true motion the search did not settle on one that "
-                "keeps on-times, gap and max_pulses; another horizon may help"
-            )
-        return self.with_bounds(best, first)
+        return best
+
+    def doubtful(self, made: Schedule | None, first: Solution) -> bool:
+        """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
+
+        Small angles hold least where there is no time to choose good moments: where nothing was found, within a few
+        nutation periods, and where a schedule is dear; but not where the rigorous bound proves it cheap enough.
+        """
+        body = self.spacecraft
+        short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
+        if first.unmet > UNMET:  # at large angles H may be brought there all the same
+            return short
+        if made is None:
+            return True
+        if not (short or self.dear(made, first.cost)):
+            return False
+        proof = self.with_bounds(made, first).bounds
+        return proof is None or proof.rigorous is None or self.price(made) > proof.rigorous * (1.0 + PROVED)
+
+    def descended(self, known: Schedule | None) -> Schedule | None:
+        """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
+        task = Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
+        found: list[_Found] = []
+        for made in optimal_starts.schedules(task, () if known is None else (known,)):
+            if self.spacecraft.limits.tick is not None:
+                missed = influence.misses(flight.flown(self.spacecraft, made), self.equations)
+                off = missed[2:4] if self.options.shift is not None else np.zeros(2)
+                made = polish(self.spacecraft, made, self.equations, off, self.program().width)
+            left = self.left(flight.flown(self.spacecraft, made))
+            if keeps_limits(self.spacecraft, made.pulses):
+                found.append(_Found(0.0 if left <= LEFT else left, self.worth(made), made))
+        return self.best(found)
+
+    def worth(self, made: Schedule) -> float:
+        """What is to be least: the cost, or the number of pulses."""
+        return float(len(made)) if self.options.least == "pulses" else self.price(made)
 
     def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none."""
+        """The cheaper of two schedules, of which there may be none; the one with fewer pulses where that counts."""
         there = [made for made in (one, other) if made is not None]
-        return min(there, key=self.price, default=None)
+        return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
 
     def dear(self, made: Schedule | None, least: float) -> bool:
         """Whether there is no schedule, or one so dear that it is worth looking for another."""
