@@ -110,13 +110,13 @@ def _descended(body: Spacecraft, free_axis: bool, rng: np.random.Generator) -> R
 
     met = {"type": "eq", "fun": lambda x: left_over(x)[0], "jac": slopes}
     kept = {"type": "ineq", "fun": lambda x: apart @ x - level / horizon, "jac": lambda _: apart}
-    found = minimize(
+    found = cast("Any", minimize)(
         lambda x: float(price @ x),
         np.concatenate([begins, ons]) / unit,
         jac=lambda _: price,
         method="SLSQP",
         bounds=Bounds(np.zeros(2 * count), np.full(2 * count, np.inf)),
-        constraints=cast("Any", [met, kept]),
+        constraints=[met, kept],
         options={"maxiter": 80, "ftol": 1e-9},
     )
     x = np.asarray(found.x) * unit

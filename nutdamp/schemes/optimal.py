@@ -74,6 +74,11 @@ LATEST = 64.0
 SHARPEST, SHARP = 1e-3, 0.02
 """Relative accuracy of a least time: by the program of small angles, and by schedules found."""
 
+NOT_FOUND = (
+    "not found: the program has solutions, but on the true motion the search did not settle on one that "
+    "keeps on-times, gap and max_pulses; another horizon may help"
+)
+
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """By how much more than the program's least time a schedule may need, tried in turn."""
 
@@ -192,13 +197,8 @@ class _Search:
         best = self.programmed(first) if solved else None
         if self.doubtful(best, first):
             best = self.cheaper(best, self.descended(best))
-        if best is None and not solved:
-            raise Infeasible(self.cure())
         if best is None:
-            raise Infeasible(
-                "not found: the program has solutions, but on the true motion the search did not settle on one that "
-                "keeps on-times, gap and max_pulses; another horizon may help"
-            )
+            raise Infeasible(NOT_FOUND if solved else self.cure())
         return self.with_bounds(best, first) if solved else best
 
     def programmed(self, first: Solution) -> Schedule | None:
@@ -220,8 +220,8 @@ class _Search:
     def doubtful(self, made: Schedule | None, first: Solution) -> bool:
         """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
 
-        Small angles hold least where there is no time to choose good moments: where nothing was found, within a few
-        nutation periods, and where a schedule is dear; but not where the rigorous bound proves it cheap enough.
+        So where nothing was found, within a few nutation periods, and where it is dear, as long as the rigorous bound
+        does not prove it cheap enough.
         """
         body = self.spacecraft
         short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
