@@ -53,6 +53,9 @@ WAYS = 3
 SHORT = 4.0
 """Inertial nutation periods up to which very many starts are tried."""
 
+STRONG = 0.3
+"""Inertial periods within which a strong channel does all there is to do."""
+
 PROVED = 0.002
 """Share above the rigorous bound below which they are not: there is little to be saved."""
 
@@ -220,25 +223,29 @@ class _Search:
     def doubtful(self, made: Schedule | None, first: Solution) -> bool:
         """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
 
-        So where nothing was found, within a few nutation periods, and where it is dear, as long as the rigorous bound
-        does not prove it cheap enough.
+        So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
+        as long as the rigorous bound does not prove it cheap enough.
         """
         body = self.spacecraft
         short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
+        strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
         if first.unmet > UNMET:  # at large angles H may be brought there all the same
             return short
         if made is None:
             return True
-        if not (short or self.dear(made, first.cost)):
+        if not strong or not (short or self.dear(made, first.cost)):
             return False
         proof = self.with_bounds(made, first).bounds
         return proof is None or proof.rigorous is None or self.price(made) > proof.rigorous * (1.0 + PROVED)
 
+    def task(self) -> Task:
+        """What is to be done, for the descents."""
+        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
+
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
-        task = Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
         found: list[_Found] = []
-        for made in optimal_starts.schedules(task, () if known is None else (known,)):
+        for made in optimal_starts.schedules(self.task(), () if known is None else (known,)):
             if self.spacecraft.limits.tick is not None:
                 missed = influence.misses(flight.flown(self.spacecraft, made), self.equations)
                 off = missed[2:4] if self.options.shift is not None else np.zeros(2)

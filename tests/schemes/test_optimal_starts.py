@@ -179,7 +179,7 @@ def test_misses_are_those_of_the_reference_integrator(seed: int) -> None:
 
 def _sizes(misses: np.ndarray) -> np.ndarray:
     """Of the transverse momentum, and of the shift."""
-    return np.linalg.norm(misses.reshape(2, 2), axis=1)
+    return np.asarray(np.linalg.norm(misses.reshape(2, 2), axis=1))
 
 
 def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves() -> None:
