@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from nutdamp import flight
 from nutdamp.physics import attitude, many
-from nutdamp.physics.rigid import NOTHING
 from nutdamp.schemes import influence
 from nutdamp.schemes.influence import Equations
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
@@ -89,15 +88,16 @@ class Task:
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
         self.pace = min(1.0 / abs(body.spin), body.inertial_period)
-        setting, start = flight.make_setting(body, true=True), body.initial
+        setting, start = flight.make_setting(body), body.initial
         self._forced = setting.constant, setting.forcing
+        self._coasting = np.zeros(3), setting.forcing._replace(turning=())
         self._start = np.asarray(setting.moments, dtype=float), start.rates, start.quaternion
         self._across = influence.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """What the flights of ``x`` (b, …) leave of the equations, (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without dissipation; 0 is the true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances; 0 is the true motion.
         """
         parts = [slice(begin, begin + many.BLOCK) for begin in range(0, len(x), many.BLOCK)]
         return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])
@@ -105,7 +105,7 @@ class Task:
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = many.Bodies(moments, *((np.zeros(3), NOTHING) if kicks else self._forced))
+        bodies = many.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
             begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
