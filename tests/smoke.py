@@ -50,6 +50,10 @@ check smoke.yaml --json check.json
 check broken.yaml; 2
 schema -o schema.json
 explain
+explain two-pulse
+explain 17
+explain file.thrusters
+explain weather; 2
 plan
 plan smoke.yaml --json plan.json --csv pulses.csv --plot plan.png
 plan smoke.yaml --scheme optimal --csv optimal.csv

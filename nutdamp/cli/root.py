@@ -21,7 +21,7 @@ COMMANDS = {
     "check": "All faults of spacecraft files, or what follows from them.",
     "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",
     "import": "A spacecraft file from a CCSDS attitude parameter message.",
-    "explain": "Where each equation of the sources stands, and its test.",
+    "explain": "The schemes, the equations, the keys of the file, the units.",
     "init": "Write a commented spacecraft file to start from.",
     "schema": "JSON Schema of the spacecraft file, for editors.",
 }

@@ -6,16 +6,17 @@ The sizes of tolerances stay as they are written here: `dispersion_rules` finds 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, WrapValidator
 from pydantic_core import CoreSchema, core_schema
 
 from nutdamp.files.fields import Section
-from nutdamp.schedule import STEERABLE
-from nutdamp.spacecraft import Steerable, Thruster
 from nutdamp.tolerances import KINDS, Dispersions, Tolerance
 from nutdamp.units import parse, pattern
+
+if TYPE_CHECKING:  # so that the keys can be known without numpy
+    from nutdamp.spacecraft import Steerable, Thruster
 
 QUANTITIES = {
     "A": "inertia",
@@ -63,10 +64,22 @@ def by_name(value: Mapping[str, object]) -> bool:
 class ToleranceSection(Section):
     """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
 
-    normal: Any = Field(default=None, description="One sigma of a normal distribution.")
-    uniform: Any = Field(default=None, description="Half the width of a uniform distribution.")
-    triangular: Any = Field(default=None, description="Half the width of a triangular distribution.")
-    bias: Any = Field(default=None, description="Fixed offset, signed.")
+    normal: Any = Field(
+        default=None,
+        description="One sigma of a normal distribution, in its unit or in %.",
+        examples=["2 %"],
+    )
+    uniform: Any = Field(
+        default=None,
+        description="Half the width of a uniform distribution, in its unit or in %.",
+        examples=["5 ms"],
+    )
+    triangular: Any = Field(
+        default=None,
+        description="Half the width of a triangular distribution, in its unit or in %.",
+        examples=["5 %"],
+    )
+    bias: Any = Field(default=None, description="Fixed offset, signed, in its unit or in %.", examples=["-2 ms"])
 
     def tolerance(self, key: str) -> Tolerance:
         """The checked tolerance, which stands at ``key`` of the dispersions."""
@@ -175,6 +188,8 @@ def dispersions(
     """
     if section is None:
         return None
+    from nutdamp.schedule import STEERABLE
+
     thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)

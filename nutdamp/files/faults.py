@@ -17,6 +17,7 @@ from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.facts import Finding
+from nutdamp.files.fields import section_of
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.rules import findings
 from nutdamp.files.settings import Setting, overlay
@@ -81,7 +82,7 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
         if child.value is None:
             cure = "give a value, or leave the key out" if isinstance(step, str) else "a value is wanted"
             yield Finding((*path, step), f"empty; {cure}")
-        below = _section(annotation) if fields else None
+        below = section_of(annotation) if fields else None
         yield from _spelling(child, below, (*path, step), _holds_names(annotation))
 
 
@@ -90,13 +91,6 @@ def _meant(key: str, fields: list[str]) -> str | None:
     folded = {field.casefold(): field for field in fields}
     close = difflib.get_close_matches(key.casefold(), folded, n=1, cutoff=0.7)
     return folded[close[0]] if close else None
-
-
-def _section(annotation: Any) -> type[BaseModel] | None:
-    """The model within the type of a field, such as that of a list's entries."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(_section, get_args(annotation))), None)
 
 
 def _holds_names(annotation: Any) -> bool:
@@ -117,7 +111,7 @@ def _description(path: KeyPath) -> str:
     for step in path:
         if model is not None and isinstance(step, str):
             field = model.model_fields[step]
-            model, text = _section(field.annotation), field.description or ""
+            model, text = section_of(field.annotation), field.description or ""
     return text[:1].lower() + text[1:].rstrip(".")
 
 

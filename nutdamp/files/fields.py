@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
@@ -82,3 +82,10 @@ class Section(BaseModel):
 
     # Built once, with the root, when the first file is read.
     model_config = ConfigDict(extra="forbid", defer_build=True)
+
+
+def section_of(annotation: Any) -> type[BaseModel] | None:
+    """The model within the type of a field, such as that of a list's entries."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(section_of, get_args(annotation))), None)
