@@ -39,6 +39,20 @@ class Residual:
     axis_error: float
 
 
+@dataclass(frozen=True, slots=True)
+class Final:
+    """How the last pulse leaves the body: where it points, and what it does from then on.
+
+    ``axis`` spin axis and ``momentum`` direction of H, inertial unit vectors (3,), just after the last pulse;
+    ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
+    """
+
+    axis: Vector
+    momentum: Vector
+    spin: float
+    nutation: float
+
+
 class Path(Protocol):
     """Motion without jumps."""
 
@@ -140,6 +154,18 @@ class Flight:
         left = arc_cones(self.moments, self.settled.rates, self._sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error)
+
+    @property
+    def final(self) -> Final:
+        """Where spin axis and angular momentum end."""
+        state = self.settled
+        momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.moments))
+        return Final(
+            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self._sense])),
+            momentum=np.asarray(momentum / np.linalg.norm(momentum)),
+            spin=state.spin,
+            nutation=self.residual.nutation,
+        )
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""

@@ -78,7 +78,7 @@ class Spacecraft:
     @property
     def rates(self) -> NDArray[np.float64]:
         """Body rates at t = 0, (3,) rad/s, in the axes of the file."""
-        return np.asarray(self.core.inertia.axes @ self.core.omega0)
+        return self.core.inertia.in_file(self.core.omega0)
 
     @property
     def nutation(self) -> float:

@@ -13,6 +13,7 @@ from nutdamp import flight, schemes
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Residual
 from nutdamp.physics import attitude
+from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.model import steady_omega
 from nutdamp.schemes.windows import SLACK
@@ -82,7 +83,8 @@ class Plan:
     @property
     def spin_change(self) -> float | None:
         """ω3 at the end minus at the start, rad/s, flown."""
-        return self.flight.settled.spin - self.spacecraft.spin if self.feasible else None
+        before, after = self.spacecraft.spin, self.flight.settled.spin
+        return cleaned_change(after - before, before) if self.feasible else None
 
     @cached_property
     def delta_v(self) -> Vector | None:

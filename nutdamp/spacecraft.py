@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
+from nutdamp.epoch import Epoch
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
+from nutdamp.rounding import cleaned
 from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
@@ -91,6 +93,10 @@ class Inertia:
     def aligned(self) -> bool:
         """Whether the principal axes are the axes of the file."""
         return bool(np.array_equal(self.axes, np.eye(3)))
+
+    def in_file(self, vector: Vector) -> Vector:
+        """A vector (3,) of the principal axes in the axes of the file, as it is shown: without rounding."""
+        return cleaned(self.axes @ vector)
 
     def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
         """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the file."""
@@ -281,6 +287,26 @@ class Spacecraft:
         body_to_n = replace(self, attitude=None).initial.quaternion
         in_body = attitude.matrix(body_to_n).T @ in_n
         return attitude.rotate(self.initial.quaternion, in_body)
+
+    def angles_of(self, direction: Vector) -> tuple[float | None, float]:
+        """The angles that name an inertial ``direction`` (3,), rad.
+
+        Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in [0, 2π) and tilt, as
+        `direction_in_n` takes them. Right ascension and azimuth are None at the pole, where there is none.
+        """
+        if self.attitude is not None:
+            return attitude.sphere_angles(direction)
+        x, y, z = direction.tolist()
+        return attitude.sphere_angles(direction)[0], math.atan2(math.hypot(x, y), z)
+
+    def utc(self, time: float) -> str | None:
+        """Date and time in UTC ``time`` s after the epoch; None without one, before 1972 and after the year 9999."""
+        if self.attitude is None or self.attitude.epoch is None:
+            return None
+        try:
+            return f"{Epoch.parse(self.attitude.epoch).plus(time).text}Z"
+        except ValueError:
+            return None
 
     @cached_property
     def widest(self) -> Cones:

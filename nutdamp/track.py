@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from nutdamp.physics import attitude
 from nutdamp.physics.arc_cones import arc_cones
+from nutdamp.rounding import SAME_ANGLE
 from nutdamp.spacecraft import Inertia
 
 Array = NDArray[np.float64]
-
-ROUNDING = 1e-11
-"""rad; angles that differ by less count as equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +102,8 @@ def extremes(track: Track) -> Extremes:
     """Extremes of the axis track over its rows."""
     away = attitude.angle_between(track.axis, track.momentum[0])
     # The first of all that are equal but for rounding: after the last pulse of a good plan nothing moves any more.
-    far = int(np.argmax(away >= away.max() - ROUNDING))
-    near = int(np.argmax(away <= away.min() + ROUNDING))
+    far = int(np.argmax(away >= away.max() - SAME_ANGLE))
+    near = int(np.argmax(away <= away.min() + SAME_ANGLE))
     x, y = np.arcsin(np.clip(track.axis[:, :2].T, -1.0, 1.0))
     ascension = np.sort(np.arctan2(track.axis[:, 1], track.axis[:, 0]) % (2 * math.pi))
     # The widest gap between neighbouring values lies outside the range, across 0 or not.

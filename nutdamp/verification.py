@@ -28,6 +28,7 @@ class Method:
     """One way to fly the schedule: its residual (rad), or why it could not be flown.
 
     ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
+    ``outside``: an integration that shares nothing with it, and so is to confirm it.
     """
 
     name: str
@@ -37,6 +38,18 @@ class Method:
     momentum: float | None = None
     rate: float | None = None
     missing: str = ""
+    outside: bool = False
+
+    @property
+    def short(self) -> str:
+        """The name without what it says of the model."""
+        return self.name.partition(",")[0]
+
+    @property
+    def difference(self) -> float:
+        """The largest of the three, NaN where one is not known."""
+        found = (self.axis, self.momentum, self.rate)
+        return float(np.max([math.nan if one is None else one for one in found]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +74,23 @@ class Verification:
     budget: tuple[Imperfection, ...]
 
     @property
+    def checks(self) -> tuple[str, ...]:
+        """Names of the integrations from outside that were flown."""
+        return tuple(method.short for method in self._outside)
+
+    @property
+    def disagreeing(self) -> tuple[str, ...]:
+        """Names of those whose motion differs from the flown one by more than `AGREE`, or is not a number."""
+        return tuple(method.short for method in self._outside if not method.difference <= AGREE)
+
+    @property
     def agree(self) -> bool:
-        """Whether the integration from outside confirms the flown motion."""
-        checked = [method for method in self.methods[2:] if method.axis is not None]
-        return all(max(one.axis or 0.0, one.momentum or 0.0, one.rate or 0.0) <= AGREE for one in checked[:1])
+        """Whether all of them confirm the flown motion."""
+        return not self.disagreeing
+
+    @property
+    def _outside(self) -> list[Method]:
+        return [method for method in self.methods if method.outside and not method.missing]
 
 
 def verify(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None) -> Verification:
@@ -209,7 +235,7 @@ def _by_basilisk(spacecraft: Spacecraft, schedule: Schedule, end: float) -> Meth
     try:
         flown = basilisk.fly(spacecraft, schedule, end)
     except (MissingExtra, Infeasible) as reason:
-        return Method(name, missing=str(reason))
+        return Method(name, missing=str(reason), outside=True)
     reference = _motion(flight.flown(spacecraft, schedule, end), flown.t)
     return _compared(name, spacecraft, schedule, flown.t, (flown.rates, flown.quaternion), reference)
 
@@ -231,7 +257,8 @@ def _compared(
     shift = float(attitude.angle_between(before, after))
     left = arc_cones(spacecraft.inertia.flown_moments, motion[0][last], math.copysign(1.0, spacecraft.spin))
     residual = Residual(left.nutation, left.body, left.space, shift, shift)
-    return _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
+    method = _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
+    return replace(method, outside=True)
 
 
 def _method(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,12 @@ import pytest
 from builders import spinner
 from process import Run
 
-from nutdamp import flight, planning
+from nutdamp import basilisk, flight, planning
+from nutdamp.basilisk import BasiliskFlight
+from nutdamp.cli.verify import command as verify_command
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import attitude
+from nutdamp.report.verify_tables import verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.verification import AGREE, integrate, verify
@@ -49,6 +53,35 @@ def test_a_flight_of_another_body_does_not_agree() -> None:
     times = np.array([0.0, 5.0])
     (_, body), (_, other) = (integrate(one, made, times)[0] for one in (EXAMPLE, heavier))
     assert np.linalg.norm(body - other) > AGREE
+
+
+def test_basilisk_has_its_say_in_the_verdict(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A stand-in for Basilisk that flies another body, or another schedule, is named and turns the verdict."""
+    plan = planning.plan(EXAMPLE, "two-pulse")
+
+    def of(body: Spacecraft) -> Callable[[Spacecraft, Schedule, float], BasiliskFlight]:
+        def fly(_: Spacecraft, made: Schedule, until: float) -> BasiliskFlight:
+            times = np.unique([*np.linspace(0.0, until, 50), *(pulse.end for pulse in made)])
+            return BasiliskFlight(times, *flight.flown(body, made, until).motion(times), 0.01)
+
+        return fly
+
+    monkeypatch.setattr(basilisk, "fly", of(EXAMPLE))
+    found = verify(EXAMPLE, plan.pulses)
+    assert found.agree
+    assert found.checks == ("DOP853", "Basilisk")
+    heavier = replace(EXAMPLE, inertia=Inertia((120.00012, 120.00012, 80.0)))
+    monkeypatch.setattr(basilisk, "fly", of(heavier))
+    found = verify(EXAMPLE, plan.pulses)
+    assert found.disagreeing == ("Basilisk",)
+    assert not found.agree
+    assert verdict(found) == "The flown motion and Basilisk DO NOT AGREE (within 1e-09 rad)."
+    with pytest.raises(SystemExit) as left:
+        verify_command.main(["--scheme", "two-pulse", "--quiet"], standalone_mode=False)
+    assert left.value.code == 1
+    assert "the flown motion and Basilisk do not agree" in capsys.readouterr().err
 
 
 def test_the_impulse_sum_agrees_outside_the_pulses_in_its_rates() -> None:

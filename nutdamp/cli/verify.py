@@ -67,7 +67,7 @@ def command(
         from nutdamp.files.output import json_text
         from nutdamp.files.verification_json import verification_json
 
-        outputs.append((json, json_text(verification_json(body, plan.scheme, found))))
+        outputs.append((json, json_text(verification_json(plan.flight, plan.scheme, found))))
     screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.verify_tables import verification_screen
@@ -75,5 +75,6 @@ def command(
         screens.append(verification_screen(body, plan.scheme, found))
     deliver(outputs, *screens)
     if not found.agree:
-        click.echo("nutdamp: the flown motion and DOP853 do not agree; please report this", err=True)
+        others = " and ".join(found.disagreeing)
+        click.echo(f"nutdamp: the flown motion and {others} do not agree; please report this", err=True)
         sys.exit(UNREADABLE)

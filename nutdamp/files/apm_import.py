@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
+from nutdamp.epoch import DIGITS
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.apm_reader import ApmContents, Manoeuvre
-from nutdamp.files.ccsds.epoch import DIGITS
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Vector

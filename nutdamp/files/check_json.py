@@ -30,7 +30,6 @@ def failed_json(name: str | None, wrong: FaultyFile | CannotRead) -> dict[str, A
 
 def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
-    axes = spacecraft.inertia.axes
     pair = survey.nearest_pair(spacecraft)
     return {
         "file": name,
@@ -40,7 +39,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
         "channels": [
             {
                 "name": steps.channel.name,
-                "torque_Nm": (axes @ steps.channel.torque).tolist(),
+                "torque_Nm": spacecraft.inertia.in_file(steps.channel.torque).tolist(),
                 "min_on_time_s": steps.channel.min_on_time,
                 "max_on_time_s": steps.channel.max_on_time,
                 "smallest_step_deg": math.degrees(steps.smallest),

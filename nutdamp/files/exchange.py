@@ -51,9 +51,9 @@ def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
         from nutdamp.files.stk import stk_attitude
 
         return stk_attitude(flight.flown(body, plan.pulses, end), end, place)
+    from nutdamp.epoch import Epoch
     from nutdamp.files.ccsds.aem import aem
     from nutdamp.files.ccsds.apm import apm
-    from nutdamp.files.ccsds.epoch import Epoch
     from nutdamp.files.ccsds.kvn import to_kvn
     from nutdamp.files.ccsds.xml import to_xml
 

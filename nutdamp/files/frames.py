@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp.epoch import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.flight import Flight, Leg
+from nutdamp.rounding import cleaned
 from nutdamp.spacecraft import Spacecraft, Vector
 
 FRAMES = ("EME2000", "J2000", "GCRF")
@@ -93,7 +94,7 @@ def stretches(flown: Flight, until: float) -> Iterator[Stretch]:
         t = np.unique(np.rint(np.linspace(begin, end, count))) / NANOSECONDS
         if len(t) < LEAST_RECORDS:
             continue
-        rates, quaternion = flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t))
+        rates, quaternion = map(cleaned, flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t)))
         quaternion = _steady(quaternion, previous)
         previous = quaternion[-1]
         yield Stretch(t, rates, quaternion, leg.completed)

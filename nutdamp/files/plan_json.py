@@ -8,6 +8,7 @@ from typing import Any
 from nutdamp import __version__
 from nutdamp.flight import Flight, Residual
 from nutdamp.planning import Comparison, Plan
+from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -34,15 +35,15 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "a": inertia.a,
         "shape": inertia.shape,
         "moments_kgm2": list(inertia.moments),
-        "principal_axes": inertia.axes.T.tolist(),
-        "omega0_rad_s": (inertia.axes @ spacecraft.omega0).tolist(),
+        "principal_axes": cleaned(inertia.axes.T).tolist(),
+        "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
         "nutation_deg": math.degrees(found.nutation),
         "body_cone_deg": math.degrees(found.body),
         "space_cone_deg": math.degrees(found.space),
         "nutation_at_start_deg": math.degrees(spacecraft.tilt),
         "body_nutation_period_s": spacecraft.body_period,
         "inertial_nutation_period_s": spacecraft.inertial_period,
-        "target_axis": spacecraft.target_axis.tolist(),
+        "target_axis": cleaned(spacecraft.target_axis).tolist(),
         "target_angle_deg": math.degrees(spacecraft.to_turn),
         "target_spin_rad_s": spacecraft.goal.spin,
     }
@@ -50,37 +51,68 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 def plan_json(plan: Plan) -> dict[str, Any]:
     """One plan; an infeasible one has no pulses, nulls, and why."""
-    schedule, axes = plan.schedule, plan.spacecraft.inertia.axes
+    schedule, body = plan.schedule, plan.spacecraft
     return {
         "scheme": plan.scheme,
         "feasible": plan.feasible,
         "why": plan.why,
         "meets_requirement": plan.meets_requirement,
-        "pulses": [pulse_json(pulse, axes) for pulse in plan.pulses],
+        "pulses": [pulse_json(pulse, body) for pulse in plan.pulses],
         "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
-        "least_impulse_Nms": None if schedule is None else plan.spacecraft.least_impulse,
+        "least_impulse_Nms": None if schedule is None else body.least_impulse,
         "propellant_kg": None if schedule is None else schedule.propellant,
         "end_s": None if schedule is None else schedule.end,
-        "delta_v_m_s": None if plan.delta_v is None else plan.delta_v.tolist(),
+        "delta_v_m_s": None if plan.delta_v is None else cleaned(plan.delta_v).tolist(),
         "spin_change_rad_s": plan.spin_change,
         "residual": residual_json(plan.residual),
         "flown": residual_json(plan.flown),
+        "final": None if schedule is None else final_json(plan.flight),
+        "target": target_json(body),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": list(plan.remarks),
     }
 
 
-def pulse_json(pulse: Pulse, axes: Vector) -> dict[str, Any]:
-    """One pulse; ``axes`` leads from principal axes to those of the file."""
+def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
+    """One pulse of ``body``; with an epoch ``utc`` is when it starts."""
+    utc = body.utc(pulse.start)
     return {
         "t_s": pulse.t,
         "start_s": pulse.start,
+        **({} if utc is None else {"utc": utc}),
         "on_time_s": pulse.on_time,
         "channel": pulse.channel,
-        "torque_Nm": None if pulse.torque is None else (axes @ pulse.torque).tolist(),
-        "impulse_Nms": (axes @ pulse.impulse).tolist(),
+        "torque_Nm": None if pulse.torque is None else body.inertia.in_file(pulse.torque).tolist(),
+        "impulse_Nms": body.inertia.in_file(pulse.impulse).tolist(),
         "propellant_kg": pulse.propellant,
     }
+
+
+def final_json(flown: Flight) -> dict[str, Any]:
+    """Where spin axis and angular momentum end, and what the body does from then on."""
+    body, final = flown.spacecraft, flown.final
+    return {
+        "axis": direction_json(body, final.axis),
+        "momentum": direction_json(body, final.momentum),
+        "spin_rad_s": final.spin,
+        "nutation_deg": math.degrees(final.nutation),
+    }
+
+
+def target_json(body: Spacecraft) -> dict[str, Any] | None:
+    """What is asked of the end, in the form of `final_json`; None where nothing is."""
+    axis, spin = body.goal.axis, body.goal.spin
+    if axis is None and spin is None:
+        return None
+    return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
+
+
+def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
+    """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
+    around, other = (None if angle is None else math.degrees(angle) for angle in body.angles_of(direction))
+    if body.attitude is None:
+        return {"tilt_deg": other, "azimuth_deg": around}
+    return {"right_ascension_deg": around, "declination_deg": other}
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
@@ -97,10 +129,9 @@ def residual_json(residual: Residual | None) -> dict[str, float | None]:
 def pulses_json(flown: Flight) -> list[dict[str, Any]]:
     """The pulses of a flight with the cone angles before and after each."""
     before, after = flown.around_pulses()
-    axes = flown.spacecraft.inertia.axes
     return [
         {
-            **pulse_json(pulse, axes),
+            **pulse_json(pulse, flown.spacecraft),
             **{
                 f"{cone}_{when}_deg": math.degrees(getattr(track, cone)[index])
                 for when, track in (("before", before), ("after", after))

@@ -34,6 +34,7 @@ HEADER = (
     "nutation_before_deg",
     "nutation_after_deg",
 )
+UTC = "utc"
 IMPULSE = HEADER[8:11]
 TORQUE = HEADER[5:8]
 
@@ -47,32 +48,36 @@ LARGEST = 1e15
 def pulses_array(flown: Flight) -> NDArray[np.void]:
     """The schedule of a flown flight, one row a pulse, fields as in `HEADER`; vectors in the axes of the file.
 
-    What is not known is NaN: the torque of an ideal impulse, a propellant.
+    What is not known is NaN: the torque of an ideal impulse, a propellant. With an epoch, a last field ``utc`` has the
+    date and time of each start.
     """
     before, after = flown.around_pulses()
-    axes = flown.spacecraft.inertia.axes
+    body = flown.spacecraft
+    dated = body.utc(0.0) is not None
     rows = [
         (
             index + 1,
             *(pulse.t, pulse.start, pulse.on_time),
             pulse.channel,
-            *(np.full(3, math.nan) if pulse.torque is None else axes @ pulse.torque),
-            *(axes @ pulse.impulse),
+            *(np.full(3, math.nan) if pulse.torque is None else body.inertia.in_file(pulse.torque)),
+            *body.inertia.in_file(pulse.impulse),
             math.nan if pulse.propellant is None else pulse.propellant,
             math.degrees(before.nutation[index]),
             math.degrees(after.nutation[index]),
+            *([body.utc(pulse.start) or ""] if dated else []),
         )
         for index, pulse in enumerate(flown.schedule)
     ]
     longest = max((len(pulse.channel) for pulse in flown.schedule), default=1)
-    kinds = {"pulse": "i8", "channel": f"U{longest}"}
-    return np.array(rows, dtype=[(name, kinds.get(name, "f8")) for name in HEADER])
+    kinds = {"pulse": "i8", "channel": f"U{longest}", UTC: "U30"}
+    return np.array(rows, dtype=[(name, kinds.get(name, "f8")) for name in (*HEADER, UTC)[: None if dated else -1]])
 
 
 def pulses_csv(flown: Flight) -> str:
     """The rows of `pulses_array` as CSV; what is not known is empty."""
-    rows = pulses_array(flown).tolist()
-    return csv_text(HEADER, ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows))
+    table = pulses_array(flown)
+    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
+    return csv_text(table.dtype.names or HEADER, texts)
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:

@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from nutdamp import __version__
-from nutdamp.files.plan_json import pulses_json, residual_json, spacecraft_json
+from nutdamp.files.plan_json import final_json, pulses_json, residual_json, spacecraft_json, target_json
 from nutdamp.flight import Flight, Residual
+from nutdamp.physics.attitude import full_turn
 from nutdamp.track import Track, extremes
 
 
@@ -24,6 +25,8 @@ def simulation_json(
         "pulses": pulses_json(flight),
         "residual": residual_json(residual),
         "flown": residual_json(flown),
+        "final": final_json(flight),
+        "target": target_json(flight.spacecraft),
         "until_s": float(track.t[-1]),
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
@@ -33,7 +36,12 @@ def simulation_json(
             "nearest_s": found.nearest[1],
             "x_deg": [math.degrees(value) for value in found.x],
             "y_deg": [math.degrees(value) for value in found.y],
-            "right_ascension_deg": None if attitude is None else [math.degrees(v) for v in found.right_ascension],
+            "right_ascension_deg": None if attitude is None else _turns(found.right_ascension),
             "declination_deg": None if attitude is None else [math.degrees(v) for v in found.declination],
         },
     }
+
+
+def _turns(angles: tuple[float, float]) -> list[float]:
+    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, whatever lies between."""
+    return [math.degrees(full_turn(angle)) for angle in angles]

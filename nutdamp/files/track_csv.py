@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.files.output import csv_text, number
+from nutdamp.rounding import cleaned
 from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track, in_file_axes
 
@@ -39,7 +40,8 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     """One row a sample, fields as in `HEADER`; rates and quaternion (scalar first) in the axes of the file."""
     turned = in_file_axes(track, inertia)
     cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
-    table = np.column_stack([track.t, turned.rates, turned.quaternion, track.axis, track.momentum, cones])
+    vectors = map(cleaned, (turned.rates, turned.quaternion, track.axis, track.momentum))
+    table = np.column_stack([track.t, *vectors, cones])
     rows = np.empty(len(track.t), dtype=ROW)
     for name, column in zip(HEADER[:-1], table.T, strict=True):
         rows[name] = column

@@ -6,18 +6,22 @@ import math
 from typing import Any
 
 from nutdamp import __version__
-from nutdamp.files.plan_json import spacecraft_json
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
+from nutdamp.flight import Flight
 from nutdamp.verification import Verification
 
 
-def verification_json(spacecraft: Spacecraft, name: str, found: Verification) -> dict[str, Any]:
-    """Methods with their differences from the flown motion (rad), conservation, error budget."""
+def verification_json(flown: Flight, name: str, found: Verification) -> dict[str, Any]:
+    """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
+    spacecraft = flown.spacecraft
     return {
         "nutdamp": __version__,
         "spacecraft": spacecraft_json(spacecraft),
         "scheme": name,
         "agree": found.agree,
+        "disagreeing": list(found.disagreeing),
+        "final": final_json(flown),
+        "target": target_json(spacecraft),
         "methods": [
             {
                 "name": method.name,

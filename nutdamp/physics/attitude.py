@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import rounding
+
 Array = NDArray[np.float64]
 
 
@@ -133,6 +135,21 @@ def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, 
     )
     cosine, sine = math.cos(half_about_axis), math.sin(half_about_axis)
     return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])
+
+
+def full_turn(angle: float) -> float:
+    """The same direction as an angle in [0, 2π)."""
+    turned = angle % (2.0 * math.pi)
+    return turned if turned < 2.0 * math.pi else 0.0  # of a tiny negative angle the remainder rounds up to 2π
+
+
+def sphere_angles(vector: Array) -> tuple[float | None, float]:
+    """Right ascension in [0, 2π) and declination of ``vector`` (3,), rad; at the poles there is no right ascension."""
+    x, y, z = rounding.cleaned(vector).tolist()
+    across = math.hypot(x, y)
+    declination = math.atan2(z, across)
+    polar = abs(math.atan2(across, abs(z))) < rounding.SAME_ANGLE
+    return None if polar else full_turn(math.atan2(y, x)), declination
 
 
 def on_sphere(right_ascension: float, declination: float) -> Array:

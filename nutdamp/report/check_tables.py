@@ -78,7 +78,7 @@ def channel_table(spacecraft: Spacecraft) -> Table:
         channel = steps.channel
         table.add_row(
             channel.name,
-            vector(spacecraft.inertia.axes @ channel.torque),
+            vector(spacecraft.inertia.in_file(channel.torque)),
             _on_times(channel),
             "any" if steps.smallest == 0.0 else degrees(steps.smallest).removesuffix(" deg"),
             degrees(steps.largest).removesuffix(" deg"),

@@ -11,10 +11,11 @@ from rich.text import Text
 
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
+from nutdamp.report.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
 from nutdamp.report.layout import columns, facts
-from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
-from nutdamp.schedule import STEERABLE
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity, steering
+from nutdamp.schedule import STEERABLE, Pulse
+from nutdamp.spacecraft import Spacecraft
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:
@@ -27,7 +28,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         return Group(*parts)
     parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {compared.reason}.")]
     if len(chosen.pulses):
-        parts += [Text(), pulse_table(chosen)]
+        parts += [Text(), pulse_table(chosen), Text(), end_table(chosen.flight)]
     return Group(*parts)
 
 
@@ -39,14 +40,14 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
-    spin, found = spacecraft.spin, spacecraft.widest
+    found = spacecraft.widest
     table = facts()
     moments = f"A = {quantity(inertia.A, 'kg m²')}, C = {quantity(inertia.C, 'kg m²')}"
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
     if not inertia.symmetric:
         first, second, _ = inertia.moments
         table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on a symmetric body alike")
-    table.add_row("spin", f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})")
+    table.add_row("spin", spin_text(spacecraft.spin))
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
     table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
@@ -59,10 +60,10 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if spacecraft.goal.axis is not None:
         turning = quantity(_turning(spacecraft), "N m s")
         least = "" if beyond else ", the least to turn H"
-        table.add_row("target", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}{least}")
+        table.add_row("target", direction_text(spacecraft, spacecraft.goal.axis))
+        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}{least}")
     if spacecraft.goal.spin is not None:
-        final = spacecraft.goal.spin
-        table.add_row("final spin", f"{final * 30 / math.pi:.4g} rpm ({quantity(final, 'rad/s')})")
+        table.add_row("final spin", spin_text(spacecraft.goal.spin))
     table.add_row("actuators", _actuators(spacecraft))
     for name, value in more:
         table.add_row(name, value)
@@ -98,6 +99,9 @@ def _actuators(spacecraft: Spacecraft) -> str:
 
 Cell = Callable[[Plan], str]
 
+SHORT_NAMES = ("RA", "dec")
+"""Right ascension and declination, where there is little room."""
+
 
 def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
     """What the comparison shows of each feasible plan."""
@@ -120,7 +124,12 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         ("  body cone", lambda plan: _angle(plan.flown, "body_cone")),
         ("  space cone", lambda plan: _angle(plan.flown, "space_cone")),
         ("  shift of H", lambda plan: _angle(plan.flown, "momentum_shift")),
-        ("  spin change", lambda plan: quantity(_spin_change(plan), "rad/s")),
+        ("  spin change", lambda plan: quantity(plan.spin_change, "rad/s")),
+    ]
+    first, second = SHORT_NAMES if compared.spacecraft.attitude is not None else angle_names(compared.spacecraft)
+    rows[-1:-1] = [
+        (f"  axis: {first}", lambda plan: angle_texts(plan.spacecraft, plan.flight.final.axis)[0]),
+        (f"  axis: {second}", lambda plan: angle_texts(plan.spacecraft, plan.flight.final.axis)[1]),
     ]
     goal = compared.spacecraft.goal
     if goal.axis is not None:
@@ -141,12 +150,6 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
 
 def _angle(left: Residual | None, name: str) -> str:
     return MISSING if left is None else degrees(getattr(left, name))
-
-
-def _spin_change(plan: Plan) -> float | None:
-    """ω3 gained, rad/s, without what is rounding."""
-    change = plan.spin_change
-    return change if change is None or abs(change) > 1e-13 * abs(plan.spacecraft.spin) else 0.0
 
 
 def _final_spin(plan: Plan) -> float | None:
@@ -180,28 +183,43 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
 
 
 def pulse_table(plan: Plan) -> Table:
-    """One row a pulse: when, how long, which channel, and the nutation before and after."""
+    """One row a pulse: when, how long, which channel, and the nutation before and after.
+
+    With an epoch the start in UTC takes the room of the centre.
+    """
     before, after = plan.flight.around_pulses()
-    axes = plan.spacecraft.inertia.axes
-    names = ("pulse", "start", "centre", "on-time", "channel", "impulse", "nutation", "after")
-    units = ("", "s", "s", "s", "", "N m s", "deg", "deg")
-    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
-    for index, pulse in enumerate(plan.pulses):
-        table.add_row(
-            str(index + 1),
-            f"{pulse.start:.4f}",
-            f"{pulse.t:.4f}",
-            "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}",
-            channel_text(pulse.channel, axes @ pulse.impulse),
-            f"{pulse.magnitude:.4g}",
-            degrees(float(before.nutation[index])).removesuffix(" deg"),
-            degrees(float(after.nutation[index])).removesuffix(" deg"),
-        )
+    pulses, body = plan.pulses, plan.spacecraft
+    day, clocks = _clocks([body.utc(pulse.start) for pulse in pulses])
+    second = (f"UTC\n{day}", clocks) if clocks else ("centre\ns", [f"{pulse.t:.4f}" for pulse in pulses])
+    cells: list[tuple[str, list[str]]] = [
+        ("pulse\n", [str(index + 1) for index in range(len(pulses))]),
+        ("start\ns", [f"{pulse.start:.4f}" for pulse in pulses]),
+        second,
+        ("on-time\ns", ["ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}" for pulse in pulses]),
+        ("channel\n", [channel_text(pulse, body) for pulse in pulses]),
+        ("impulse\nN m s", [f"{pulse.magnitude:.4g}" for pulse in pulses]),
+        ("nutation\ndeg", [degrees(angle).removesuffix(" deg") for angle in before.nutation.tolist()]),
+        ("after\ndeg", [degrees(angle).removesuffix(" deg") for angle in after.nutation.tolist()]),
+    ]
+    table = columns(*(name for name, _ in cells), text=("channel\n",))
+    for row in zip(*(column for _, column in cells), strict=True):
+        table.add_row(*row)
     return table
 
 
-def channel_text(name: str, impulse: Vector) -> str:
-    """A steerable pulse is named by the angle of its torque in the 1-2 plane."""
-    if name != STEERABLE:
-        return name
-    return f"{STEERABLE} {math.degrees(math.atan2(impulse[1], impulse[0])):.2f}°"
+def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
+    """The day that all dates share, and of each the rest to the millisecond; nothing where one is not known."""
+    known = [date.removesuffix("Z").split("T") for date in dates if date is not None]
+    if not known or len(known) < len(dates):
+        return "", []
+    clocks = [time[: -len("000000")] for _, time in known]  # nanoseconds cut to milliseconds
+    if len({day for day, _ in known}) == 1:
+        return known[0][0], clocks
+    return "", [f"{day} {clock}" for (day, _), clock in zip(known, clocks, strict=True)]
+
+
+def channel_text(pulse: Pulse, body: Spacecraft) -> str:
+    """The channel of a pulse; a steerable one is named by the angle of its torque too."""
+    if pulse.channel != STEERABLE:
+        return pulse.channel
+    return f"{STEERABLE} {steering(body.inertia.in_file(pulse.impulse).tolist())}"

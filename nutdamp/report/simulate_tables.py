@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.flight import Flight, Residual
+from nutdamp.report.end_tables import end_table
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.plan_tables import channel_text, header
-from nutdamp.report.text import degrees, moment
+from nutdamp.report.text import degrees, longitude, moment, pointing
 from nutdamp.track import Extremes, Track, extremes
 
 
@@ -20,19 +19,19 @@ def simulation_screen(flight: Flight, track: Track, residual: Residual, flown: R
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule):
         parts += [Text(), _pulses(flight)]
-    parts += [Text(), _residuals(residual, flown), Text(), _extremes(extremes(track), flight, track)]
+    parts += [Text(), _residuals(residual, flown), Text(), end_table(flight)]
+    parts += [Text(), _extremes(extremes(track), flight, track)]
     return Group(*parts)
 
 
 def _pulses(flight: Flight) -> Table:
     before, after = flight.around_pulses()
-    axes = flight.spacecraft.inertia.axes
     names = ("pulse", "centre", "on-time", "channel", "", "nutation", "body cone", "space cone")
     units = ("", "s", "s", "", "", "deg", "deg", "deg")
     table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
     for index, pulse in enumerate(flight.schedule):
         on_time = "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}"
-        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse.channel, axes @ pulse.impulse))
+        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
         for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
             cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
             table.add_row(*cells, when, *(degrees(cone).removesuffix(" deg") for cone in cones))
@@ -64,12 +63,13 @@ def _extremes(found: Extremes, flight: Flight, track: Track) -> Table:
     given = flight.spacecraft.attitude
     if given is not None:
         frame = given.frame or "the frame of the file"
-        table.add_row("right ascension", f"{_range(found.right_ascension)} in {frame}")
+        west, east = map(longitude, found.right_ascension)
+        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, eastward")
         table.add_row("declination", _range(found.declination))
     table.add_row("track", f"{len(track.t)} rows, 0 to {moment(float(track.t[-1]))}")
     return table
 
 
 def _range(values: tuple[float, float]) -> str:
-    low, high = (math.degrees(value) for value in values)
-    return f"{low:.4f} to {high:.4f} deg"
+    low, high = map(pointing, values)
+    return f"{low.removesuffix(' deg')} to {high}"

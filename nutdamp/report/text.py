@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+from nutdamp.rounding import cleaned
 
 MISSING = "–"
 """Stands where a number is not known."""
@@ -48,5 +50,26 @@ def moment(value: float) -> str:
 
 
 def vector(components: Iterable[float]) -> str:
-    """Components in brackets."""
-    return "(" + ", ".join(f"{float(part) + 0.0:.4g}" for part in components) + ")"
+    """Components in brackets, without what is rounding."""
+    return "(" + ", ".join(f"{part:.4g}" for part in cleaned(list(components)).tolist()) + ")"
+
+
+def pointing(angle: float | None) -> str:
+    """An angle of a direction given in rad, in degrees to four decimals, as every place shows it."""
+    return MISSING if angle is None else f"{fixed(math.degrees(angle), 4)} deg"
+
+
+def longitude(angle: float | None) -> str:
+    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; what is at the pole has none."""
+    return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
+
+
+def steering(impulse: Sequence[float]) -> str:
+    """Direction of a transverse torque in the 1-2 plane, from axis 1 towards axis 2: 0 to below 360 degrees."""
+    return f"{fixed(math.degrees(math.atan2(impulse[1], impulse[0])) % 360.0, 2, 360.0)}°"
+
+
+def fixed(value: float, digits: int, period: float = math.inf) -> str:
+    """A number with so many decimals, without -0; what rounds up to ``period`` is 0."""
+    rounded = round(value, digits)
+    return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"

@@ -16,7 +16,6 @@ from nutdamp.verification import AGREE, Verification
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
     """Everything that ``verify`` shows of the schedule called ``name``."""
     missing = [Text(f"{method.name}: {method.missing}") for method in found.methods if method.missing]
-    verdict = "agree" if found.agree else "DO NOT AGREE"
     return Group(
         header(spacecraft),
         Text(),
@@ -25,13 +24,20 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
         methods_table(found),
         *missing,
         Text(),
-        Text(f"Taylor series and DOP853 {verdict} (within {AGREE:g} rad)."),
+        Text(verdict(found)),
         Text(conservation(spacecraft, found)),
         Text(),
         Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
         Text(),
         budget_table(found),
     )
+
+
+def verdict(found: Verification) -> str:
+    """Whether the integrations from outside confirm the flown motion, in a sentence."""
+    names = found.checks if found.agree else found.disagreeing
+    how = f"agree (within {AGREE:g} rad)" if found.agree else f"DO NOT AGREE (within {AGREE:g} rad)"
+    return f"The flown motion and {' and '.join(names)} {how}."
 
 
 def conservation(spacecraft: Spacecraft, found: Verification) -> str:

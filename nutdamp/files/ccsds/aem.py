@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from nutdamp.epoch import Epoch
 from nutdamp.files.ccsds.apm import angular_velocity, header, identity
-from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.files.ccsds.message import AEM_METADATA, BODY_FRAME, Message, Segment, block, number
 from nutdamp.files.frames import Reference, Stretch, stretches
 from nutdamp.flight import Flight

@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from nutdamp import __version__
+from nutdamp.epoch import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.files.ccsds.message import (
     APM_BLOCKS,
     APM_METADATA,
@@ -27,6 +27,7 @@ from nutdamp.files.ccsds.message import (
 from nutdamp.files.frames import Reference
 from nutdamp.physics import attitude, cones
 from nutdamp.planning import Plan
+from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -100,7 +101,7 @@ def _frames(frame: str) -> Values:
 
 def _motion(body: Spacecraft, frame: str) -> list[Block]:
     """Attitude and angular velocity at t = 0."""
-    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    rates, quaternion = map(cleaned, body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion))
     scalar, *vector = quaternion.tolist()
     # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
     turn: Values = dict(zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True))
@@ -130,7 +131,7 @@ def _spin(body: Spacecraft) -> Values:
     transverse = math.hypot(momentum[0], momentum[1])
     phase = math.atan2(-momentum[1], momentum[0]) if transverse > 0.0 else 0.0
     return {
-        "SPIN_ALPHA": math.degrees(right_ascension),
+        "SPIN_ALPHA": math.degrees(attitude.full_turn(right_ascension)),
         "SPIN_DELTA": math.degrees(declination),
         "SPIN_ANGLE": math.degrees(math.atan2(-node @ axes[:, 1], node @ axes[:, 0])),
         "SPIN_ANGLE_VEL": math.degrees(inertia.a * rates[2]),
@@ -158,7 +159,7 @@ def _manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference
     if pulse.torque is None or pulse.on_time == 0.0:
         cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
         raise BadRequest(f"pulse {number} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
-    torque = (body.inertia.axes @ pulse.torque).tolist()
+    torque = body.inertia.in_file(pulse.torque).tolist()
     values: Values = {
         "MAN_EPOCH_START": reference.epoch.plus(max(pulse.start, 0.0)).text,
         "MAN_DURATION": pulse.on_time,

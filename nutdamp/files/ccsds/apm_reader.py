@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.checked import Checked, unit_length
-from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.files.ccsds.kvn import from_kvn
 from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, VERSION, Block, Keyword
 from nutdamp.files.ccsds.xml import from_xml

@@ -7,8 +7,8 @@ import math
 import re
 from collections.abc import Iterable
 
+from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault
-from nutdamp.files.ccsds.epoch import Epoch
 from nutdamp.files.ccsds.message import Block, Entry, Keyword
 
 LARGEST = 1e15

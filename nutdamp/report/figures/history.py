@@ -12,6 +12,7 @@ from nutdamp.report import geometry
 from nutdamp.report.figures import style
 from nutdamp.report.figures.motion import title
 from nutdamp.report.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.report.text import steering
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.track import Track
 
@@ -134,8 +135,7 @@ def timeline(axes: Axes, flight: Flight, until: float, *, brief: bool = False) -
 def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
     how = f"{pulse.on_time:.3g} s" if pulse.on_time else f"{pulse.magnitude:.3g} N m s"
     if pulse.channel == STEERABLE:
-        torque = flight.spacecraft.inertia.axes @ pulse.impulse
-        how += f" at {round(math.degrees(math.atan2(torque[1], torque[0]))) % 360}°"
+        how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
     return f"{number + 1}: {how}"
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from nutdamp import __version__
 from nutdamp.planning import Comparison, Plan, unrounded
 from nutdamp.report.check_tables import channel_table, disturbance_table
+from nutdamp.report.end_tables import end_table
 from nutdamp.report.page.document import (
     Block,
     Facts,
@@ -20,12 +21,13 @@ from nutdamp.report.page.document import (
     Remarks,
     Section,
     blocks_of,
+    facts_of,
     sheet_of,
 )
 from nutdamp.report.page.pictures import dispersion_picture_of, pictures_of
 from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.report.text import degrees, mass, moment, quantity
-from nutdamp.report.verify_tables import budget_table, conservation, methods_table
+from nutdamp.report.verify_tables import budget_table, conservation, methods_table, verdict
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 
@@ -134,23 +136,23 @@ def _schemes(compared: Comparison) -> Section:
 
 def _schedule(chosen: Plan) -> Section:
     title = f"Recommended schedule: {chosen.scheme}"
+    end = facts_of("Where it points after the last pulse", end_table(chosen.flight))
     if not len(chosen.pulses):
-        return Section("schedule", title, (Prose("No pulse is needed."),))
+        return Section("schedule", title, (Prose("No pulse is needed."), end))
     note = Prose(
         "A pulse is on from its start for its on-time; the centre lies halfway. "
         "Nutation: before the pulse, and after it."
     )
-    return Section("schedule", title, (pulse_sheet(chosen), note))
+    return Section("schedule", title, (pulse_sheet(chosen), note, end))
 
 
 def _budget(chosen: Plan) -> Section:
     verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen))
-    agree = "agree" if verified.agree else "DO NOT AGREE"
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     blocks: list[Block] = [
         sheet_of("What each imperfection alone leaves, everything else ideal", budget_table(verified)),
         sheet_of("The schedule flown by independent means", methods_table(verified)),
-        Prose(f"Taylor series and DOP853 {agree}. {conservation(chosen.spacecraft, verified)}"),
+        Prose(f"{verdict(verified)} {conservation(chosen.spacecraft, verified)}"),
     ]
     if missing:
         blocks.append(Remarks(missing))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 from nutdamp.flight import Residual
 from nutdamp.planning import Comparison, Plan
+from nutdamp.report.end_tables import angle_names, angle_texts
 from nutdamp.report.page.document import Column, Facts, Sheet, facts_of, sheet_of
 from nutdamp.report.plan_tables import derived_table, pulse_table
 from nutdamp.report.text import MISSING, degrees, duration, moment
@@ -75,6 +76,11 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         (Column("nutation by (17)", "deg"), lambda plan: _angle(plan.residual, "nutation")),
         (Column("shift by (17)", "deg"), lambda plan: _angle(plan.residual, "momentum_shift")),
     ]
+    body = compared.spacecraft
+    columns += [
+        (Column(f"axis: {angle_names(body)[0]}", "deg"), lambda plan: _pointing(plan, 0)),
+        (Column(f"axis: {angle_names(body)[1]}", "deg"), lambda plan: _pointing(plan, 1)),
+    ]
     if any(plan.spin_change for plan in compared.plans):
         columns.append((Column("spin change", "rad/s"), lambda plan: _number(plan.spin_change)))
     if any(plan.delta_v is not None for plan in compared.plans):
@@ -88,6 +94,10 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
 
 def _number(value: float | None, scale: float = 1.0) -> str:
     return MISSING if value is None else f"{scale * value:.4g}"
+
+
+def _pointing(plan: Plan, which: int) -> str:
+    return angle_texts(plan.spacecraft, plan.flight.final.axis)[which].removesuffix(" deg")
 
 
 def _angle(left: Residual | None, name: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp.files.ccsds.epoch import FIRST_DAY, LEAP_DAYS, Epoch
+from nutdamp.epoch import FIRST_DAY, LEAP_DAYS, Epoch
 
 
 def test_the_leap_seconds_are_those_of_another_list() -> None:

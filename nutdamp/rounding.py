@@ -1,0 +1,24 @@
+"""What is rounding and no result: the one place that says which numbers are shown as 0."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+NOISE = 1e-13
+"""Part of its largest neighbour below which a component of a vector is rounding."""
+
+SAME_ANGLE = 1e-11
+"""rad; angles that differ by less count as equal, and a direction this near a pole has no longitude."""
+
+
+def cleaned(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Vectors (..., n) with 0 for components that are rounding beside the largest one, and for -0."""
+    values = np.asarray(vectors, dtype=float)
+    largest = np.abs(values).max(axis=-1, keepdims=True, initial=0.0)
+    return np.where(np.abs(values) < NOISE * largest, 0.0, values) + 0.0
+
+
+def cleaned_change(change: float, whole: float) -> float:
+    """A difference of two numbers of the size of ``whole``; 0 where it is rounding beside them."""
+    return float(cleaned([change, whole])[0])
