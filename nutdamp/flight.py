@@ -261,7 +261,7 @@ def make_setting(spacecraft: Spacecraft) -> Setting:
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
     transverse = sum(disturbance.transverse for disturbance in fixed)
     return Setting(
-        moments=spacecraft.inertia.flown_moments,
+        moments=spacecraft.inertia.moments,
         constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
         forcing=Forcing(
             turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),

@@ -25,19 +25,20 @@ from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
 
-SYMMETRY_TOLERANCE = 1e-12
-"""Transverse moments that differ by less, relatively, count as equal: the rounding of an eigensolver."""
-
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
     """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the file.
 
-    ``moments`` is (I1, I2, I3); ``axes`` is 3×3, its columns the principal axes in file axes.
+    ``moments`` is (I1, I2, I3), those that `inertia.settled` calls equal made so; ``axes`` is 3×3, its columns the
+    principal axes in file axes.
     """
 
-    moments: tuple[float, float, float]
+    moments: inertia.Moments
     axes: Vector = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "moments", inertia.settled(self.moments))
 
     @property
     def A(self) -> float:
@@ -72,13 +73,7 @@ class Inertia:
     @property
     def symmetric(self) -> bool:
         """Whether I1 = I2, so that the closed forms hold exactly."""
-        first, second, _ = self.moments
-        return abs(first - second) <= SYMMETRY_TOLERANCE * max(first, second)
-
-    @property
-    def flown_moments(self) -> tuple[float, float, float]:
-        """(I1, I2, I3) with I1 = I2 to the last digit where they differ by rounding only, so that closed forms hold."""
-        return (self.A, self.A, self.C) if self.symmetric else self.moments
+        return self.moments[0] == self.moments[1]
 
     @property
     def tensor(self) -> Vector:
@@ -311,7 +306,7 @@ class Spacecraft:
     @cached_property
     def widest(self) -> Cones:
         """The cone angles of the free motion from t = 0, where its nutation is largest; with I1 = I2 it stays so."""
-        return arc_cones(self.inertia.flown_moments, self.omega0, math.copysign(1.0, self.spin))
+        return arc_cones(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin))
 
     @property
     def nutation(self) -> float:
@@ -321,7 +316,7 @@ class Spacecraft:
     @property
     def tilt(self) -> float:
         """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2, else equal."""
-        return cones.momentary(self.inertia.flown_moments, self.omega0, math.copysign(1.0, self.spin)).nutation
+        return cones.momentary(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin)).nutation
 
     @property
     def transverse_rate(self) -> float:

@@ -255,7 +255,7 @@ def _compared(
     before = attitude.rotate(start.quaternion, start.rates * moments)
     after = attitude.rotate(motion[1][last], motion[0][last] * moments)
     shift = float(attitude.angle_between(before, after))
-    left = arc_cones(spacecraft.inertia.flown_moments, motion[0][last], math.copysign(1.0, spacecraft.spin))
+    left = arc_cones(spacecraft.inertia.moments, motion[0][last], math.copysign(1.0, spacecraft.spin))
     residual = Residual(left.nutation, left.body, left.space, shift, shift)
     method = _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
     return replace(method, outside=True)

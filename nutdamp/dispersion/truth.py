@@ -149,7 +149,7 @@ class Model:
         body = self.spacecraft
         axis = body.goal.axis
         if axis is None:
-            axis = np.asarray(body.inertia.flown_moments) * body.omega0
+            axis = np.asarray(body.inertia.moments) * body.omega0
         else:
             axis = attitude.rotate(body.initial.quaternion * np.array([1.0, -1.0, -1.0, -1.0]), np.asarray(axis))
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)

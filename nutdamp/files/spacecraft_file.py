@@ -112,7 +112,7 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
         return rates
     state = contents.state
     assert state is not None
-    first, second, third = inertia.flown_moments
+    first, second, third = inertia.moments
     way = np.array([math.cos(state.phase), math.sin(state.phase)])
     moment = first if first == second else math.hypot(first * way[0], second * way[1])
     return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])

@@ -3,10 +3,27 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 DEGENERATE = 1e-9
-"""Principal moments that differ by less, relative to the largest, share their plane of axes."""
+"""Principal moments that differ by no more, relative to the largest, are equal: a sphere, or a plane of free axes."""
+
+Moments = tuple[float, float, float]
+
+
+def settled(moments: ArrayLike) -> Moments:
+    """Principal moments (I1, I2, I3), those within `DEGENERATE` of each other made exactly equal.
+
+    I1 and I2 become their mean; of a sphere all are I3. So whatever is decided by comparing moments, a sphere, symmetry
+    or the class of an axis, is decided alike everywhere, and nothing divides by a difference that is rounding.
+    """
+    first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
+    rounding = DEGENERATE * max(first, second, third)
+    if first != second and abs(first - second) <= rounding:
+        first = second = 0.5 * (first + second)
+    if max(abs(first - third), abs(second - third)) <= rounding:
+        first = second = third
+    return first, second, third
 
 
 def ratio(A: float, C: float) -> float:
@@ -23,7 +40,7 @@ def shape(A: float, C: float) -> str:
 
 def principal_axes(
     tensor: NDArray[np.float64],
-) -> tuple[tuple[float, float, float], NDArray[np.float64]]:
+) -> tuple[Moments, NDArray[np.float64]]:
     """Principal moments and axes of a symmetric 3×3 tensor (kg m²).
 
     Returns ((I1, I2, I3), axes): the columns of ``axes`` are the principal axes in the axes of the tensor, right

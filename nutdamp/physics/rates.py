@@ -21,6 +21,12 @@ ComplexArray = NDArray[np.complex128]
 SERIES_REACH = 2.0
 """Largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel."""
 
+SERIES_ORDERS = 60
+"""Orders of that power series: it has converged long before."""
+
+OUTWARDS = 2000
+"""Steps of a tenth outwards, at most, in which an on-time is sought: over more decades than there are in a number."""
+
 MOST_PANELS = 20_000
 """A pulse over more phase than these span keeps less than 1e-4 of its impulse; it counts as keeping none."""
 
@@ -74,9 +80,10 @@ def width_factor(
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
     offset = 0.5 * a * spin_rate * half * half
     slope, bend = a * (spin + (spin_rate + drift) * half) + 1j * growth, 0.5 * a * (spin_rate + drift)
-    panels = math.ceil((abs(slope) + abs(bend) * half) * half / SERIES_REACH) or 1
-    if panels > MOST_PANELS:
+    turned = (abs(slope) + abs(bend) * half) * half
+    if not turned <= MOST_PANELS * SERIES_REACH:
         return 0.0 + 0.0j
+    panels = math.ceil(turned / SERIES_REACH) or 1
     width = half / panels
     total = 0.0 + 0.0j
     for panel in range(panels):
@@ -89,12 +96,14 @@ def width_factor(
 def _mean_of_phase(slope: complex, bend: float, half: float) -> complex:
     """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series about the middle."""
     before, term = 0.0 + 0.0j, 1.0 + 0.0j  # terms c_k half^k of the series of the integrand
-    total, order = term, 0
-    while order < 4 or abs(term) + abs(before) > 1e-18:
+    total = term
+    for order in range(SERIES_ORDERS):
+        if order >= 4 and abs(term) + abs(before) <= 1e-18:
+            break
         after = 1j * half * (slope * term + 2 * bend * half * before) / (order + 1)
-        before, term, order = term, after, order + 1
-        if order % 2 == 0:
-            total += term / (order + 1)
+        before, term = term, after
+        if order % 2 == 1:
+            total += term / (order + 2)
     return total
 
 
@@ -118,11 +127,13 @@ def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate:
 
     # From the pulse without axial torque outwards: the first on-time that does enough lies in the last step.
     low, high = 0.0, min(plain, longest)
-    while excess(high) < 0.0:
+    for _ in range(OUTWARDS):
+        if excess(high) >= 0.0:
+            return _crossing(excess, low, high)
         if high >= longest or abs(a) * (abs(spin) + 0.5 * abs(spin_rate) * high) * high > 2.0 * math.pi:
             return None
         low, high = high, min(1.1 * high, longest)
-    return _crossing(excess, low, high)
+    return None
 
 
 def _crossing(excess: Callable[[float], float], low: float, high: float) -> float:

@@ -28,6 +28,9 @@ AT_REST = 1e-9
 LONGEST = 3e5
 """Radians that one integration may run over: some two hundred thousand steps."""
 
+MOST_STEPS = 400_000
+"""Steps of one integration, at most: enough for `LONGEST`, whatever becomes of the rates on the way."""
+
 REMAINDER = 2.0**-53
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
 
@@ -92,28 +95,29 @@ def integrate(
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
-    now = start
-    while now < end:
+    gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step
+    for _ in range(MOST_STEPS):
+        now, left = start + gone, duration - gone
+        if left <= 0.0:
+            return pieces
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
         pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
-        if pace * (end - now) > LONGEST:
+        if not pace * left <= LONGEST:
             raise Infeasible(
-                f"the motion from {now:.4g} s to {end:.4g} s runs over {pace * (end - now):.2g} rad, too many to be "
+                f"the motion from {now:.4g} s to {end:.4g} s runs over {pace * left:.2g} rad, too many to be "
                 f"integrated; shorten the time, or look for a torque or rate that is too large"
             )
-        unit = 1.0 / pace if pace > 0.0 else end - now
+        unit = 1.0 / pace if pace > 0.0 else left
         series = _series(moments, acceleration, forcing, floor, now, np.concatenate([rates, quaternion]), unit)
-        step = min(_reach(series, unit) * unit, end - now)
-        if end - now - step < 1e-3 * step:  # no sliver of a step at the end
-            step = end - now
-        if now + step == now or len(pieces) > LONGEST:
-            raise Infeasible(f"the motion changes too fast to be integrated at {now:.10g} s")
+        step = min(_reach(series, unit) * unit, left)
+        if left - step < 1e-3 * step:  # no sliver of a step at the end
+            step = left
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
         piece = Piece(now, step, scaled[:, :3], scaled[:, 3:])
         pieces.append(piece)
         rates, quaternion = piece.final
-        now = end if step == end - now else now + step
-    return pieces
+        gone = duration if step == left else gone + step
+    raise Infeasible(f"the motion from {start:.4g} s to {end:.4g} s changes too fast to be integrated")
 
 
 def _series(

@@ -35,15 +35,13 @@ class NutationRates(NamedTuple):
 def axis_class(moments: ArrayLike) -> AxisClass:
     """Kind of axis 3 among the principal moments (I1, I2, I3).
 
-    Moments closer than `inertia.DEGENERATE` count as equal. I1 = I2 leaves axis 3 the minimum or the maximum;
+    Equal moments are those of `inertia.settled`. I1 = I2 leaves axis 3 the minimum or the maximum;
     ``degenerate`` means I3 equal to one of the others alone, so that any axis of their plane would do.
     """
-    first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
-    rounding = inertia.DEGENERATE * max(first, second, third)
-    equal = (abs(first - third) <= rounding, abs(second - third) <= rounding)
-    if all(equal):
+    first, second, third = inertia.settled(moments)
+    if first == second == third:
         return "sphere"
-    if any(equal):
+    if min(abs(first - third), abs(second - third)) <= inertia.DEGENERATE * max(first, second, third):
         return "degenerate"
     if third < min(first, second):
         return "minimum"

@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-140
 """A rate below this part of the largest counts as zero, as does a sine: its square would leave the range of numbers."""
 
+MEANS = 40
+"""Steps to an arithmetic-geometric mean, at most; from the smallest number there is it takes twelve."""
+
 MODES_REACH = 40.0
 """Fourier coefficients are kept down to exp(-40): less than a rounding."""
 
@@ -265,7 +268,9 @@ def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
     """Arithmetic and geometric means that begin with 1 and sqrt(1 - m), and what they tend to."""
     arithmetic, geometric = 1.0, math.sqrt(complement)
     pairs = [(arithmetic, geometric)]
-    while arithmetic - geometric > 1e-8 * arithmetic:  # the next difference is the square of this one
+    for _ in range(MEANS):
+        if not arithmetic - geometric > 1e-8 * arithmetic:  # the next difference is the square of this one
+            break
         arithmetic, geometric = 0.5 * (arithmetic + geometric), math.sqrt(arithmetic * geometric)
         pairs.append((arithmetic, geometric))
     return pairs, 0.5 * (arithmetic + geometric)

@@ -90,10 +90,10 @@ def _train(
     single = math.isinf(torque) or rates.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
     share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
     if not single and share > 0.0:
-        count = math.ceil(start.left / share)
-        most = spacecraft.limits.max_pulses
-        if most is not None and count > most:  # rather longer pulses than too many
-            count = min(most, max(math.ceil(start.left / max(capacity(longest), share)), 1))
+        most = start.most
+        count = math.ceil(min(start.left / share, most + 1.0))
+        if count > most:  # rather longer pulses than too many
+            count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
     walk = _fire_train(spacecraft, count, capacity(longest), fire)
     if spacecraft.growth > 0.0 and walk.pulses and walk.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.

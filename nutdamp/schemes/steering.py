@@ -44,6 +44,9 @@ ASIDE = np.linspace(-1.0, 1.0, 41)
 NARROWEST = 1e-7
 """Share of the first steps at which the search for the best choice ends; the cost is flat there to its square."""
 
+COMPASS_STEPS = 2000
+"""Steps of that search, at most."""
+
 ROUNDING = 1e-14
 """Relative gain that counts as one while the best choice is made exact."""
 
@@ -239,7 +242,9 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
     rose = rose[np.any(rose != 0.0, axis=1)]
     best = float(cost(point[None, :])[0])
     narrowed = 1.0
-    while narrowed > NARROWEST and len(rose):
+    for _ in range(COMPASS_STEPS if len(rose) else 0):
+        if narrowed <= NARROWEST:
+            break
         around = point + narrowed * rose
         costs = cost(around)
         index = int(np.argmin(costs))

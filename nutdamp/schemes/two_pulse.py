@@ -110,10 +110,11 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
     best: tuple[Pulse, Pulse] | None = None
     for turns in range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2):
         wait = turns * halves.wait
-        for start in _starts(windows, spacecraft.limits.earliest, on_times, wait):
-            pulses = _pair(spacecraft, torquer, halves, start, wait, on_times)
-            if trim.keeps_limits(spacecraft, pulses) and (best is None or pulses[1].end < best[1].end):
-                best = pulses
+        placed = (
+            _pair(spacecraft, torquer, halves, start, wait, on_times)
+            for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
+        )
+        best = next((pulses for pulses in placed if trim.keeps_limits(spacecraft, pulses)), None)
         if best is not None:
             break
     if best is None:
@@ -141,11 +142,15 @@ def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> floa
 
 
 def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait: float) -> list[float]:
-    """Starts of the first pulse worth trying: at once, or as a blackout window ends for either pulse."""
+    """Starts of the first pulse with which both find room, in order: at once, or as a window ends for either pulse."""
     to_second = wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
-    ends = [end for _, end in windows.limits.blackout]
-    starts = [earliest, *ends, *(end - to_second for end in ends)]
-    return [windows.tick_after(start) for start in starts if start >= earliest]
+    ends = np.array([end for _, end in windows.limits.blackout])
+    tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
+    starts = windows.ticks_after(tried[tried >= earliest])
+    seconds, (long, longer) = windows.nearest_ticks(starts + to_second), (np.full(len(starts), on) for on in on_times)
+    allowed = windows.allowed(starts, long, earliest)
+    allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
+    return [float(start) for start in starts[allowed]]
 
 
 def _pair(

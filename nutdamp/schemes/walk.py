@@ -15,6 +15,12 @@ from nutdamp.spacecraft import Channel, Disturbance, Spacecraft, Steerable
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
 
+MISSED = 50
+"""Alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready."""
+
+MOST_PULSES = 2000
+"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
+
 
 class Walk:
     """The transverse rate as it will be, and the pulses chosen so far.
@@ -46,8 +52,13 @@ class Walk:
     @property
     def full(self) -> bool:
         """Whether no more pulses are allowed."""
+        return len(self.pulses) >= self.most
+
+    @property
+    def most(self) -> int:
+        """Pulses that are allowed."""
         most = self.spacecraft.limits.max_pulses
-        return most is not None and len(self.pulses) >= most
+        return MOST_PULSES if most is None else min(most, MOST_PULSES)
 
     @property
     def period(self) -> float:
@@ -120,7 +131,8 @@ class Walk:
 
     def schedule(self) -> Schedule:
         """What has been chosen."""
-        return Schedule(tuple(self.pulses))
+        cut = f"ends after {MOST_PULSES} pulses, the most that are planned; a longer max_on_time helps"
+        return Schedule(tuple(self.pulses), (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else ())
 
     def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
         """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
@@ -136,10 +148,15 @@ class Walk:
             start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
         first = self.now + turn / (self.a * self.spin)
-        ready = self.ready
-        slack = SLACK if self.pulses else 0.0  # nothing may start before t = 0
-        while True:
-            turns = math.ceil((ready + 0.5 * on_time - first - slack) / self.period)
+        # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
+        slack = min(SLACK, 1e-3 * on_time) if self.pulses else 0.0
+
+        def alignment(ready: float) -> float:
+            """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
+            return math.ceil((ready + 0.5 * on_time - first - slack) / self.period)
+
+        turns = alignment(self.ready)
+        for _ in range(len(self.windows.limits.blackout) + MISSED):
             centre = first + turns * self.period
             if not self.uniform:
                 centre = self._opposed_near(channel, centre, on_time)
@@ -147,14 +164,14 @@ class Walk:
             if self.windows.limits.tick is not None:
                 start = self.windows.nearest_tick(start)
                 centre = start + 0.5 * on_time
-            if start < self.ready - slack:  # rounded to a tick before the actuators are ready
-                ready += self.windows.limits.tick or SLACK
-                continue
             free = self.windows.blocked_until(start, on_time)
-            if free is None:
-                break
-            ready = max(free, ready + SLACK)
-        return channel_pulse(channel, centre, on_time) if self.windows.allows(start, on_time, self.ready) else None
+            later = not self.pulses or centre > self.now  # also where the clock cannot tell so short a time
+            if start >= self.ready - slack and later and free is None:
+                allowed = self.windows.allows(start, on_time, self.ready)
+                return channel_pulse(channel, centre, on_time) if allowed else None
+            # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
+            turns = max(turns + 1, alignment(self.ready if free is None else free))
+        return None
 
     def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
         """Moment near ``centre`` at which ω opposes the pulse where it does not turn evenly.

@@ -25,10 +25,13 @@ class Windows:
 
     def blocked_until(self, start: float, on_time: float) -> float | None:
         """End of the first blackout window that the pulse would touch; None where it is free."""
-        for begins, ends in self.limits.blackout:
-            if start < ends - SLACK and start + on_time > begins + SLACK:
-                return ends
-        return None
+        if not self.limits.blackout:
+            return None
+        begins, over = self._merged()
+        # The first window that is not over when the pulse starts is the only one that it can touch first.
+        following = int(np.searchsorted(over, start + SLACK, side="right"))
+        touched = following < len(over) and start + on_time > begins[following] + SLACK
+        return float(over[following]) if touched else None
 
     def allows(self, start: float, on_time: float, ready: float) -> bool:
         """Whether a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
@@ -44,8 +47,7 @@ class Windows:
         free = (starts >= np.maximum(ready, 0.0) - SLACK) & (ends <= self.horizon + SLACK)
         if self.limits.blackout:
             begins, over = self._merged()
-            # The first window that is not over when the pulse starts is the only one that it can touch first.
-            following = np.searchsorted(over, starts + SLACK, side="right")
+            following = np.searchsorted(over, starts + SLACK, side="right")  # as in `blocked_until`
             free &= ends <= np.append(begins, np.inf)[following] + SLACK
         return np.asarray(free)
 
@@ -64,7 +66,10 @@ class Windows:
     def earliest_start(self, on_time: float, ready: float) -> float | None:
         """First allowed start, s, on a tick; None where the horizon comes first."""
         start = self.tick_after(ready)
-        while (free := self.blocked_until(start, on_time)) is not None:
+        for _ in range(len(self.limits.blackout)):  # none blocks twice
+            free = self.blocked_until(start, on_time)
+            if free is None:
+                break
             start = self.tick_after(free)
         return start if self.allows(start, on_time, ready) else None
 
@@ -73,10 +78,20 @@ class Windows:
         tick = self.limits.tick
         return time if tick is None else round(time / tick) * tick
 
-    def tick_after(self, time: float) -> float:
-        """First commandable time not before ``time``."""
+    def nearest_ticks(self, times: Vector) -> Vector:
+        """`nearest_tick` of many times (n,)."""
         tick = self.limits.tick
-        return time if tick is None else math.ceil((time - SLACK) / tick) * tick
+        return times if tick is None else np.rint(times / tick) * tick
+
+    def tick_after(self, time: float) -> float:
+        """First commandable time not before ``time``, but for rounding."""
+        tick = self.limits.tick
+        return time if tick is None else math.ceil((time - 0.5 * SLACK) / tick) * tick
+
+    def ticks_after(self, times: Vector) -> Vector:
+        """`tick_after` of many times (n,)."""
+        tick = self.limits.tick
+        return times if tick is None else np.ceil((times - 0.5 * SLACK) / tick) * tick
 
     def on_time(self, wanted: float, shortest: float, longest: float) -> float:
         """Commandable on-time nearest to ``wanted`` s within the bounds, and not zero."""

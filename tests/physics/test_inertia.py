@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from nutdamp.physics import inertia
+from nutdamp.physics import inertia, stability, triaxial
 
 Array = NDArray[np.float64]
 EPS = np.finfo(float).eps
@@ -101,3 +101,37 @@ def test_sphere_that_rounding_has_smeared_keeps_the_axes_of_the_file() -> None:
     found, axes = inertia.principal_axes(tensor)
     assert found == pytest.approx((7.0, 7.0, 7.0), rel=4 * EPS)
     assert axes == pytest.approx(np.eye(3), abs=4 * EPS)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ((100.00000003, 100.0, 100.0), (100.0, 100.0, 100.0)),
+        ((100.0, 100.0000000002, 100.0000000001), (100.0000000001,) * 3),  # I3 in the middle
+        ((100.0, 100.0, 100.00000009), (100.00000009,) * 3),
+        ((100.0, 100.00000015, 100.00000008), (100.00000008,) * 3),  # each within reach of I3, not of one another
+        ((120.0, 120.0 * (1 + 5e-10), 80.0), (120.0 * (1 + 2.5e-10), 120.0 * (1 + 2.5e-10), 80.0)),
+        ((120.0, 120.0 * (1 + 2e-9), 80.0), (120.0, 120.0 * (1 + 2e-9), 80.0)),
+        ((100.0, 100.0, 100.0000002), (100.0, 100.0, 100.0000002)),
+        ((3.0, 4.0, 3.0 * (1 + 1e-13)), (3.0, 4.0, 3.0 * (1 + 1e-13))),
+    ],
+)
+def test_moments_that_differ_by_rounding_are_one(
+    given: tuple[float, float, float], expected: tuple[float, float, float]
+) -> None:
+    found = inertia.settled(given)
+    assert found == pytest.approx(expected, rel=2 * EPS)
+    assert inertia.settled(found) == found
+    assert (found[0] == found[1]) == (expected[0] == expected[1])
+    assert (found[0] == found[2]) == (expected[0] == expected[2])
+
+
+@given(st.floats(1e-3, 1e6), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+def test_what_is_a_sphere_is_one_for_every_question(size: float, one: float, two: float) -> None:
+    moments = (size, size * (1 + one * inertia.DEGENERATE), size * (1 + two * inertia.DEGENERATE))
+    first, second, third = inertia.settled(moments)
+    kind = stability.axis_class(moments)
+    assert kind == stability.axis_class((first, second, third))
+    assert (kind == "sphere") == (first == second == third) == (inertia.ratio(first, third) == 0.0 and first == second)
+    if kind in ("minimum", "maximum"):
+        assert triaxial.body_nutation_rate((first, second, third), 1.0) != 0.0

@@ -10,6 +10,7 @@ import pytest
 import reference
 from numpy.typing import NDArray
 
+from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, rigid
 
 Array = NDArray[np.float64]
@@ -118,3 +119,21 @@ def test_units_of_time_do_not_matter(scale: float) -> None:
     scaled = rigid.integrate(moments, torque * scale**2, rates * scale, START, 0.0, 5.0 / scale)[-1].final
     assert scaled[0] / scale == pytest.approx(plain[0], rel=200 * EPS)
     assert scaled[1] == pytest.approx(plain[1], abs=200 * EPS)
+
+
+def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
+    """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
+    torque, start = np.array([0.3, -0.2, 0.1]), np.array([0.2, 0.1, 3.0])
+    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    late, early = (rigid.integrate((120.0, 100.0, 80.0), torque, start, quaternion, t, t + 64.0) for t in (1e17, 0.0))
+    assert len(late) == len(early)
+    for one, other in zip(late[-1].final, early[-1].final, strict=True):
+        assert one == pytest.approx(other, abs=1e-12)
+
+
+@pytest.mark.parametrize("torque", [math.nan, math.inf, 1e200, 1e300])
+def test_what_cannot_be_integrated_is_refused(torque: float) -> None:
+    with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
+        rigid.integrate(
+            (120.0, 100.0, 80.0), np.array([torque, 0.0, 0.0]), np.ones(3), np.array([1.0, 0, 0, 0]), 0.0, 1e9
+        )

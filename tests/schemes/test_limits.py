@@ -13,8 +13,8 @@ from nutdamp import planning
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
 
-PATIENCE = 20.0
-"""s for one plan, which takes some hundredths; so that an endless search fails and does not hang."""
+PATIENCE = 10_000_000
+"""Calls of functions for one plan, which takes two million at most; so that an endless search fails, not hangs."""
 
 ASKED = {
     "one-pulse": ("one-pulse", Options()),

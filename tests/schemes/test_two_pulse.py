@@ -118,7 +118,7 @@ def test_one_pulse_allowed_is_too_few() -> None:
 def test_a_blackout_to_the_horizon_is_found_hopeless_at_once() -> None:
     """Not every odd number of half turns within 10⁷ s is tried."""
     limits = Limits(horizon=1e7, blackout=((0.0, 1e7),))
-    with within(5.0):
+    with within(1_000_000):
         plan = planning.plan(spinner(steerable=Steerable(8.0), limits=limits), "two-pulse")
     assert not plan.feasible
 
@@ -234,14 +234,14 @@ def test_a_gap_longer_than_the_cheapest_waits_is_kept(literal: bool) -> None:
 def test_near_spheres_are_planned_or_declined_in_no_time(a: float) -> None:
     """The default horizon is 20 T_ω: its 20/a closings of H are not laid out one by one."""
     spacecraft = spinner(120.0, 120.0 * (1 - a), channels=cross(8.0))
-    with within(10.0):
+    with within(3_000_000):
         plan = planning.plan(spacecraft, "two-pulse")
     assert plan.feasible or plan.why
 
 
 def test_a_long_horizon_costs_no_time() -> None:
     """10⁷ s are 116 days."""
-    with within(10.0):
+    with within(3_000_000):
         plan = planning.plan(spinner(channels=cross(8.0), limits=Limits(horizon=1e7)), "two-pulse")
     assert plan.feasible
 
@@ -261,7 +261,7 @@ def test_trimming_does_not_run_away() -> None:
         ),
         limits=Limits(horizon=2194.4435233461004, earliest=1844.9859185150808),
     )
-    with within(10.0):
+    with within(3_000_000):
         plan = planning.plan(body, "two-pulse")
     assert plan.feasible or plan.why
 
