@@ -125,7 +125,6 @@ def _faults(program: str, folder: Path) -> Iterator[str]:
             capture_output=True,
             text=True,
             check=False,
-            timeout=600,
         )
 
     for line in CALLS:

@@ -23,7 +23,6 @@ def completed(*words: str) -> list[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
     )
     assert done.stderr == ""
     return done.stdout.split()

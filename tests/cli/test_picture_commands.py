@@ -46,7 +46,7 @@ def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> Non
 def test_standard_output_takes_the_picture_alone(run: Run) -> None:
     environment = {**os.environ, "COLUMNS": "80"}
     command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--plot", "-", "--figure", "timeline"]
-    done = subprocess.run(command, env=environment, capture_output=True, check=False, timeout=120)
+    done = subprocess.run(command, env=environment, capture_output=True, check=False)
     assert done.returncode == 0
     assert done.stdout.startswith(b"\x89PNG")
     assert done.stdout.endswith(b"IEND\xaeB`\x82")
@@ -105,7 +105,7 @@ def without(package: str, tmp_path: Path, *arguments: str) -> subprocess.Complet
         f"import sys; sys.modules[{package!r}] = None; from nutdamp.cli import main; sys.argv[0] = 'nutdamp'; main()"
     )
     command = [sys.executable, "-c", blocked, *arguments]
-    return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+    return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(

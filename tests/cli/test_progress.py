@@ -55,10 +55,8 @@ def test_what_takes_long_is_named_while_it_is_done(
     monkeypatch.setattr(module, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning", quiet=quiet):
-        for _ in range(200):
-            if not told or "planning" in stream.getvalue():
-                break
-            time.sleep(0.05)
+        while told and "planning" not in stream.getvalue():
+            time.sleep(0.01)
     assert ("planning" in stream.getvalue()) is told
 
 
@@ -85,8 +83,6 @@ def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
     monkeypatch.setattr(module, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning"):
-        for _ in range(200):  # until the timer has had its turn
-            if not seen or "planning" in stream.getvalue():
-                break
-            time.sleep(0.05)
+        while seen and "planning" not in stream.getvalue():  # until the timer has had its turn
+            time.sleep(0.01)
     assert ("planning" in stream.getvalue()) is seen

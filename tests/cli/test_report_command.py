@@ -152,7 +152,8 @@ def test_a_browser_that_prints_nothing_is_an_error(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str, said: str
 ) -> None:
     monkeypatch.setenv(pdf.VARIABLE, printer(tmp_path, script))
-    monkeypatch.setattr(pdf, "PATIENCE", 0.5)
+    if "timed out" in said:
+        monkeypatch.setattr(pdf, "PATIENCE", 0.1)
     with pytest.raises(CannotWrite, match=f"cannot write report.pdf: .*{said}"):
         pdf.printed("<p>", "report.pdf")
 

@@ -78,7 +78,7 @@ def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str
 @pytest.mark.parametrize("command", ["plan --quiet", "plan --quiet --csv -"])
 def test_a_process_without_standard_output_does_its_work(tmp_path: Path, command: str) -> None:
     call = f'exec "{sys.executable}" -m nutdamp {command} --json pulses.json >&-'
-    done = subprocess.run(["sh", "-c", call], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(["sh", "-c", call], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "pulses.json").exists()
 
@@ -98,7 +98,6 @@ def _process(folder: Path, command: str, *, stdout: int | IO[str], **more: str) 
         stderr=subprocess.PIPE,
         text=True,
         encoding="latin-1",
-        timeout=60,
         check=False,
     )
 

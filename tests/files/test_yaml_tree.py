@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from builders import within
 
 from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files.yaml_tree import (
@@ -191,9 +191,8 @@ def bomb(levels: int) -> str:
     ],
 )
 def test_bombs_are_refused_at_once(text: str, message: str) -> None:
-    begin = time.perf_counter()
-    assert message in refusal(text)
-    assert time.perf_counter() - begin < 5.0
+    with within(10_000_000):
+        assert message in refusal(text)
 
 
 def test_the_limits_themselves_are_allowed() -> None:
