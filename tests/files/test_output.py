@@ -31,7 +31,7 @@ def temporary(folder: Path) -> list[str]:
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 def test_the_next_write_removes_what_a_killed_run_left(tmp_path: Path) -> None:
     for _ in range(2):
-        done = subprocess.run([sys.executable, "-c", KILLED], cwd=tmp_path, check=False, timeout=60)
+        done = subprocess.run([sys.executable, "-c", KILLED], cwd=tmp_path, check=False)
         assert done.returncode == -signal.SIGKILL
         assert len(temporary(tmp_path)) == 1  # that of the second run alone: it removed the first
     (tmp_path / ".x.csv.mine").write_text("a hidden file of somebody else")
