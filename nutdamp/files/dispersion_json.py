@@ -9,7 +9,6 @@ import numpy as np
 
 from nutdamp import __version__
 from nutdamp.dispersion.outputs import OUTPUTS
-from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
@@ -100,14 +99,13 @@ def _shares(results: Results) -> list[dict[str, Any]]:
     return rows
 
 
-def case_json(study: Study, case: int, draws: dict[str, float], outputs: Array | None = None) -> dict[str, Any]:
+def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    values = study.outputs_of(draws) if outputs is None else outputs
     return {
         "case": case + 1,
         "inputs": {entry.name: entry.nominal + draws[entry.name] for entry in study.model.inputs.drawn},
         **{
             column: _shown(name, float(value))
-            for name, column, value in zip(OUTPUTS, OUTPUT_COLUMNS, values, strict=True)
+            for name, column, value in zip(OUTPUTS, OUTPUT_COLUMNS, study.outputs_of(draws), strict=True)
         },
     }

@@ -34,8 +34,7 @@ class SamplesWriter:
     """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees."""
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
-        self._stream, self._study = stream, study
-        self._source = study.source()
+        self._stream, self._source = stream, study.source()
         self._inputs = study.model.inputs.drawn
         header = ["case", *(column(entry) for entry in self._inputs), *OUTPUT_COLUMNS]
         stream.write(csv_text(header, []).encode())

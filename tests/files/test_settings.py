@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from broken import BASE, THRUSTERS
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nutdamp
@@ -84,8 +84,8 @@ def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
 
 
 def test_setting_every_value_to_itself_changes_nothing() -> None:
-    settings = [f"{dotted(path)}={json.dumps(value)}" for path, value in LEAVES]
-    assert repr(with_settings(EXAMPLE, *settings)) == repr(with_settings(EXAMPLE))
+    chosen = [f"{dotted(path)}={json.dumps(value)}" for path, value in LEAVES]
+    assert repr(with_settings(EXAMPLE, *chosen)) == repr(with_settings(EXAMPLE))
 
 
 def test_entries_by_position_by_name_and_in_brackets() -> None:
@@ -172,6 +172,20 @@ def test_a_key_as_messages_write_it_can_be_set(path: list[str | int], value: str
     assert setting.path == tuple(path)
     assert setting.value == value
     assert setting.label.isprintable()
+
+
+KEYS = st.sampled_from([dotted(path) for path, _ in LEAVES] + ["thrusters", "limits", "goal.spin", "x.y[0]", "limits"])
+VALUES = st.one_of(st.text(max_size=12), st.text("[]{}:,&*!'\"#-1e9 .xmNd\n\t|>%@", max_size=24))
+
+
+@settings(max_examples=400)
+@given(st.lists(st.tuples(KEYS, VALUES), min_size=1, max_size=3))
+def test_whatever_is_set_is_a_spacecraft_or_faults_on_one_line_each(chosen: list[tuple[str, str]]) -> None:
+    try:
+        with_settings(EXAMPLE, *(f"{key}={value}" for key, value in chosen))
+    except FaultyFile as wrong:
+        for fault in wrong.faults:
+            assert str(fault).isprintable()
 
 
 def test_the_library_sets_too(tmp_path: Path) -> None:
