@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
-from nutdamp.cli.common import Input, load, quiet_option, remarks, set_option, show
+from nutdamp.cli.common import DEFAULT_FILE, Input, deliver, load, quiet_option, remarks, set_option, show
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import RenderableType
+
     from nutdamp.files.settings import Setting
 
 
@@ -23,14 +27,14 @@ if TYPE_CHECKING:
 @quiet_option
 def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, quiet: bool) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
-    from nutdamp.errors import CannotRead, FaultyFile
+    from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
 
     silent = expect_outputs(*(Input(file) for file in files or (None,)), json=json)
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
     for name in files or (None,):
         try:
-            spacecraft = load(Input(name, settings), remarks(quiet))
+            report, screen = _looked_into(Input(name, settings), remarks(quiet))
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.files.check_json import failed_json
 
@@ -38,20 +42,35 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
             reports.append(failed_json(name, wrong))
             continue
-        if json is not None:
-            from nutdamp.files.check_json import checked_json
-
-            reports.append(checked_json(name, spacecraft))
+        reports.append(report)
         if not silent:
-            from nutdamp.report.check_tables import check_screen
-
-            show(check_screen(spacecraft))
+            show(screen)
             if len(files) > 1:
                 click.echo()
     if json is not None:
         from nutdamp.files.check_json import check_json
-        from nutdamp.files.output import json_text, write_whole
+        from nutdamp.files.output import json_text
 
-        write_whole(json, json_text(check_json(reports)))
+        try:
+            deliver([(json, json_text(check_json(reports)))])
+        except CannotWrite as wrong:
+            click.echo(f"nutdamp: {wrong}", err=True)
+            failures.add(UNREADABLE)
     if failures:
         sys.exit(max(failures))
+
+
+def _looked_into(given: Input, remark: Callable[[str], None]) -> tuple[dict[str, Any], RenderableType]:
+    """What follows from a file, for JSON and for the screen.
+
+    Raises CannotRead, and FaultyFile also for what turns out to be wrong only when consequences are worked out.
+    """
+    from nutdamp.errors import Fault, FaultyFile, NutdampError
+    from nutdamp.files.check_json import checked_json
+    from nutdamp.report.check_tables import check_screen
+
+    spacecraft = load(given, remark)
+    try:
+        return checked_json(given.path, spacecraft), check_screen(spacecraft)
+    except NutdampError as wrong:
+        raise FaultyFile([Fault(given.path or DEFAULT_FILE, 1, 1, "", str(wrong))]) from wrong

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -57,6 +59,46 @@ def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
     assert files[3]["channels"][1]["damps"] is False
     axes = files[3]["spacecraft"]["principal_axes"]
     assert axes[0][2] == pytest.approx(-axes[2][0], abs=1e-12)  # the tilt about axis 2
+
+
+LATE = """
+import sys
+from nutdamp import errors, survey
+from nutdamp.cli import main
+
+found = survey.spin_axis
+
+def late(spacecraft):
+    if spacecraft.name == "Typo":
+        raise errors.Infeasible("the motion changes too fast to be integrated")
+    return found(spacecraft)
+
+survey.spin_axis = late
+sys.argv = ["nutdamp", "check", "typo.yaml", "good.yaml", "--json", "check.json"]
+main()
+"""
+
+
+def test_check_goes_on_after_what_turns_out_late(tmp_path: Path) -> None:
+    for name, text in (("good.yaml", GOOD), ("typo.yaml", TYPO.replace("c:", "C:"))):
+        (tmp_path / name).write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-c", LATE], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr == "typo.yaml:1:1: the motion changes too fast to be integrated\n"
+    assert "Good" in done.stdout
+    files = json.loads((tmp_path / "check.json").read_text())["files"]
+    assert [entry["valid"] for entry in files] == [False, True]
+    assert files[0]["faults"][0]["problem"] == "the motion changes too fast to be integrated"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_bad_file_counts_before_a_report_that_cannot_be_written(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "typo.yaml").write_text(TYPO)
+    (tmp_path / "good.yaml").write_text(GOOD)
+    assert run("check", "good.yaml", "typo.yaml", "--json", "/dev/full").returncode == 2
+    assert run("check", "good.yaml", "--json", "/dev/full").returncode == 1
 
 
 def test_a_missing_file_alone_is_exit_1(run: Run) -> None:
