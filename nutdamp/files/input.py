@@ -27,7 +27,12 @@ def read_bytes(path: str, most: int = -1) -> bytes:
 
 def read_utf8(path: str) -> str:
     """The text of a file, without a byte order mark; raises CannotRead, or FaultyFile where it is not UTF-8."""
+    return utf8_text(read_bytes(path), path)
+
+
+def utf8_text(data: bytes, name: str) -> str:
+    """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file ``name``."""
     try:
-        return read_bytes(path).decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as reason:
-        raise FaultyFile([Fault(path, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason
+        raise FaultyFile([Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason

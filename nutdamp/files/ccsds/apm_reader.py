@@ -17,9 +17,9 @@ from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.checked import Checked, unit_length
 from nutdamp.files.ccsds.kvn import from_kvn
 from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, VERSION, Block, Keyword
-from nutdamp.files.ccsds.xml import from_xml
+from nutdamp.files.ccsds.xml import from_xml, is_xml
 from nutdamp.files.frames import FRAMES
-from nutdamp.files.input import read_utf8
+from nutdamp.files.input import read_bytes, utf8_text
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Vector
 
@@ -72,8 +72,8 @@ class ApmContents:
 
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    text = read_utf8(path)
-    blocks, faults = (from_xml if text.lstrip().startswith("<") else from_kvn)(text, path)
+    data = read_bytes(path)
+    blocks, faults = from_xml(data, path) if is_xml(data) else from_kvn(utf8_text(data, path), path)
     _refuse_other_versions(path, blocks[0], faults)
     contents = _Reader(path, blocks, faults).read()
     if faults or contents is None:

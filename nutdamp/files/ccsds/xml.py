@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import re
 from collections.abc import Iterable
 from itertools import groupby
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -13,6 +15,16 @@ from nutdamp.files.ccsds.message import AEM_RECORD, APM_BLOCKS, VERSION, Block, 
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
 
 _TAGS = {layout.tag: name for name, layout in APM_BLOCKS.items()}
+_BEGINNINGS = {
+    codecs.BOM_UTF16_LE + b"<\0": "utf-16",
+    codecs.BOM_UTF16_BE + b"\0<": "utf-16",
+    b"<\0": "utf-16-le",
+    b"\0<": "utf-16-be",
+    codecs.BOM_UTF8 + b"<": "utf-8-sig",
+}
+"""First bytes of a document, by which its encoding is known before it is declared."""
+
+_DECLARED = re.compile(rb"""\s*<\?xml\s[^>]*?\bencoding\s*=\s*["']([A-Za-z][A-Za-z0-9._-]*)["']""")
 _STRUCTURE = ("header", "body", "segment", "metadata", "data")
 _WRAPS = {keyword.tag for layout in APM_BLOCKS.values() for keyword in layout.keywords if keyword.tag}
 
@@ -60,14 +72,26 @@ class _Foreign(Exception):
     """XML that is refused as a whole."""
 
 
-def from_xml(text: str, name: str) -> tuple[list[Block], list[Fault]]:
+def is_xml(data: bytes) -> bool:
+    """Whether the content of a file begins as XML does, in whatever encoding."""
+    return data.lstrip().startswith((b"<", *_BEGINNINGS))
+
+
+def from_xml(data: bytes, name: str) -> tuple[list[Block], list[Fault]]:
     """The blocks of an APM, the first of what stands outside of blocks, and what is not of this notation.
 
-    Lines count from 1; ``name`` stands for the file in faults. Document types, and with them entities, are refused.
+    Lines count from 1; ``name`` stands for the file in faults. The encoding is the one declared, any that Python has a
+    codec for. Document types, and with them entities, are refused.
     """
+    encoding = _encoding(data)
     reader = _Reader(name)
     try:
-        reader.parser.Parse(text.encode(), True)
+        reader.parser.Parse(data.decode(encoding).encode(), True)
+    except LookupError:
+        reader.faults.append(Fault(name, 1, 1, "", f"the encoding {encoding!r} is not known; save it as UTF-8"))
+    except UnicodeError as wrong:
+        place = f" (byte {wrong.start})" if isinstance(wrong, UnicodeDecodeError) else ""
+        reader.faults.append(Fault(name, 1, 1, "", f"the text is not {encoding}, as it says{place}; save it as UTF-8"))
     except expat.ExpatError as wrong:
         reader.faults.append(
             Fault(name, wrong.lineno, wrong.offset + 1, "", f"not XML: {expat.ErrorString(wrong.code)}")
@@ -75,6 +99,15 @@ def from_xml(text: str, name: str) -> tuple[list[Block], list[Fault]]:
     except _Foreign as wrong:
         reader.faults.append(Fault(name, reader.parser.CurrentLineNumber, 1, "", str(wrong)))
     return [Block("", tuple(reader.outside), line=1), *reader.blocks], reader.faults
+
+
+def _encoding(data: bytes) -> str:
+    """The encoding of an XML text: by its first bytes, else the one declared, else UTF-8."""
+    for beginning, encoding in _BEGINNINGS.items():
+        if data.startswith(beginning):
+            return encoding
+    declared = _DECLARED.match(data)
+    return declared[1].decode("ascii") if declared else "utf-8"
 
 
 class _Reader:
@@ -85,7 +118,7 @@ class _Reader:
         self.outside: list[Entry] = []
         self.blocks: list[Block] = []
         self.faults: list[Fault] = []
-        self.parser = expat.ParserCreate()
+        self.parser = expat.ParserCreate("utf-8")  # whatever is declared: the text has been decoded
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._data
