@@ -12,6 +12,13 @@ class NutdampError(Exception):
     """
 
 
+def printable(text: str) -> str:
+    """A text such as the name of a file, with escapes in place of what cannot be printed, or would steer a terminal."""
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text)
+
+
 class Fault(NamedTuple):
     """One thing wrong in an input file.
 
@@ -26,7 +33,8 @@ class Fault(NamedTuple):
     problem: str
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        file = printable(self.file)
+        place = f"{file}:{self.line}:{self.column}" if self.line else file
         return f"{place}: {self.where}: {self.problem}" if self.where else f"{place}: {self.problem}"
 
 
@@ -53,7 +61,7 @@ class CannotRead(NutdampError):
         super().__init__(path, reason)
 
     def __str__(self) -> str:
-        return f"cannot read {self.path}: {self.reason}"
+        return f"cannot read {printable(self.path)}: {self.reason}"
 
 
 class CannotWrite(NutdampError):
@@ -64,7 +72,7 @@ class CannotWrite(NutdampError):
         super().__init__(path, reason)
 
     def __str__(self) -> str:
-        return f"cannot write {self.path}: {self.reason}"
+        return f"cannot write {printable(self.path)}: {self.reason}"
 
 
 class MissingExtra(NutdampError):

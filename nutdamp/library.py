@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from nutdamp import flight as flights
 from nutdamp import planning, schemes
 from nutdamp import spacecraft as craft
-from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.errors import BadRequest, Infeasible, printable
 from nutdamp.flight import Residual
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Options
@@ -417,7 +417,7 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
     schedule, remarks = read_pulses(fspath(path), spacecraft.core)
     for remark in (*remarks, *planning.broken_limits(spacecraft.core, schedule)):
         warnings.warn(remark, stacklevel=2)
-    return Plan(planning.Plan(spacecraft.core, fspath(path), schedule))
+    return Plan(planning.Plan(spacecraft.core, printable(fspath(path)), schedule))
 
 
 def _known(scheme: str) -> None:

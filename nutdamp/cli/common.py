@@ -288,7 +288,7 @@ def plan_or_read(
     """
     from nutdamp import planning
     from nutdamp.cli.progress import working
-    from nutdamp.errors import Infeasible
+    from nutdamp.errors import Infeasible, printable
 
     tell_unread(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
@@ -297,7 +297,7 @@ def plan_or_read(
         pulses, warnings = read_pulses(schedule, body)
         for warning in (*warnings, *planning.broken_limits(body, pulses)):
             remark(f"warning: {warning}")
-        return planning.Plan(body, schedule, pulses)
+        return planning.Plan(body, printable(schedule), pulses)
     with working("planning", quiet=quiet):
         plan = (
             planning.plan(body, scheme, options)

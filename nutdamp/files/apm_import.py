@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from nutdamp.epoch import DIGITS
-from nutdamp.errors import Fault, FaultyFile
+from nutdamp.errors import Fault, FaultyFile, printable
 from nutdamp.files.ccsds.apm_reader import ApmContents, Manoeuvre
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
@@ -50,7 +50,7 @@ def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
 def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
     lines = [
-        f"# From the attitude parameter message {' '.join(path.split())}; numbers as they stand there.",
+        f"# From the attitude parameter message {printable(path)}; numbers as they stand there.",
         "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
         f"name: {_text(contents.name)}",
     ]
