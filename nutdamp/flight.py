@@ -22,6 +22,9 @@ from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import Track, make_track, widest
 
+LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
+"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+
 
 @dataclass(frozen=True, slots=True)
 class Residual:
@@ -347,3 +350,21 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
+
+
+def momentum_gained(flown: Flight) -> Vector:
+    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
+    gained = np.zeros(3)
+    for leg in flown.legs:
+        firing = [p.force for p in flown.schedule if p.force is not None and p.start <= leg.start and leg.end <= p.end]
+        force = np.asarray(sum(firing, np.zeros(3)))
+        if leg.end == leg.start or not force.any():
+            continue
+        ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
+        turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
+        edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
+        middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
+        for node, weight in (*LEGENDRE, *((-node, weight) for node, weight in LEGENDRE)):
+            _, quaternions = leg.path.motion(middles + node * half)
+            gained += weight * half * attitude.rotate(quaternions, force).sum(axis=0)
+    return gained

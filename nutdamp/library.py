@@ -329,7 +329,16 @@ class Comparison:
     @property
     def reason(self) -> str:
         """Why that one."""
-        return self.core.reason
+        from nutdamp.report import verdicts
+
+        return verdicts.reason(self.core)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the recommended plan does not reach, and what stands in the way."""
+        from nutdamp.report import verdicts
+
+        return verdicts.warnings(self.core)
 
     def __len__(self) -> int:
         return len(self.core.plans)
@@ -346,8 +355,9 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` gives."""
         from nutdamp.files.plan_json import comparison_json
+        from nutdamp.report import verdicts
 
-        return comparison_json(self.core)
+        return comparison_json(self.core, verdicts.spoken(self.core))
 
     def __repr__(self) -> str:
         chosen = self.core.recommended

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cached_property
 
-import numpy as np
-
-from nutdamp import flight, schemes
-from nutdamp.errors import Infeasible
+from nutdamp import compliance, flight, schemes
+from nutdamp.compliance import Bound, Left
+from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
-from nutdamp.physics import attitude
+from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.model import steady_omega
@@ -22,25 +22,36 @@ from nutdamp.spacecraft import Spacecraft, Vector
 NO_NUTATION = 1e-12
 """Nutation angle in rad below which there is nothing to plan."""
 
-AS_GOOD = math.radians(1e-3)
-"""Flown nutation in rad below which plans count as equally good; likewise within twice the least."""
-
 TELLING = math.radians(1e-6)
 """Nutation angle in rad from which what is left is worth a remark."""
 
-LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
-"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+BUG = "internal error, please report"
+"""Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
+
+
+class Obstacle(Enum):
+    """What keeps a plan from leaving less nutation."""
+
+    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
+    STEADY_TILT = "disturbances, under which a tilt stays"
+    MAX_PULSES = "limits.max_pulses"
+    RESOLUTION = "limits.tick, or the shortest pulse"
+    LIMITS = "on-times, horizon or blackout windows"
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A scheme's schedule for a spacecraft, and how it was judged; without one, ``why``."""
+    """A scheme's schedule for a spacecraft, and how it was judged; without one, ``why``.
+
+    ``failure``: the exception of a scheme that has a bug.
+    """
 
     spacecraft: Spacecraft
     scheme: str
     schedule: Schedule | None
     why: str | None = None
     options: schemes.Options = field(default_factory=schemes.Options)
+    failure: Exception | None = None
 
     @property
     def feasible(self) -> bool:
@@ -68,17 +79,43 @@ class Plan:
         return self.flight.residual if self.feasible else None
 
     @property
-    def meets_requirement(self) -> bool | None:
-        """Whether the flown residual keeps the requirement of the file; None without one or without a schedule.
+    def left(self) -> Left | None:
+        """What remains, flown, as `compliance` takes it."""
+        left = self.flown
+        return None if left is None else Left(left.nutation, left.axis_error, self.flight.settled.spin)
 
-        With a target axis the shift of H counts from there.
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether the flown residual keeps the requirement of the file, and the spin of the goal where there is one.
+
+        None where neither is given, and without a schedule. With a target axis the shift of H counts from there.
         """
-        asked, left = self.spacecraft.requirement, self.flown
-        if asked is None or left is None or (asked.nutation is None and asked.momentum_shift is None):
+        if self.left is None or not compliance.required(self.spacecraft):
             return None
-        return (asked.nutation is None or left.nutation <= asked.nutation) and (
-            asked.momentum_shift is None or left.axis_error <= asked.momentum_shift
-        )
+        return not any(bound.required for bound in self.shortfalls)
+
+    @property
+    def shortfalls(self) -> tuple[Bound, ...]:
+        """The `compliance.bounds` that the flown residual does not keep."""
+        left, body = self.left, self.spacecraft
+        if left is None:
+            return ()
+        bounds = compliance.bounds(body)
+        return tuple(bound for bound in bounds if not compliance.left_of(bound.part, left, body) <= bound.most)
+
+    @property
+    def standing(self) -> Standing:
+        """What it reaches; an infeasible plan misses all."""
+        if self.left is None or self.meets_requirement is False:
+            return Standing.MISSES
+        if not self.shortfalls:
+            return Standing.COMPLIES
+        return Standing.MISSES if self.meets_requirement is None else Standing.MEETS
+
+    @property
+    def severity(self) -> float:
+        """See `compliance.severity`; infinite for an infeasible plan."""
+        return math.inf if self.left is None else float(compliance.severity(self.spacecraft, self.left))
 
     @property
     def spin_change(self) -> float | None:
@@ -92,7 +129,7 @@ class Plan:
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        return _momentum_gained(self.flight) / mass
+        return flight.momentum_gained(self.flight) / mass
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -123,23 +160,36 @@ class Plan:
             f"{scale * bounds.first_order:.4g} {unit} ({beside}){proof}",
         )
 
+    @property
+    def obstacle(self) -> Obstacle:
+        """What keeps the plan from leaving less nutation."""
+        body, limits = self.spacecraft, self.spacecraft.limits
+        if body.disturbances:
+            return Obstacle.STEADY_TILT if self.options.with_disturbances else Obstacle.UNPLANNED_DISTURBANCES
+        if len(self.pulses) == limits.max_pulses:
+            return Obstacle.MAX_PULSES
+        if limits.tick is not None and self.flight.residual.nutation < 0.1 * body.nutation:
+            return Obstacle.RESOLUTION
+        return Obstacle.LIMITS
+
+    @property
+    def steady_tilt(self) -> float:
+        """Angle in rad at which the disturbances hold the body once the pulses are over."""
+        inertia, spin = self.spacecraft.inertia, self.spacecraft.spin
+        return math.atan(inertia.A * abs(steady_omega(self.spacecraft, self.pulses.end)) / (inertia.C * abs(spin)))
+
     def _remainder(self) -> tuple[str, ...]:
         """Why nutation is left."""
-        body, left = self.spacecraft, self.flight.residual.nutation
+        left = self.flight.residual.nutation
         if left < TELLING or self.options.coarse or self.options.literal:
             return ()
-        limits = body.limits
-        if body.disturbances and not self.options.with_disturbances:
-            reason = "the plan does not know of the disturbances (--with-disturbances)"
-        elif body.disturbances:
-            steady = body.inertia.A * abs(steady_omega(body, self.pulses.end)) / (body.inertia.C * abs(body.spin))
-            reason = f"{math.degrees(math.atan(steady)):.3g}° is the steady tilt under the disturbances"
-        elif len(self.pulses) == limits.max_pulses:
-            reason = f"limits.max_pulses = {limits.max_pulses} ends it"
-        elif limits.tick is not None and left < 0.1 * body.nutation:
-            reason = "the resolution of commands (limits.tick) or the shortest pulse leaves it"
-        else:
-            reason = "on-times, horizon or blackout windows allow no more"
+        reason = {
+            Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
+            Obstacle.STEADY_TILT: f"{math.degrees(self.steady_tilt):.3g}° is the steady tilt under the disturbances",
+            Obstacle.MAX_PULSES: f"limits.max_pulses = {self.spacecraft.limits.max_pulses} ends it",
+            Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
+            Obstacle.LIMITS: "on-times, horizon or blackout windows allow no more",
+        }[self.obstacle]
         return (f"{_degrees(left)} of nutation remain: {reason}",)
 
     def _asymmetry(self) -> tuple[str, ...]:
@@ -171,36 +221,29 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"
 
 
-def _momentum_gained(flown: Flight) -> Vector:
-    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
-    gained = np.zeros(3)
-    for leg in flown.legs:
-        firing = [p.force for p in flown.schedule if p.force is not None and p.start <= leg.start and leg.end <= p.end]
-        force = np.asarray(sum(firing, np.zeros(3)))
-        if leg.end == leg.start or not force.any():
-            continue
-        ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
-        turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
-        edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
-        middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
-        for node, weight in (*LEGENDRE, *((-node, weight) for node, weight in LEGENDRE)):
-            _, quaternions = leg.path.motion(middles + node * half)
-            gained += weight * half * attitude.rotate(quaternions, force).sum(axis=0)
-    return gained
-
-
 def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> Plan:
     """Plan one scheme and judge it; an infeasible plan says why.
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
-    if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spacecraft.goal.spin is None:
+    spun = _spun(spacecraft)
+    if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
+    if not spun and scheme in schemes.PLANNED and scheme not in schemes.SPINNING:
+        able = " and ".join(schemes.SPINNING)
+        why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
+        return Plan(spacecraft, scheme, None, why)
     options = options or schemes.Options()
     try:
         return judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, options), options), options)
     except Infeasible as reason:
         return Plan(spacecraft, scheme, None, str(reason))
+
+
+def _spun(spacecraft: Spacecraft) -> bool:
+    """Whether the spin is that of the goal from the beginning."""
+    goal = spacecraft.goal.spin
+    return goal is None or abs(spacecraft.spin - goal) <= compliance.SPIN_TOLERANCE * abs(goal)
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> tuple[Plan, ...]:
@@ -288,72 +331,55 @@ def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Several plans for one spacecraft, the recommended one and the reason for it."""
+    """Several plans for one spacecraft, and which of them is recommended on what ground."""
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
-    recommended: Plan | None
-    reason: str
+
+    @cached_property
+    def recommendation(self) -> Recommendation[Plan]:
+        """Which plan to fly, and what decided."""
+        return recommend(self.plans)
+
+    @property
+    def recommended(self) -> Plan | None:
+        """The plan to fly; None where no scheme is feasible."""
+        return self.recommendation.plan
+
+    @property
+    def failed(self) -> tuple[Plan, ...]:
+        """Those whose scheme has a bug."""
+        return tuple(one for one in self.plans if one.failure is not None)
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """The schemes to compare where none is named: the classic ones, with a target those that can point."""
-    return schemes.CLASSIC if spacecraft.goal.axis is None else schemes.POINTING
+    """The schemes to compare where none is named: the classic ones, with a target those that can point.
+
+    Those that can set the spin are among them where it has to change.
+    """
+    names = schemes.CLASSIC if spacecraft.goal.axis is None else schemes.POINTING
+    return names if _spun(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 
 def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Options | None = None) -> Comparison:
-    """Plan the schemes named and recommend one."""
-    plans = tuple(plan(spacecraft, name, options) for name in names)
-    recommended, reason = recommend(plans)
-    return Comparison(spacecraft, plans, recommended, reason)
+    """Plan the schemes named and recommend one; one that has a bug does not take the others down.
 
-
-def recommend(plans: Sequence[Plan]) -> tuple[Plan | None, str]:
-    """The plan to fly, and why.
-
-    Of the plans that meet the requirement (all feasible ones without one), those within twice the least flown nutation
-    or below 1e-3 deg; of these least propellant (impulse where unknown), then less shift of H, then earlier end. If
-    none meets it, least flown nutation. With a target axis the distance from it counts where it exceeds the nutation.
+    Raises NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
     """
-    judged = [(one, one.flown) for one in plans]
-    feasible = [(one, left) for one, left in judged if left is not None]
-    if not feasible:
-        return None, "no scheme is feasible"
-    least = min(missed(one, left) for one, left in feasible)
-    asked = any(one.meets_requirement is not None for one, _ in feasible)
-    meeting = [(one, left) for one, left in feasible if one.meets_requirement is not False]
-    if not meeting:
-        best = next(one for one, left in feasible if missed(one, left) == least)
-        nearest = "leaves least nutation" if best.spacecraft.goal.axis is None else "comes nearest to the target"
-        return best, f"no feasible plan meets the requirement; this one {nearest}"
-    least = min(missed(one, left) for one, left in meeting)
-    close = [(one, left) for one, left in meeting if missed(one, left) <= max(2.0 * least, AS_GOOD)]
-    those = "meet the requirement" if asked else "are feasible"
-    if len(meeting) == 1:
-        return meeting[0][0], f"the only plan that {'meets the requirement' if asked else 'is feasible'}"
-    if len(close) == 1:
-        return close[0][0], f"leaves least nutation of the {len(meeting)} plans that {those}"
-    known = all(one.pulses.propellant is not None for one, _ in close)
-
-    def cost(one: Plan) -> float:
-        propellant = one.pulses.propellant
-        return propellant if known and propellant is not None else one.pulses.total_impulse
-
-    cheapest = min(cost(one) for one, _ in close)
-    equal = [(one, left) for one, left in close if cost(one) <= cheapest * (1.0 + 1e-6)]
-    what = "propellant" if known else "impulse"
-    if len(equal) == 1:
-        even = all(missed(one, left) <= AS_GOOD for one, left in close)
-        leave = "leave least nutation" if even else "leave at most twice the least nutation"
-        return equal[0][0], f"least {what} of the {len(close)} plans that {those} and {leave}"
-    least_shift = min(left.axis_error for _, left in equal)
-    still = [one for one, left in equal if left.axis_error <= least_shift + 1e-9]
-    best = min(still, key=lambda one: one.pulses.end)
-    if len(still) == 1:
-        return best, f"as little {what} as any, and less shift of H"
-    return best, f"as little {what} and shift of H as any, and ends first"
+    unknown = set(names) - set(schemes.NAMES)
+    if unknown:
+        raise KeyError(*sorted(unknown))
+    return Comparison(spacecraft, tuple(attempt(spacecraft, name, options) for name in names))
 
 
-def missed(judged: Plan, left: Residual) -> float:
-    """What a plan leaves, rad: nutation, or the distance from a target axis where that is more."""
-    return left.nutation if judged.spacecraft.goal.axis is None else max(left.nutation, left.axis_error)
+def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None) -> Plan:
+    """The plan of a scheme, or one that carries the exception which nobody expected."""
+    try:
+        made = plan(spacecraft, scheme, options)
+        # Judged here, where a failure is that of this scheme alone, and not when the first figure is shown.
+        _ = made.residual, made.delta_v, made.remarks
+    except NutdampError:
+        raise
+    except Exception as failure:
+        return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", failure=failure)
+    return made

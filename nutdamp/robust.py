@@ -1,7 +1,7 @@
-"""Robust planning: the plan that leaves least nutation for nearly all dispersed truths, instead of for the estimate.
+"""Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
 
 Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments.
-All of them fly the same draws, so that what is compared is the plans and not their luck.
+All of them fly the same draws through real widths, so that what is compared is the plans and not their luck.
 """
 
 from __future__ import annotations
@@ -16,37 +16,31 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import planning
-from nutdamp.dispersion import study_of
+from nutdamp.dispersion import SAMPLES, SEED, study_of
+from nutdamp.dispersion.agreement import check_impulses
 from nutdamp.dispersion.outputs import aim_output
-from nutdamp.dispersion.study import PROBABILITY, Results, run, threads_here
+from nutdamp.dispersion.statistics import binomial_interval
+from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.planning import Comparison, Plan
-from nutdamp.schedule import Schedule
+from nutdamp.recommendation import Ground, by_propellant, cheapest, missed
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Spacecraft
-
-SAMPLES = 20_000
-"""Dispersed truths that every candidate flies in closed form."""
-
-SAMPLES_FLOWN = 6_000
-"""The same where the closed form leaves something out, so that real widths are flown, which takes longer."""
-
-SEED = 1
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
 
 AS_GOOD = 1.05
-"""Candidates within this factor of the least nutation count as equally good: so far apart may be their luck."""
+"""Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A plan and how it fares with dispersed truths.
+    """A plan and how it fares in dispersed cases.
 
     ``variant`` says how it differs from what its scheme plans; ``nutation`` and ``off`` rad (how far H ends from
-    where it shall) are not exceeded with the probability asked; ``met`` is the fraction of truths that keep the
-    requirement, None without one.
+    where it shall) are not exceeded in the share of cases required; ``met`` is the share that complies, None where
+    nothing is required.
     """
 
     plan: Plan
@@ -58,17 +52,18 @@ class Candidate:
     @property
     def left(self) -> float:
         """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
-        return self.nutation if self.plan.spacecraft.goal.axis is None else max(self.nutation, self.off)
+        return missed(self.plan.spacecraft, self.nutation, self.off)
 
     @property
     def nominal(self) -> float | None:
-        """The same for the estimate, rad."""
-        return None if self.plan.flown is None else planning.missed(self.plan, self.plan.flown)
+        """The same for nominal values, rad."""
+        flown = self.plan.flown
+        return None if flown is None else missed(self.plan.spacecraft, flown.nutation, flown.axis_error)
 
     @property
-    def cost(self) -> float:
-        """Propellant in kg, impulse in N m s where that is not known."""
-        return self.plan.pulses.cost
+    def rank(self) -> float:
+        """What candidates are ranked by, the least first: the share that does not comply, or what is left."""
+        return self.left if self.met is None else 1.0 - self.met
 
 
 class Cost(NamedTuple):
@@ -82,16 +77,19 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobustComparison:
-    """Candidates from the best down; ``usual`` is what `planning.recommend` takes, ``chosen`` the robust plan.
+    """Candidates from the best down; ``usual`` is what `recommendation.recommend` takes, ``chosen`` the robust plan.
 
-    Each candidate flew ``samples`` truths of ``seed``, in closed form or, ``flown``, through real widths.
+    ``ground`` is what decided among the ``equals`` candidates that are as good as the best, by propellant or by
+    impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``, in closed form.
     """
 
     comparison: Comparison
     candidates: tuple[Candidate, ...]
     usual: Candidate | None
     chosen: Candidate | None
-    reason: str
+    ground: Ground | None
+    equals: int
+    by_propellant: bool
     probability: float
     samples: int
     seed: int
@@ -113,7 +111,7 @@ class RobustComparison:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether enough dispersed truths keep the requirement with the robust plan; None without requirement."""
+        """Whether enough cases comply with the robust plan; None where nothing is required."""
         if self.chosen is None or self.chosen.met is None:
             return None
         return self.chosen.met >= self.probability
@@ -128,6 +126,8 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
     body, options = comparison.spacecraft, options or Options()
     found: list[Attempt] = []
     for base in comparison.plans:
+        if base.failure is not None:
+            continue
         found.append(partial(list, [("as planned", base)]))
         found.append(partial(_alignments, body, base.scheme, options))
         found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
@@ -135,17 +135,21 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
 
 
 def compare(
-    comparison: Comparison, trials: Sequence[Attempt], watch: Callable[[int], None] = lambda _: None
+    comparison: Comparison,
+    trials: Sequence[Attempt],
+    watch: Callable[[int], None] = lambda _: None,
+    *,
+    impulses: bool = False,
+    force: bool = False,
 ) -> RobustComparison:
-    """Make the plans of the ``trials``, let dispersed truths fly each, and recommend one; no schedule comes twice.
+    """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``watch`` is told how many trials are done. Raises BadRequest for a spacecraft without dispersions.
+    ``watch`` is told how many trials are done. ``impulses``: in closed form. Raises BadRequest for a spacecraft without
+    dispersions, and for closed forms that err by too much unless ``force``.
     """
     body = comparison.spacecraft
     asked = body.requirement
     probability = PROBABILITY if asked is None or asked.probability is None else asked.probability
-    flown = bool(study_of(body, Schedule()).remarks)
-    samples = SAMPLES_FLOWN if flown else SAMPLES
     found: dict[object, Candidate] = {}
     for number, trial in enumerate(trials):
         watch(number)
@@ -155,12 +159,27 @@ def compare(
             if not plan.feasible or kind in found or planning.broken_limits(body, plan.pulses):
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
-            with suppress(Infeasible):  # truths that cannot be flown, such as those that take too long
-                found[kind] = _dispersed(own, variant, probability, samples, flown=flown)
-    candidates = sorted(found.values(), key=lambda one: (-_tier(one, probability), one.left, one.plan.pulses.end))
+            with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
+                found[kind] = _dispersed(own, variant, probability, impulses=impulses, force=force)
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    chosen, reason = _choose(candidates, probability)
-    return RobustComparison(comparison, tuple(candidates), usual, chosen, reason, probability, samples, SEED, flown)
+    equals = _equals(list(found.values()))
+    chosen, ground = None, None
+    if equals:
+        best, ground = cheapest([one.plan for one in equals])
+        chosen = next(one for one in equals if one.plan is best)
+    return RobustComparison(
+        comparison,
+        tuple(sorted(found.values(), key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
+        usual,
+        chosen,
+        ground,
+        len(equals),
+        by_propellant([one.plan for one in equals]),
+        probability,
+        SAMPLES,
+        SEED,
+        not impulses,
+    )
 
 
 def _kind(plan: Plan) -> object:
@@ -191,13 +210,15 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 
 def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:
-    return [(variant, planning.plan(body, scheme, options))]
+    return [(variant, planning.attempt(body, scheme, options))]
 
 
-def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, flown: bool) -> Candidate:
-    """How a plan fares with dispersed truths."""
-    study = study_of(plan.spacecraft, plan.pulses, seed=SEED, flown=flown)
-    results = run(Results(study, samples), threads=threads_here())
+def _dispersed(plan: Plan, variant: str, probability: float, *, impulses: bool, force: bool) -> Candidate:
+    """How a plan fares in dispersed cases."""
+    study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
+    if impulses and not force:
+        check_impulses(study)
+    results = run(Results(study, SAMPLES), threads=threads_here())
     ends = []
     aim, _ = aim_output(plan.spacecraft)
     for output in ("nutation", aim):
@@ -207,38 +228,12 @@ def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, fl
     return Candidate(plan, variant, ends[0], ends[1], results.met_fraction)
 
 
-def _tier(candidate: Candidate, probability: float) -> int:
-    """2: keeps the requirement with the probability asked; 1: at least as the estimate has it; 0: does not."""
-    if candidate.met is None or candidate.met >= probability:
-        return 2
-    return int(candidate.plan.meets_requirement is True)
-
-
-def _choose(candidates: Sequence[Candidate], probability: float) -> tuple[Candidate | None, str]:
-    """The candidate to fly, and why; ``candidates`` from the best down."""
+def _equals(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates that are as good as the best, but for what the sampling may make of them."""
     if not candidates:
-        return None, "no scheme is feasible"
-    best = candidates[0]
-    tier = _tier(best, probability)
-    those = [one for one in candidates if _tier(one, probability) == tier]
-    close = [one for one in those if one.left <= AS_GOOD * best.left]
-    known = all(one.plan.pulses.propellant is not None for one in close)
-
-    def cost(one: Candidate) -> float:
-        return one.cost if known else one.plan.pulses.total_impulse
-
-    cheapest = min(map(cost, close))
-    chosen = min((one for one in close if cost(one) <= cheapest * (1.0 + 1e-6)), key=lambda one: one.plan.pulses.end)
-    level = f"{100 * probability:.6g} %"
-    which = f"of {len(those)} plans" if len(those) > 1 else "by the only plan"
-    if best.met is not None:
-        keep = "keep" if len(those) > 1 else "keeps"
-        which += {
-            2: f" that {keep} the requirement with {level}",
-            1: f" that {keep} the requirement for the estimate, none with {level}",
-            0: "; none keeps the requirement",
-        }[tier]
-    if len(close) == 1:
-        return chosen, f"least nutation within {level} {which}"
-    what = "propellant" if known else "impulse"
-    return chosen, f"least {what} of {len(close)} that leave about the least nutation within {level}, {which}"
+        return []
+    best = min(candidates, key=lambda one: one.rank)
+    if best.met is None:
+        return [one for one in candidates if one.rank <= AS_GOOD * best.rank]
+    low, _ = binomial_interval(round(best.met * SAMPLES), SAMPLES, CONFIDENCE)
+    return [one for one in candidates if one.met is not None and one.met >= low]

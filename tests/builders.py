@@ -6,14 +6,28 @@ import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import FrameType
 
 import numpy as np
 import reference
 
+from nutdamp.compliance import Left
+from nutdamp.flight import Residual
+from nutdamp.planning import Plan
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Attitude, Channel, Inertia, Limits, Requirement, Spacecraft, Steerable, Thruster, Vector
+from nutdamp.spacecraft import (
+    Attitude,
+    Channel,
+    Goal,
+    Inertia,
+    Limits,
+    Requirement,
+    Spacecraft,
+    Steerable,
+    Thruster,
+    Vector,
+)
 
 
 def spinner(
@@ -141,3 +155,40 @@ def within(calls: int) -> Iterator[None]:
         yield
     finally:
         sys.setprofile(previous)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged(Plan):
+    """A plan whose flown residual is given, and the spin at its end where that is not the one at t = 0."""
+
+    ended: Residual | None = None
+    ended_spin: float | None = None
+
+    @property
+    def flown(self) -> Residual | None:
+        return self.ended
+
+    @property
+    def left(self) -> Left | None:
+        spin = self.spacecraft.spin if self.ended_spin is None else self.ended_spin
+        return None if self.ended is None else Left(self.ended.nutation, self.ended.axis_error, spin)
+
+
+def judged(
+    name: str,
+    nutation: float,
+    *,
+    shift: float = 0.0,
+    impulse: float = 1.0,
+    propellant: float | None = None,
+    end: float = 1.0,
+    asked: Requirement | None = None,
+    goal: Goal | None = None,
+    spin: float | None = None,
+) -> Plan:
+    """A plan for 5° of nutation that leaves so much, flown; angles in degrees."""
+    spacecraft = replace(spinner(requirement=asked), goal=goal or Goal())
+    fired = Pulse(end, 0.0, "T", np.array([impulse, 0.0, 0.0]), propellant=propellant)
+    theta, turned = math.radians(nutation), math.radians(shift)
+    ended = Residual(theta, theta, 0.0, turned, turned)
+    return Judged(spacecraft, name, Schedule((fired,)), ended=ended, ended_spin=spin)

@@ -4,146 +4,36 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference
-from builders import channel, cross, events, spinner
+from builders import channel, cross, events, judged, spinner
 from scipy.integrate import simpson
 
 from nutdamp import planning, schemes
 from nutdamp.actuators import STANDARD_GRAVITY
-from nutdamp.flight import Residual
-from nutdamp.planning import Plan, broken_limits, compare, plan, recommend
-from nutdamp.schedule import Bounds, Pulse, Schedule, channel_pulse
-from nutdamp.spacecraft import Channel, Goal, Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.planning import Plan, broken_limits, compare, plan
+from nutdamp.recommendation import Ground, Standing
+from nutdamp.schedule import Bounds, Schedule, channel_pulse
+from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft, Steerable, Vector
 
 CLASSIC = schemes.CLASSIC
-
-# --- the rule of the recommendation ----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Judged(Plan):
-    """A plan whose flown residual is given."""
-
-    left: Residual | None = None
-
-    @property
-    def flown(self) -> Residual | None:
-        return self.left
-
-
-def judged(
-    name: str,
-    nutation: float,
-    *,
-    shift: float = 0.0,
-    impulse: float = 1.0,
-    propellant: float | None = None,
-    end: float = 1.0,
-    asked: Requirement | None = None,
-) -> Plan:
-    """Angles in degrees."""
-    spacecraft = spinner(requirement=asked)
-    fired = Pulse(end, 0.0, "T", np.array([impulse, 0.0, 0.0]), propellant=propellant)
-    theta, turned = math.radians(nutation), math.radians(shift)
-    return Judged(spacecraft, name, Schedule((fired,)), left=Residual(theta, theta, 0.0, turned, turned))
-
-
-def chosen(*plans: Plan) -> str | None:
-    best, reason = recommend(plans)
-    assert reason
-    return None if best is None else best.scheme
-
-
-INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
 HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
 BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
 
-
-def test_nothing_feasible_recommends_nothing() -> None:
-    assert recommend([INFEASIBLE]) == (None, "no scheme is feasible")
-    assert chosen() is None
+# --- the rule of the recommendation: the rule itself is tested in test_recommendation ---------------------------------
 
 
-def test_infeasible_plans_are_passed_over() -> None:
-    assert chosen(INFEASIBLE, judged("a", 3.0)) == "a"
-
-
-def test_far_less_nutation_beats_less_propellant() -> None:
-    assert chosen(judged("thrifty", 0.5, propellant=0.1), judged("clean", 0.1, propellant=9.0)) == "clean"
-
-
-def test_within_twice_the_least_nutation_the_propellant_decides() -> None:
-    assert chosen(judged("thrifty", 0.19, propellant=0.1), judged("clean", 0.1, propellant=0.2)) == "thrifty"
-    assert chosen(judged("thrifty", 0.21, propellant=0.1), judged("clean", 0.1, propellant=0.2)) == "clean"
-
-
-def test_below_a_thousandth_of_a_degree_all_are_as_good() -> None:
-    assert chosen(judged("thrifty", 0.9e-3, propellant=0.1), judged("clean", 1e-12, propellant=0.2)) == "thrifty"
-    assert chosen(judged("thrifty", 1.1e-3, propellant=0.1), judged("clean", 1e-12, propellant=0.2)) == "clean"
-
-
-def test_where_a_propellant_is_not_known_the_impulse_decides() -> None:
-    assert chosen(judged("a", 0.1, impulse=3.0, propellant=0.1), judged("b", 0.1, impulse=2.0)) == "b"
-
-
-def test_of_equal_cost_the_smaller_shift_of_h_then_the_earlier_end() -> None:
-    late = judged("late", 0.1, shift=1.0, end=9.0)
-    early = judged("early", 0.1, shift=1.0, end=5.0)
-    still = judged("still", 0.1, shift=0.5, end=20.0)
-    assert chosen(late, early, still) == "still"
-    assert chosen(late, early) == "early"
-
-
-def test_plans_that_meet_the_requirement_come_first() -> None:
-    """Even if one that does not leaves less nutation."""
-    drifting = judged("drifting", 0.01, shift=0.3, propellant=0.1, asked=BOTH)
-    meeting = judged("meeting", 0.4, shift=0.1, propellant=0.5, asked=BOTH)
-    assert chosen(drifting, meeting) == "meeting"
-
-
-def test_if_none_meets_it_the_least_flown_nutation_whatever_the_cost() -> None:
-    one = judged("one", 0.7, propellant=0.1, asked=HALF_A_DEGREE)
-    two = judged("two", 0.6, propellant=9.0, asked=HALF_A_DEGREE)
-    assert chosen(one, two) == "two"
-    assert "no feasible plan meets the requirement" in recommend([one, two])[1]
-
-
-def test_reasons_say_what_decided() -> None:
-    assert recommend([judged("a", 0.1)])[1] == "the only plan that is feasible"
-    assert "least nutation" in recommend([judged("a", 0.1), judged("b", 1.0)])[1]
-    pair = [judged("a", 0.1, propellant=0.1), judged("b", 0.1, propellant=0.2)]
-    assert recommend(pair)[1].startswith("least propellant")
-    assert recommend([judged("a", 0.1, impulse=1.0), judged("b", 0.1, impulse=2.0)])[1].startswith("least impulse")
-    assert "less shift of H" in recommend([judged("a", 0.1, shift=1.0), judged("b", 0.1)])[1]
-    assert "ends first" in recommend([judged("a", 0.1), judged("b", 0.1, end=2.0)])[1]
-
-
-def test_the_reason_admits_that_the_cheapest_leaves_up_to_twice_the_least_nutation() -> None:
-    _, reason = recommend([judged("A", 2.0, impulse=2.0), judged("B", 3.9, impulse=1.0)])
-    assert reason == "least impulse of the 2 plans that are feasible and leave at most twice the least nutation"
-    _, reason = recommend([judged("A", 1e-6, impulse=2.0), judged("B", 9e-4, impulse=1.0)])
-    assert reason.endswith("and leave least nutation")
-
-
-def test_with_a_target_the_reason_speaks_of_it() -> None:
-    asked = Requirement(nutation=math.radians(0.1), momentum_shift=math.radians(0.1))
-    one = judged("A", 1e-6, shift=7.0, asked=asked)
-    pointing = replace(one, spacecraft=replace(one.spacecraft, goal=Goal(axis=np.array([0.6, 0.0, 0.8]))))
-    assert recommend([pointing])[1].endswith("comes nearest to the target")
-    assert recommend([one])[1].endswith("leaves least nutation")
-
-
-def test_compare_keeps_the_order_asked_for_and_recommends_one_of_them() -> None:
+def test_compare_keeps_the_order_given_and_recommends_one_of_them() -> None:
     compared = compare(spinner(channels=cross(20.0), requirement=BOTH), CLASSIC)
     assert [one.scheme for one in compared.plans] == list(CLASSIC)
-    # one-pulse and four-pulse move H by degrees: only two-pulse meets the shift asked for.
+    # one-pulse and four-pulse move H by degrees: only two-pulse meets the shift required.
     assert [one.meets_requirement for one in compared.plans] == [False, True, False]
     assert compared.recommended is compared.plans[1]
-    assert compared.reason == "the only plan that meets the requirement"
+    assert compared.recommendation.standing is Standing.COMPLIES
+    assert compared.recommendation.ground is Ground.ONLY
 
 
 # --- requirement -----------------------------------------------------------------------------------------------------

@@ -13,9 +13,12 @@ from checker import violations
 from nutdamp import planning, robust
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.single import flown_outputs
+from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Requirement, Spacecraft, Thruster
+from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.report import verdicts
+from nutdamp.schemes import CLASSIC, four_pulse
+from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
 from nutdamp.tolerances import Dispersions, Tolerance
 
 EXACT = Dispersions(A=Tolerance("normal", 0.002, relative=True))
@@ -117,37 +120,85 @@ def test_how_far_it_is_can_be_watched() -> None:
     assert told == list(range(len(trials)))
 
 
-def test_a_plan_that_keeps_the_requirement_comes_before_one_that_leaves_less() -> None:
-    """Many pulses average their errors out, but turn H by more than asked; two pulses bring it back."""
-    schemes, dispersions = ("four-pulse", "two-pulse"), Dispersions(thrust_per_pulse=normal(0.02))
-    loose, tight = (
-        planned(
-            dispersed(dispersions, Requirement(math.radians(5.0), math.radians(shift), 0.99), degrees=10.0), schemes
-        )
-        for shift in (45.0, 1.0)
-    )
-    assert loose.chosen is not None
-    assert tight.chosen is not None
-    assert (loose.chosen.plan.scheme, tight.chosen.plan.scheme) == ("four-pulse", "two-pulse")
-    assert loose.chosen.nutation < tight.chosen.nutation
-    assert loose.chosen.off > math.radians(1.0)
-    assert tight.chosen.met is not None
-    assert tight.chosen.met >= 0.99
-    assert tight.meets_requirement
+def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
+    """Four pulses of the example cost less, but turn H more; two pulses bring it back."""
+    example = read_spacecraft(built_in_example_text(), "example.yaml")
+    body = replace(example, dispersions=Dispersions(thrust_per_pulse=normal(0.001)))
+    for shift, scheme in ((5.0, "four-pulse"), (0.1, "two-pulse")):
+        asked = Requirement(math.radians(0.5), math.radians(shift), 0.99)
+        found = planned(replace(body, requirement=asked), ("four-pulse", "two-pulse"))
+        assert found.chosen is not None
+        assert found.chosen.plan.scheme == scheme
+        assert found.chosen.met == 1.0
+        assert found.meets_requirement
+
+
+def test_the_plan_in_which_most_cases_comply() -> None:
+    """Whatever the nominal plan costs; of those within the sampling error of the best the cheapest."""
+    narrow = Requirement(math.radians(0.4), math.radians(0.3))
+    body = dispersed(Dispersions(A=normal(0.01), thrust_per_pulse=normal(0.02)), narrow)
+    found = planned(body)
+    shares = [one.met for one in found.candidates if one.met is not None]
+    assert len(shares) == len(found.candidates)
+    assert 0.05 < max(shares) < 0.997
+    assert found.chosen is found.candidates[0]
+    error = 3.0 * math.sqrt(max(shares) * (1.0 - max(shares)) / found.samples)
+    assert found.chosen.met is not None
+    assert found.chosen.met >= max(shares) - error
+    surely = [one for one in found.candidates if one.met is not None and one.met >= max(shares) - error / 3.0]
+    assert found.chosen.plan.pulses.cost <= 1.001 * min(one.plan.pulses.cost for one in surely)
+    assert found.meets_requirement is False
+
+
+def test_each_share_is_that_of_the_real_widths() -> None:
+    """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
+    body = dispersed(Dispersions(A=normal(0.002)), Requirement(None, math.radians(0.7)))
+    compared = planning.compare(body, ("four-pulse",))
+    found = robust.compare(compared, robust.attempts(compared))
+    for one in found.candidates:
+        results = run(Results(study_of(body, one.plan.pulses), found.samples))
+        assert one.met == results.met_fraction
+    with pytest.raises(BadRequest, match="errs by up to"):
+        robust.compare(compared, robust.attempts(compared), impulses=True)
+    forced = robust.compare(compared, robust.attempts(compared), impulses=True, force=True)
+    assert (forced.candidates[0].met, found.candidates[0].met) == (0.0, 1.0)
+
+
+def test_the_spin_is_part_of_the_requirement_in_every_case() -> None:
+    """Cases whose spin misses the goal by more than 0.1 % do not comply: ω3 is known to 0.1 % here, one sigma."""
+    body = dispersed(Dispersions(omega0=(None, None, normal(0.001))))
+    found = planned(replace(body, goal=Goal(spin=body.spin)), ("two-pulse",))
+    assert found.chosen is not None
+    assert found.chosen.met == pytest.approx(math.erf(1.0 / math.sqrt(2.0)), abs=0.01)
+
+
+def test_a_scheme_with_a_bug_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> object:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(four_pulse, "schedule", broken)
+    found = planned(dispersed(EXACT), ("two-pulse", "four-pulse"))
+    assert {one.plan.scheme for one in found.candidates} == {"two-pulse"}
 
 
 def test_less_propellant_among_equals() -> None:
     found = planned(dispersed(EXACT))
     assert found.chosen is not None
-    close = [one for one in found.candidates if one.nutation <= 1.05 * found.candidates[0].nutation]
-    assert found.chosen.cost <= min(one.cost for one in close) * (1 + 1e-6)
+    least = min(one.left for one in found.candidates)
+    close = [one.plan.pulses.cost for one in found.candidates if one.left <= 1.05 * least]
+    assert len(close) == found.equals
+    assert found.chosen.plan.pulses.cost <= min(close) * 1.001
 
 
 def test_a_real_tensor_is_flown() -> None:
     body = dispersed(Dispersions(A=normal(0.01)), moments=(122.0, 118.0, 80.0))
     found = planned(body, ("four-pulse",))
     assert found.flown
-    assert found.samples < robust.SAMPLES
+    (candidate, *_) = found.candidates
+    study = study_of(body, candidate.plan.pulses, seed=found.seed)
+    assert study.outputs_of(study.draws_of(3))[0] == pytest.approx(
+        flown_outputs(study.model, study.draws_of(3))[0], abs=1e-10
+    )
     assert found.chosen is not None
 
 
@@ -157,7 +208,7 @@ def test_nothing_feasible() -> None:
     found = planned(replace(body, channels=weak, limits=replace(body.limits, horizon=1e-3)))
     assert found.chosen is None
     assert found.cost is None
-    assert found.reason == "no scheme is feasible"
+    assert verdicts.robust_reason(found) == "no scheme is feasible"
     assert found.meets_requirement is None
 
 

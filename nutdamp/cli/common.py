@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
+from nutdamp.cli.failures import debug_option, show_failures
 from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
 from nutdamp.schemes import LEAST, Options
 
@@ -137,8 +138,9 @@ READ_BY = {
 }
 """Options of planning that only some schemes read; the others are for all."""
 
-SPINNING = "optimal"
-"""The scheme that can change the spin rate on purpose."""
+
+SUN_SCHEME = "rhumb-line"
+"""The scheme that reads the direction of the Sun."""
 
 
 def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
@@ -146,8 +148,8 @@ def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark
     for option, readers in READ_BY.items():
         if getattr(options, option) != Options._field_defaults[option] and not set(readers) & set(names):
             remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
-    if body.goal.spin is not None and set(names) - {"none"} and SPINNING not in names:
-        remark(f"the final spin asked for is out of reach here: --scheme {SPINNING} can set it")
+    if body.goal.sun is not None and SUN_SCHEME not in names:
+        remark(f"--sun does nothing here: it is for {SUN_SCHEME}")
 
 
 def scheme_options(command: Command) -> Command:
@@ -218,6 +220,7 @@ def scheme_options(command: Command) -> Command:
         click.option(
             "--on-time", type=Quantity("time"), help="Pulse length of four-pulse and rhumb-line, such as 200ms."
         ),
+        debug_option,
     ):
         wrapped = option(wrapped)
     return cast(Command, wrapped)
@@ -299,11 +302,12 @@ def plan_or_read(
             remark(f"warning: {warning}")
         return planning.Plan(body, printable(schedule), pulses)
     with working("planning", quiet=quiet):
-        plan = (
-            planning.plan(body, scheme, options)
-            if scheme
-            else planning.compare(body, planning.usual(body), options).recommended
-        )
+        if scheme:
+            plan: Plan | None = planning.plan(body, scheme, options)
+        else:
+            compared = planning.compare(body, planning.usual(body), options)
+            plan = compared.recommended
+            show_failures(compared)
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     if plan.why is not None:

@@ -1,4 +1,4 @@
-"""``nutdamp disperse``: fly one schedule with many dispersed truths."""
+"""``nutdamp disperse``: fly one schedule in many dispersed cases."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from nutdamp.cli.common import (
     scheme_options,
     spacecraft_argument,
 )
+from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import NAMES, Options
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from nutdamp.dispersion.study import Collect, Results, Study
     from nutdamp.errors import CannotWrite
 
+SAMPLES = 20_000
+"""Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
+
 SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
 
@@ -46,12 +50,13 @@ SAVED_EVERY = 30.0
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to disperse; default the recommended one.")
 @click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
 @scheme_options
-@click.option("--samples", type=Count(), default=100_000, show_default=True, help="Dispersed truths to fly.")
+@click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
 @click.option(
     "--seed", type=click.IntRange(0, 2**64 - 1), default=1, show_default=True, help="Same seed, same draws, always."
 )
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
-@click.option("--flown", is_flag=True, help="Real widths, true tensor and disturbances, not the impulse sum (17).")
+@impulse_options
+@click.option("--flown", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @click.option(
     "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
@@ -71,6 +76,8 @@ def command(
     seed: int,
     threads: int | None,
     flown: bool,
+    impulses: bool,
+    force: bool,
     case: int | None,
     worst: int,
     csv: str | None,
@@ -79,13 +86,16 @@ def command(
     resume: str | None,
     quiet: bool,
 ) -> None:
-    """Fly one schedule with many truths, dispersed as the spacecraft file says.
+    """Fly one schedule in many cases, dispersed as the spacecraft file says.
 
-    Shows percentiles of what is left, how surely the requirement is met, which tolerance counts, and the worst cases.
+    Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to disperse: either --scheme or --schedule")
+    if flown and impulses:
+        raise click.UsageError("--flown or --impulses: the cases are flown in one way")
+    expect_impulses(impulses, force, True, "disperse")
     if case is not None and (csv or plot or resume):
         raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
     if resume == "-":
@@ -101,9 +111,11 @@ def command(
 
     from nutdamp.dispersion import study_of
 
-    study = study_of(body, plan.pulses, seed=seed, flown=flown)
-    for text in study.remarks:
-        remark(text)
+    study = study_of(body, plan.pulses, seed=seed, flown=not impulses)
+    if impulses:
+        from nutdamp.dispersion.agreement import check_impulses
+
+        remark(check_impulses(study, force=force))
     if case is not None:
         _one_case(study, case - 1, plan.scheme, json, silent)
         return

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
+from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
     Aim,
     Input,
@@ -24,6 +24,8 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     tell_unread,
 )
+from nutdamp.cli.failures import show_failures
+from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 from nutdamp.schemes import PLANNED, Options
@@ -40,8 +42,9 @@ if TYPE_CHECKING:
 @click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan this one only; repeatable.")
 @scheme_options
 @click.option(
-    "--robust", is_flag=True, help="Pick among the schemes and their variants by what dispersed truths leave (99.7 %)."
+    "--robust", is_flag=True, help="Pick among the schemes and their variants by how many dispersed cases comply."
 )
+@impulse_options
 @click.option("--csv", type=FILE, help="Write the pulses of the recommended plan, or the one named.")
 @click.option("--json", type=FILE, help="Write all plans with their residuals.")
 @plot_options
@@ -52,6 +55,8 @@ def command(
     options: Options,
     aim: Aim,
     robust: bool,
+    impulses: bool,
+    force: bool,
     csv: str | None,
     json: str | None,
     plot: str | None,
@@ -64,6 +69,7 @@ def command(
     example. A FILE of - is standard output.
     """
     names = tuple(dict.fromkeys(names))
+    expect_impulses(impulses, force, robust, "--robust")
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
@@ -83,7 +89,7 @@ def command(
     tell_unread(names, options, body, remark)
     with working("planning", quiet=quiet):
         compared = compare(body, names, options)
-    dispersed = _disperse(compared, options, quiet) if robust else None
+    dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
     if dispersed is None:
         chosen = compared.recommended
         met = None if chosen is None else chosen.meets_requirement
@@ -94,12 +100,13 @@ def command(
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.plan_json import comparison_json
+        from nutdamp.report import verdicts
 
-        data = comparison_json(compared)
+        data = comparison_json(compared, verdicts.spoken(compared))
         if dispersed is not None:
             from nutdamp.files.robust_json import robust_json
 
-            data["robust"] = robust_json(dispersed)
+            data["robust"] = robust_json(dispersed, verdicts.robust_reason(dispersed))
         outputs.append((json, json_text(data)))
     if csv is not None and chosen is not None:
         from nutdamp.files.pulses_csv import pulses_csv
@@ -121,18 +128,25 @@ def command(
         from nutdamp.report.plan_tables import comparison_screen
 
         screens.append(comparison_screen(compared))
+    else:
+        from nutdamp.report import verdicts
+
+        for warning in verdicts.warnings(compared):
+            remark(f"warning: {warning}")
     deliver(outputs, *screens)
+    if show_failures(compared):
+        sys.exit(INTERNAL)
     if chosen is None:
         sys.exit(INFEASIBLE)
     if met is False:
         sys.exit(REQUIREMENT_MISSED)
 
 
-def _disperse(compared: Comparison, options: Options, quiet: bool) -> RobustComparison:
-    """Let dispersed truths fly the plans and their variants, with a bar."""
+def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: bool, force: bool) -> RobustComparison:
+    """Fly the plans and their variants in dispersed cases, with a bar."""
     from nutdamp import robust
     from nutdamp.cli.progress import progress
 
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=quiet) as told:
-        return robust.compare(compared, trials, told)
+        return robust.compare(compared, trials, told, impulses=impulses, force=force)

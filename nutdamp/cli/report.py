@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED, interruption
+from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
     Aim,
     Input,
@@ -23,6 +23,8 @@ from nutdamp.cli.common import (
     tell_unread,
 )
 from nutdamp.cli.disperse import fly
+from nutdamp.cli.failures import show_failures
+from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
@@ -45,7 +47,8 @@ if TYPE_CHECKING:
     show_default=True,
     help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",
 )
-@click.option("--disperse", type=Count(), help="Fly the recommended schedule with so many dispersed truths.")
+@click.option("--disperse", type=Count(), help="Fly the recommended schedule in so many dispersed cases.")
+@impulse_options
 @quiet_option
 def command(
     spacecraft: Input,
@@ -54,6 +57,8 @@ def command(
     aim: Aim,
     output: str,
     disperse: int | None,
+    impulses: bool,
+    force: bool,
     quiet: bool,
 ) -> None:
     """Write a report: spacecraft, schemes compared, schedule, pictures, error budget, and how to repeat it.
@@ -65,6 +70,7 @@ def command(
 
     form = form_of(output)
     expect_outputs(spacecraft, output=output)
+    expect_impulses(impulses, force, disperse is not None, "--disperse")
     remark = remarks(quiet)
     text, name = source(spacecraft.path, remark)
 
@@ -84,26 +90,33 @@ def command(
     with working("planning", quiet=quiet):
         compared = compare(body, schemes, options)
     chosen = compared.recommended
-    dispersed = None if chosen is None or disperse is None else _dispersed(chosen, disperse, quiet=quiet)
+    dispersed, note = None, ""
+    if chosen is not None and disperse is not None:
+        dispersed, note = _dispersed(chosen, disperse, impulses=impulses, force=force, quiet=quiet)
     with working("writing the page", quiet=quiet):
-        page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed)
+        page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed, note=note)
         content = form.write(page, output)
     deliver([(output, content)])
     if output != "-":
         remark(f"wrote {output}")
+    if show_failures(compared):
+        sys.exit(INTERNAL)
     if chosen is None:
         sys.exit(INFEASIBLE)
     if chosen.meets_requirement is False or (dispersed is not None and dispersed.meets_requirement is False):
         sys.exit(REQUIREMENT_MISSED)
 
 
-def _dispersed(chosen: Plan, samples: int, *, quiet: bool) -> Results:
-    """The recommended schedule in many truths, flown as the rest of the report; interrupted, nothing is written."""
+def _dispersed(chosen: Plan, samples: int, *, impulses: bool, force: bool, quiet: bool) -> tuple[Results, str]:
+    """The recommended schedule in many cases, and how far impulses err; interrupted, nothing is written."""
     from nutdamp.dispersion import study_of
 
-    results, _, stopped_by = fly(
-        study_of(chosen.spacecraft, chosen.pulses, flown=True), samples, None, None, None, quiet
-    )
+    study, note = study_of(chosen.spacecraft, chosen.pulses, flown=not impulses), ""
+    if impulses:
+        from nutdamp.dispersion.agreement import check_impulses
+
+        note = check_impulses(study, force=force)
+    results, _, stopped_by = fly(study, samples, None, None, None, quiet)
     if stopped_by is not None and results.done < samples:
         raise interruption(stopped_by)
-    return results
+    return results, note

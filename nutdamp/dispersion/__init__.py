@@ -1,4 +1,4 @@
-"""Dispersion studies: many truths fly one schedule."""
+"""Dispersion studies: many dispersed cases fly one schedule."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from nutdamp.errors import BadRequest
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft
 
-__all__ = ["study_of"]
+__all__ = ["SAMPLES", "SEED", "study_of"]
+
+SAMPLES = 20_000
+"""Cases that are flown where nothing else is said."""
+
+SEED = 1
+"""Of their draws, likewise."""
 
 
-def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = 1, flown: bool = False) -> Study:
-    """The study of ``schedule`` with the dispersions of ``spacecraft``, by the impulse sum or ``flown``.
+def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED, flown: bool = True) -> Study:
+    """The study of ``schedule`` with the dispersions of ``spacecraft``, ``flown`` or by the impulse sum.
 
     Raises BadRequest for a spacecraft without dispersions.
     """
@@ -21,6 +27,6 @@ def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = 1, flown
     model = Model(spacecraft, schedule)
     if not flown:
         return Study(model, seed)
-    from nutdamp.dispersion.flown import RealWidths  # few studies need its integrator
+    from nutdamp.dispersion.flown import RealWidths  # closed forms need no integrator
 
     return Study(model, seed, RealWidths(model), flown=True)

@@ -54,6 +54,7 @@ class RealWidths:
             before=_triple(moments * rates),
             after=after,
             pointed=rotated(after, truth.tilt),
+            spin=settled[2],
             spin_change=settled[2] - rates[2],
             propellant=truth.propellant,
             nutation=None if truth.moments[0] is truth.moments[1] else largest_nutation(moments, momentum, sense),

@@ -38,14 +38,15 @@ class Ends:
 
     ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
     H at t = 0 and at the end in the true body axes of t = 0, which stand still in space; ``pointed``: the end in the
-    estimated body axes of t = 0. ``spin_change`` rad/s; ``propellant`` kg or None. ``nutation`` rad where it is not
-    simply the angle of ``momentum`` (bodies with I1 ≠ I2).
+    estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
+    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2).
     """
 
     momentum: Triple
     before: Triple
     after: Triple
     pointed: Triple
+    spin: Cases
     spin_change: Cases
     propellant: Cases | None
     nutation: Cases | None = None
@@ -122,6 +123,7 @@ def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...], growth: float) -> 
         before=before,
         after=after,
         pointed=rotated(after, truth.tilt),
+        spin=spin,
         spin_change=spin - truth.omega0[2],
         propellant=truth.propellant,
     )
@@ -298,5 +300,5 @@ def _replaced(ends: Ends, cases: NDArray[np.intp], others: Ends) -> Ends:
         name: tuple(mended(v, o, count) for v, o in zip(getattr(ends, name), getattr(others, name), strict=True))
         for name in ("momentum", "before", "after", "pointed")
     }
-    spin_change = mended(ends.spin_change, others.spin_change, count)
-    return Ends(**triples, spin_change=spin_change, propellant=ends.propellant)
+    spins = {name: mended(getattr(ends, name), getattr(others, name), count) for name in ("spin", "spin_change")}
+    return Ends(**triples, **spins, propellant=ends.propellant)

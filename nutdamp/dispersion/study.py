@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import flight
+from nutdamp import compliance
+from nutdamp.compliance import Left
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, aim_output, measure, vectors
@@ -27,7 +28,7 @@ from nutdamp.dispersion.statistics import (
     Worst,
     binomial_interval,
 )
-from nutdamp.dispersion.truth import Model, Truth
+from nutdamp.dispersion.truth import Cases, Model, Truth
 from nutdamp.errors import BadRequest
 from nutdamp.physics import many
 
@@ -50,16 +51,10 @@ KEPT_WORST = 1_000
 """Worst cases that are kept."""
 
 PROBABILITY = 0.997
-"""How surely a requirement must be met where the file does not say."""
+"""Share of cases that must comply where the file does not say."""
 
 CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
-
-LONG_PULSE = 0.5
-"""rad that the body turns within a pulse, beyond which H moves by 1 % less than by an impulse, sinc(ω3τ/2)."""
-
-ROUGH = 0.002
-"""deg that H may be moved otherwise than flown without a remark."""
 
 Collect = Callable[[int, Array], None]
 """Takes the number (from 0) of the first of some cases, and their outputs (5, n), in order."""
@@ -96,30 +91,6 @@ class Study:
         """Sensitivities by the closed form."""
         return first_order(self.model)
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What the impulse sum leaves out of this spacecraft."""
-        body = self.model.spacecraft
-        left = [
-            *["disturbances"] * bool(body.disturbances),
-            *["dissipation"] * (body.dissipation is not None),
-            *["I1 ≠ I2 (their mean is flown)"] * (not body.inertia.symmetric),
-        ]
-        if self.flown:
-            return ()
-        notes = [f"the impulse sum (17) knows nothing of {' and '.join(left)}; --flown does"] if left else []
-        longest = max((pulse.on_time for pulse in self.model.schedule), default=0.0)
-        if abs(body.spin) * longest > LONG_PULSE:
-            summed = math.degrees(self.outputs_of({})[1])
-            real = math.degrees(flight.flown(body, self.model.schedule).residual.momentum_shift)
-            if abs(summed - real) > ROUGH:
-                notes.append(
-                    f"the pulses, up to {longest:.3g} s, are long for this spin: on the nutation the impulse sum (17) "
-                    f"is right all the same, but it moves H by {summed:.3g}° where the plan flown does by {real:.3g}°; "
-                    f"--flown has both"
-                )
-        return tuple(notes)
-
     def source(self) -> Source:
         """Draws for one thread."""
         return Source(self.model.inputs.drawn, self.seed, self.model.physical)
@@ -136,19 +107,10 @@ class Study:
         measure(self.model, self.flies(truth), out)
         return out[:, 0]
 
-    def severity(self, values: Array) -> Array:
-        """How bad cases are: by what the requirement asks, relative to it; without one by the nutation left.
-
-        With a target axis the distance from it stands for the shift of H.
-        """
-        body = self.model.spacecraft
-        asked, aim = body.requirement, OUTPUTS.index(aim_output(body)[0])
-        limits = () if asked is None else ((0, asked.nutation), (aim, asked.momentum_shift))
-        ratios = [values[row] / limit for row, limit in limits if limit is not None]
-        if not ratios:
-            worst = values[0] if body.goal.axis is None else np.maximum(values[0], values[aim])
-            return np.asarray(worst)
-        return np.asarray(np.max(ratios, axis=0))
+    def severity(self, values: Array, spin: Cases) -> Array:
+        """How bad cases are, (n,), by `compliance.severity`: outputs (5, n), and ω3 at their end in rad/s."""
+        aim = OUTPUTS.index(aim_output(self.model.spacecraft)[0])
+        return np.asarray(compliance.severity(self.model.spacecraft, Left(values[0], values[aim], spin)))
 
     @property
     def fingerprint(self) -> str:
@@ -162,7 +124,7 @@ class Study:
             body.omega0,
             body.dispersions,
         ]
-        parts += [body.requirement, body.disturbances, body.dissipation, body.channels, body.steerable]
+        parts += [body.requirement, body.goal.spin, body.disturbances, body.dissipation, body.channels, body.steerable]
         parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
         with np.printoptions(precision=17, floatmode="unique"):
             return hashlib.sha256(repr(parts).encode()).hexdigest()
@@ -210,8 +172,8 @@ class Results:
 
     @property
     def met_fraction(self) -> float | None:
-        """Fraction of cases within the requirement; None without one."""
-        return None if self.study.model.spacecraft.requirement is None or not self.done else self.met / self.done
+        """Fraction of cases that comply; None where nothing is required."""
+        return self.met / self.done if self.done and compliance.required(self.study.model.spacecraft) else None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -220,13 +182,13 @@ class Results:
 
     @property
     def probability(self) -> float:
-        """How surely the requirement must be met."""
+        """Share of cases that must comply."""
         asked = self.study.model.spacecraft.requirement
         return PROBABILITY if asked is None or asked.probability is None else asked.probability
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether as many cases as asked are within the requirement; None without one."""
+        """Whether as many cases comply as must; None where nothing is required."""
         fraction = self.met_fraction
         return None if fraction is None else fraction >= self.probability
 
@@ -242,9 +204,8 @@ class Results:
                 rows[name].append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
         return sampled_shares({name: np.concatenate(parts) for name, parts in rows.items()}, self.early[:, :count])
 
-    def take(self, first: int, values: Array) -> None:
-        """Count the cases from ``first`` on, outputs (5, n)."""
-        severity = self.study.severity(values)
+    def take(self, first: int, values: Array, severity: Array) -> None:
+        """Count the cases from ``first`` on, outputs (5, n) and `Study.severity` (n,)."""
         self.met += int(np.count_nonzero(severity <= 1.0))
         self.worst.add(first, severity)
         for sketch, row in zip(self.sketches or (), values, strict=False):
@@ -288,11 +249,12 @@ def run(
         first = results.done
         last = min(results.asked, first - first % ROUND + ROUND)
         out = np.empty((len(OUTPUTS), last - first)) if results.values is None else results.values[:, first:last]
-        done, redrawn = _Round(results, first, last, out, chunk).fly(threads, watch, stopped)
+        flights = _Round(results, first, last, out, chunk)
+        done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:
             break
         results.redrawn += redrawn
-        results.take(first, out[:, :done])
+        results.take(first, out[:, :done], flights.severity[:done])
         if collect is not None:
             collect(first, out[:, :done])
         watch(results.done)
@@ -304,6 +266,7 @@ class _Round:
 
     def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
+        self.severity = np.empty(last - first)
         self.chunk = max(chunk // STRIDE, 1) * STRIDE
         self.blocks = range(first // BLOCK, math.ceil(last / BLOCK))
         self.taken = 0
@@ -366,7 +329,9 @@ class _Round:
             inner = slice(wanted.start - low, wanted.stop - low)
             outputs = np.empty((len(OUTPUTS), high - low))
             measure(study.model, ends, outputs)
-            self.out[:, wanted.start - self.first : wanted.stop - self.first] = outputs[:, inner]
+            place = slice(wanted.start - self.first, wanted.stop - self.first)
+            self.out[:, place] = outputs[:, inner]
+            self.severity[place] = study.severity(outputs, ends.spin)[inner]
             if low < EARLY:
                 outcome = np.empty((ROWS, high - low))
                 vectors(study.model, ends, outcome)

@@ -32,7 +32,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
         from nutdamp.files.plan_json import comparison_json
         from nutdamp.planning import Comparison
 
-        return json_text(comparison_json(Comparison(plan.spacecraft, (plan,), plan, "the plan exported")))
+        return json_text(comparison_json(Comparison(plan.spacecraft, (plan,)), {"reason": "the plan exported"}))
     if form == "basilisk":
         from nutdamp.files.basilisk_script import basilisk_script
 

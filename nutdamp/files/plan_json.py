@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from nutdamp import __version__
@@ -13,14 +14,14 @@ from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
 
-def comparison_json(compared: Comparison) -> dict[str, Any]:
-    """What ``plan --json`` gives."""
+def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
     return {
         "nutdamp": __version__,
         "spacecraft": spacecraft_json(compared.spacecraft),
         "plans": [plan_json(plan) for plan in compared.plans],
         "recommended": None if compared.recommended is None else compared.recommended.scheme,
-        "reason": compared.reason,
+        **spoken,
     }
 
 

@@ -10,8 +10,11 @@ from nutdamp.files.plan_json import plan_json
 from nutdamp.robust import Candidate, RobustComparison
 
 
-def robust_json(found: RobustComparison) -> dict[str, Any]:
-    """The candidates from the best down, the one to fly with its pulses, and what it costs against the usual one."""
+def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
+    """The candidates from the best down, the one to fly with its pulses, and what it costs against the usual one.
+
+    ``reason``: why that one, in words.
+    """
     chosen, usual = found.chosen, found.usual
     return {
         "probability": found.probability,
@@ -20,7 +23,7 @@ def robust_json(found: RobustComparison) -> dict[str, Any]:
         "flown": found.flown,
         "candidates": [_candidate(one) for one in found.candidates],
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
-        "reason": found.reason,
+        "reason": reason,
         "meets_requirement": found.meets_requirement,
         "against": None if usual is None else _candidate(usual),
         "cost": None

@@ -14,8 +14,9 @@ from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS, aim_output
 from nutdamp.dispersion.statistics import Array, cases_to_show
 from nutdamp.dispersion.study import EARLY, Results, Study
+from nutdamp.report import verdicts
 from nutdamp.report.layout import columns, facts
-from nutdamp.report.text import MISSING, degrees, quantity
+from nutdamp.report.text import MISSING, quantity
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin gain, mrad/s", "propellant, g")
@@ -49,7 +50,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Group:
 def _title(results: Results, scheme: str) -> Text:
     study = results.study
     how = "real widths and true tensor" if study.flown else "the impulse sum (17)"
-    drawn = f"{results.done:,} truth{'s' * (results.done > 1)}, seed {study.seed}"
+    drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
     return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, flown by {how}, {drawn}")
@@ -81,22 +82,19 @@ def _beside(value: float, largest: float) -> str:
 
 
 def _requirement(results: Results) -> list[RenderableType]:
-    asked, fraction = results.study.model.spacecraft.requirement, results.met_fraction
-    if asked is None or fraction is None:
+    share, probability = results.met_fraction, results.probability
+    if share is None:
         return [Text("The file has no requirement to meet.")]
-    limits = ((asked.nutation, "nutation"), (asked.momentum_shift, aim_output(results.study.model.spacecraft)[1]))
-    wanted = " and ".join(f"{name} within {degrees(limit)}" for limit, name in limits if limit is not None)
     low, high = results.interval
-    verdict = ("met", "green") if results.meets_requirement else ("NOT met", "red")
-    probability = f"{100 * results.probability:.6g} %"
-    text = Text.assemble(("Requirement ", "bold"), f"({wanted}, by {probability}): ", verdict)
-    digits = max(2 - math.floor(math.log10(100 * (high - low))), 0)  # what the interval leaves worth telling
-    shares = [f"{100 * share:.{digits}f} %" for share in (fraction, low, high)]
-    text.append(f", by {shares[0]} of the cases (95 % interval {shares[1]} to {shares[2]}).")
-    if results.meets_requirement and low < results.probability:
-        few = cases_to_show(results.probability)
+    asked = verdicts.required(results.study.model.spacecraft)
+    verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
+    interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
+    text = Text.assemble(("Requirement ", "bold"), f"({asked}) ", verdict, f"; 95 % interval {interval}.")
+    if results.meets_requirement and low < probability:
+        few = cases_to_show(probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""
-        text.append(f" The interval reaches below {probability}: more --samples would show it.{hint}")
+        level = verdicts.exact_percent(probability)
+        text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
     return [text]
 
 
@@ -217,7 +215,7 @@ def unused_table(unused: Iterable[Unused]) -> Table:
 
 def case_screen(study: Study, case: int, draws: dict[str, float], flown: Array, *, scheme: str) -> RenderableType:
     """One case (from 0): every input, and how it ends by the impulse sum and flown through real widths."""
-    inputs = columns("input", "estimate", "truth", "off by", "in sigmas")
+    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
     for entry in study.model.inputs.drawn:
         unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
         draw = draws[entry.name]

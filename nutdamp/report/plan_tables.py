@@ -9,8 +9,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp import compliance
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
+from nutdamp.report import verdicts
 from nutdamp.report.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity, steering
@@ -22,11 +24,13 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     """Everything that ``plan`` shows."""
     parts: list[RenderableType] = [header(compared.spacecraft), Text(), _comparison(compared)]
     parts.extend(_reasons(compared))
-    chosen = compared.recommended
+    chosen, reason = compared.recommended, verdicts.reason(compared)
     if chosen is None:
-        parts += [Text(), Text(f"No recommendation: {compared.reason}.", style="bold")]
+        parts += [Text(), Text(f"No recommendation: {reason}.", style="bold")]
         return Group(*parts)
-    parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {compared.reason}.")]
+    parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {reason}.")]
+    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in verdicts.warnings(compared)]
+    parts += [Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)]
     if len(chosen.pulses):
         parts += [Text(), pulse_table(chosen), Text(), end_table(chosen.flight)]
     return Group(*parts)
@@ -142,9 +146,8 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
     if any(plan.delta_v is not None for plan in compared.plans):
         rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
-    if compared.spacecraft.requirement is not None:
-        verdict = {True: "met", False: "not met", None: MISSING}
-        rows.append(("requirement", lambda plan: verdict[plan.meets_requirement]))
+    if compliance.required(compared.spacecraft):
+        rows.append(("requirement", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
     return rows
 
 
@@ -167,7 +170,7 @@ def _comparison(compared: Comparison) -> Table:
     for name, cell in rows:
         cells = [cell(plan) if plan.feasible else "" for plan in compared.plans]
         if name == "pulses":
-            cells = [text or "infeasible" for text in cells]
+            cells = [text or verdicts.no_plan(plan) for text, plan in zip(cells, compared.plans, strict=True)]
         table.add_row(Text(name, style="dim"), *cells)
     return table
 

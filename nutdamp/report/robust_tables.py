@@ -1,13 +1,16 @@
-"""The screen of ``plan --robust``: candidates by what dispersed truths leave, the one to fly and what it costs."""
+"""The screen of ``plan --robust``: candidates by how many cases comply, the one to fly and what it costs."""
 
 from __future__ import annotations
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp import compliance
+from nutdamp.planning import Plan
+from nutdamp.report import verdicts
 from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header, pulse_table
-from nutdamp.report.text import MISSING, degrees, mass, moment, quantity
+from nutdamp.report.text import MISSING, degrees
 from nutdamp.robust import RobustComparison
 
 MOST_ROWS = 12
@@ -18,27 +21,35 @@ def robust_screen(found: RobustComparison) -> RenderableType:
     """Everything that ``plan --robust`` shows."""
     parts: list[RenderableType] = [header(found.comparison.spacecraft), Text()]
     infeasible = [plan for plan in found.comparison.plans if plan.why is not None]
-    reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), f"infeasible: {plan.why}") for plan in infeasible]
-    chosen = found.chosen
+    reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
+    chosen, reason = found.chosen, verdicts.robust_reason(found)
     if chosen is None:
-        return Group(*parts, *reasons, Text(f"No recommendation: {found.reason}.", style="bold"))
+        return Group(*parts, *reasons, Text(f"No recommendation: {reason}.", style="bold"))
     how = "flown through real widths" if found.flown else "by the impulse sum (17)"
-    parts.append(Text(f"{found.samples:,} dispersed truths (seed {found.seed}) fly each plan, {how}", style="bold"))
+    parts.append(Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"))
     parts += [Text(), _candidates(found), *reasons, Text()]
-    title = Text.assemble("Robust plan: ", (f"{chosen.plan.scheme}, {chosen.variant}", "bold"), f" – {found.reason}.")
-    parts += [title, Text(_cost(found))]
+    parts.append(Text.assemble("Robust plan: ", (f"{chosen.plan.scheme}, {chosen.variant}", "bold"), f" – {reason}."))
+    if chosen.met is not None:
+        asked = verdicts.required(found.comparison.spacecraft)
+        verdict = verdicts.cases_verdict(chosen.met, found.probability)
+        parts.append(Text.assemble(("Requirement ", "bold"), f"({asked}) {verdict}."))
+    parts.append(Text(verdicts.robust_cost(found)))
     if len(chosen.plan.pulses):
         parts += [Text(), pulse_table(chosen.plan)]
     return Group(*parts)
 
 
+def _why(plan: Plan) -> str:
+    return f"infeasible: {plan.why}" if plan.failure is None else f"{plan.why}"
+
+
 def _candidates(found: RobustComparison) -> RenderableType:
-    level = f"{100 * found.probability:.6g} %"
-    requirement = found.comparison.spacecraft.requirement is not None
+    level = verdicts.exact_percent(found.probability)
+    requirement = bool(compliance.required(found.comparison.spacecraft))
     propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
     cost = "propellant\ng" if propellant else "impulse\nN m s"
     heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg")
-    table = columns(*heads, *["requirement\nkept by"] * requirement, text=("variant\n",))
+    table = columns(*heads, *["cases that\ncomply"] * requirement, text=("variant\n",))
     named = list(found.candidates[:MOST_ROWS])
     named += [one for one in (found.chosen, found.usual) if one is not None and one not in named]
     for one in named:
@@ -50,41 +61,11 @@ def _candidates(found: RobustComparison) -> RenderableType:
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
             *(degrees(angle).removesuffix(" deg") for angle in (one.nominal, one.left)),
-            *[MISSING if one.met is None else f"{100 * one.met:.4g} %"] * requirement,
+            *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * requirement,
         )
-    what = _what(found)
+    what = verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
-    more = f"{rest} more come behind. " if rest else ""
-    note = f"{more}nominal, {level}: the {what} left for the estimate, and not exceeded by so many truths."
-    star = " * is what is recommended for the estimate." if found.usual is not None else ""
+    more = f"{rest} more plans are worse. " if rest else ""
+    note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
+    star = " * is recommended for nominal values." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))
-
-
-def _cost(found: RobustComparison) -> str:
-    """The robust plan against the one that is recommended for the estimate."""
-    chosen, usual, cost = found.chosen, found.usual, found.cost
-    if chosen is None or usual is None or cost is None:
-        return "There is nothing to compare it with."
-    if chosen is usual:
-        return "It is the plan that is recommended for the estimate too: robustness costs nothing."
-    level = f"{100 * found.probability:.6g} %"
-    if cost.propellant is None:
-        spent = _more(cost.impulse, quantity(abs(cost.impulse), "N m s"), "impulse")
-    else:
-        spent = _more(cost.propellant, mass(abs(cost.propellant)), "propellant")
-    when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
-    return (
-        f"Against {usual.plan.scheme}, recommended for the estimate: {degrees(chosen.left)} instead of "
-        f"{degrees(usual.left)} of {_what(found)} within {level}; it takes {spent} and ends {when}."
-    )
-
-
-def _what(found: RobustComparison) -> str:
-    """What the plans are ranked by."""
-    return "nutation" if found.comparison.spacecraft.goal.axis is None else "nutation or axis error"
-
-
-def _more(difference: float, shown: str, what: str) -> str:
-    if difference == 0.0:
-        return f"as much {what}"
-    return f"{shown} {'more' if difference > 0 else 'less'} {what}"

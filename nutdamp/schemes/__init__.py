@@ -17,6 +17,9 @@ CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 POINTING = ("two-pulse", "half-cone", "rhumb-line", "optimal")
 """The schemes that can turn the spin axis to a target axis, planned when there is one and none is named."""
 
+SPINNING = ("optimal",)
+"""The schemes that can set the spin rate."""
+
 PLANNED = (*CLASSIC, "optimal", "half-cone", "rhumb-line")
 """The schemes that plan pulses."""
 

@@ -77,9 +77,10 @@ PROCESSES = (
         "import scipy.optimize",
         5.0,
     ),
+    Process("disperse --impulses, 1e5 cases", (*DISPERSE, "1e5", "--impulses"), "import numpy", None, 250.0),
+    Process("disperse --impulses, 1e6 cases", (*DISPERSE, "1e6", "--impulses"), "import numpy", 15.0, 250.0),
+    Process("disperse, 2e4 cases", (*DISPERSE, "2e4"), "import numpy", None, 250.0),
     Process("disperse, 1e5 cases", (*DISPERSE, "1e5"), "import numpy", None, 250.0),
-    Process("disperse, 1e6 cases", (*DISPERSE, "1e6"), "import numpy", 15.0, 250.0),
-    Process("disperse --flown, 1e5 cases", (*DISPERSE, "1e5", "--flown"), "import numpy", None, 250.0),
 )
 
 BODY = """\

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -34,8 +35,8 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_plan(run: Run, sat: Pa
     done = run("plan", "sat.yaml", "--scheme", "four-pulse", "--robust", "--json", "plan.json", "--csv", "pulses.csv")
     assert done.returncode == 0, done.stderr
     words = " ".join(done.stdout.split())
-    assert "20,000 dispersed truths (seed 1) fly each plan, by the impulse sum (17)" in words
-    assert "Against four-pulse, recommended for the estimate:" in words
+    assert "20,000 dispersed cases of each plan, flown through real widths, seed 1" in words
+    assert "Against four-pulse, recommended for nominal values:" in words
     assert "Robust plan: four-pulse, without b" in words
     found = json.loads((tmp_path / "plan.json").read_text("utf-8"))
     assert found["recommended"] == "four-pulse"
@@ -61,7 +62,8 @@ def test_the_requirement_with_its_probability(run: Run, sat: Path, degrees: floa
     sat.write_text(BODY + UNTRUSTED + requirement, encoding="utf-8")
     done = run("plan", "sat.yaml", "--scheme", "four-pulse", "--robust")
     assert done.returncode == status, done.stdout
-    assert "95 %" in done.stdout
+    verdict = r"\) met: 100.0 % of cases" if status == 0 else r"\) NOT met: [\d.]+ % of cases"
+    assert re.search(verdict + r" comply \(95 % required\)", " ".join(done.stdout.split()))
 
 
 def test_without_dispersions_it_says_what_to_write(run: Run, sat: Path, tmp_path: Path) -> None:
@@ -78,3 +80,36 @@ def test_nothing_feasible(run: Run, sat: Path) -> None:
     assert done.returncode == 3
     assert "No recommendation: no scheme is feasible." in done.stdout
     assert "one-pulse: infeasible:" in " ".join(done.stdout.split())
+
+
+def test_most_cases_comply_with_the_plan_picked_for_the_example(run: Run, tmp_path: Path) -> None:
+    """By impulse sums four-pulse complied in 2 % of the cases, and was taken all the same."""
+    done = run("plan", "--robust", "--json", "plan.json")
+    assert done.returncode == 4
+    words = " ".join(done.stdout.split())
+    assert "Robust plan: two-pulse, as planned – most cases comply, of 24 plans." in words
+    assert "NOT met: 85.6 % of cases comply (99.7 % required)" in words
+    assert "85.6 % instead of 71.4 % of cases comply" in words
+    found = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
+    assert found["flown"]
+    assert found["recommended"]["met_fraction"] == max(one["met_fraction"] for one in found["candidates"])
+    assert found["against"]["scheme"] == "four-pulse"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--impulses",), "--impulses says how dispersed cases are flown: it is for --robust"),
+        (("--robust", "--force"), "--force is for --impulses"),
+        (("--robust", "--impulses"), "errs by up to"),
+    ],
+)
+def test_impulses_are_refused(run: Run, arguments: tuple[str, ...], said: str) -> None:
+    done = run("plan", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+
+
+def test_impulses_are_flown_where_they_must(run: Run) -> None:
+    done = run("plan", "--robust", "--impulses", "--force", "--scheme", "four-pulse")
+    assert "by the impulse sum (17)" in done.stdout

@@ -43,9 +43,21 @@ def test_an_option_beside_a_schedule_is_told(run: Run, tmp_path: Path) -> None:
     assert "--coarse does nothing here" in done.stderr
 
 
-def test_a_final_spin_that_nothing_sets_is_told(run: Run) -> None:
-    assert "--scheme optimal can set it" in run("plan", "--spin", "31rpm").stderr
-    assert "can set it" not in run("simulate", "--scheme", "none", "--spin", "31rpm").stderr
+def test_a_scheme_that_cannot_set_the_spin_is_infeasible(run: Run) -> None:
+    done = run("plan", "--spin", "31rpm")
+    assert done.returncode == 3
+    assert "one-pulse, two-pulse, four-pulse: cannot set the spin; optimal can" in done.stdout
+    done = run("simulate", "--scheme", "two-pulse", "--spin", "31rpm")
+    assert done.returncode == 3
+    assert "two-pulse is infeasible: cannot set the spin" in done.stderr
+    assert run("simulate", "--scheme", "none", "--spin", "31rpm").returncode == 0
+    assert run("plan", "--spin", "keep").returncode == 0
+
+
+def test_a_direction_of_the_sun_that_nothing_reads_is_told(run: Run) -> None:
+    command = ("plan", "--target", "10deg,45deg", "--sun", "70deg,0deg", "--scheme")
+    assert "--sun does nothing here: it is for rhumb-line" in run(*command, "half-cone").stderr
+    assert "does nothing" not in run(*command, "rhumb-line").stderr
 
 
 @pytest.mark.parametrize(

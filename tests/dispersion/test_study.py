@@ -27,7 +27,7 @@ def a_study(**changes: object) -> Study:
     model = dispersed.with_jets(scale=0.2)
     given: dict[str, object] = {"requirement": Requirement(0.0712, 0.0269, 0.85), **changes}
     body = replace(model.spacecraft, **given)  # type: ignore[arg-type]
-    return study_of(body, model.schedule, seed=5)
+    return study_of(body, model.schedule, seed=5, flown=False)
 
 
 @pytest.fixture(scope="module")

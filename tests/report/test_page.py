@@ -135,7 +135,7 @@ def test_the_same_input_gives_the_same_page(example: str) -> None:
 
 
 def test_the_comparison_says_what_the_json_says(example: str) -> None:
-    data = comparison_json(compared(built_in_example_text()))
+    data = comparison_json(compared(built_in_example_text()), {})
     heads, rows = sheet(parsed(example), "schemes")
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
     for row, plan in zip(rows, data["plans"], strict=True):
@@ -242,8 +242,10 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     made = report_page(found, Repeat("", "", ""), pictured=True, dispersed=results)
     assert made.good == good
     assert results.met_fraction is not None
-    said = f"{100 * results.met_fraction:.4g} % of 1,000 cases meet the requirement; 90 % are asked."
-    assert made.verdict.endswith(said)
+    share = f"{100 * results.met_fraction:.1f} % of cases comply (90 % required)"
+    said = f"met: {share}" if good else f"NOT met: {share}"
+    assert made.verdict.endswith(f" {said}.")
+    assert dict(made.figures)["requirement"] == said  # the tile does not contradict the page
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     heads, rows = sheet(tree, "dispersion")
     assert heads[:2] == ["quantity", "nominal"]

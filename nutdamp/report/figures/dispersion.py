@@ -42,7 +42,7 @@ def dispersion_figure(results: Results, *, scheme: str) -> Figure:
         row[0].set_title(f"{name}: histogram")
         row[1].set_title(f"{100 * results.probability:.6g} % within {reached:.3g}°{required}")
     style.legend(figure, list(grid.flat))
-    figure.suptitle(f"{results.study.model.spacecraft.name}: {scheme}, {results.done:,} dispersed truths")
+    figure.suptitle(f"{results.study.model.spacecraft.name}: {scheme}, {results.done:,} dispersed cases")
     return figure
 
 

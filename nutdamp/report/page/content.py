@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp import __version__
 from nutdamp.planning import Comparison, Plan, unrounded
+from nutdamp.recommendation import Standing
+from nutdamp.report import verdicts
 from nutdamp.report.check_tables import channel_table, disturbance_table
 from nutdamp.report.end_tables import end_table
 from nutdamp.report.page.document import (
@@ -25,7 +27,7 @@ from nutdamp.report.page.document import (
     sheet_of,
 )
 from nutdamp.report.page.pictures import dispersion_picture_of, pictures_of
-from nutdamp.report.page.sheets import VERDICT, comparison_sheet, pulse_sheet, spacecraft_facts
+from nutdamp.report.page.sheets import comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.report.text import degrees, mass, moment, quantity
 from nutdamp.report.verify_tables import budget_table, conservation, methods_table, verdict
 from nutdamp.spacecraft import Spacecraft
@@ -53,10 +55,11 @@ def report_page(
     *,
     pictured: bool,
     dispersed: Results | None = None,
+    note: str = "",
 ) -> Page:
     """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
 
-    ``dispersed``: the recommended schedule flown with dispersed truths.
+    ``dispersed``: the recommended schedule flown in dispersed cases; ``note``: a remark on how.
     """
     body, chosen = compared.spacecraft, compared.recommended
     sections = [_spacecraft(body), _schemes(compared)]
@@ -66,8 +69,8 @@ def report_page(
             sections.append(Section("pictures", "Pictures", pictures_of(chosen)))
         sections.append(_budget(chosen))
         if dispersed is not None:
-            sections.append(_dispersion(chosen, dispersed, pictured=pictured))
-    good = chosen is not None and chosen.meets_requirement is not False
+            sections.append(_dispersion(chosen, dispersed, note, pictured=pictured))
+    good = chosen is not None and chosen.standing is Standing.COMPLIES
     if dispersed is not None and dispersed.meets_requirement is False:
         good = False
     return Page(
@@ -81,14 +84,14 @@ def report_page(
 
 
 def _verdict(compared: Comparison, dispersed: Results | None) -> str:
-    chosen = compared.recommended
+    chosen, reason = compared.recommended, verdicts.reason(compared)
     if chosen is None:
-        return f"No recommendation: {compared.reason}."
-    verdict = f"Recommended: {chosen.scheme} – {compared.reason}."
+        return f"No recommendation: {reason}."
+    verdict = " ".join((f"Recommended: {chosen.scheme} – {reason}.", *verdicts.warnings(compared)))
     if dispersed is None or dispersed.met_fraction is None:
         return verdict
-    met, asked = (f"{100.0 * share:.4g} %" for share in (dispersed.met_fraction, dispersed.probability))
-    return f"{verdict} With dispersions {met} of {dispersed.done:,} cases meet the requirement; {asked} are asked."
+    cases = verdicts.cases_verdict(dispersed.met_fraction, dispersed.probability)
+    return f"{verdict} With dispersions ({dispersed.done:,} cases) {cases}."
 
 
 def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
@@ -102,10 +105,15 @@ def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
         yield Figure("impulse", quantity(pulses.total_impulse, "N m s"))
     else:
         yield Figure("propellant", mass(pulses.propellant))
-    if chosen.meets_requirement is not None:
-        verdict = VERDICT[chosen.meets_requirement]
-        cases = None if dispersed is None else dispersed.met_fraction
-        yield Figure("requirement", verdict if cases is None else f"{verdict}, by {100.0 * cases:.4g} % of cases")
+    if chosen.meets_requirement is None:
+        return
+    share = None if dispersed is None else dispersed.met_fraction
+    if dispersed is None or share is None:
+        yield Figure("requirement", verdicts.VERDICT[chosen.meets_requirement])
+        return
+    if not chosen.meets_requirement:
+        yield Figure("requirement, nominal", verdicts.VERDICT[False])
+    yield Figure("requirement", verdicts.cases_verdict(share, dispersed.probability))
 
 
 def _spacecraft(body: Spacecraft) -> Section:
@@ -130,7 +138,8 @@ def _schemes(compared: Comparison) -> Section:
         "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "
         "integrate Euler's equations through the real widths; recommendation and requirement go by them."
     )
-    blocks: tuple[Block, ...] = (comparison_sheet(compared), note)
+    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
+    blocks: tuple[Block, ...] = (comparison_sheet(compared), *hints, note)
     return Section("schemes", "Schemes compared", (*blocks, Remarks(remarks)) if remarks else blocks)
 
 
@@ -159,11 +168,12 @@ def _budget(chosen: Plan) -> Section:
     return Section("budget", "Error budget", tuple(blocks))
 
 
-def _dispersion(chosen: Plan, dispersed: Results, *, pictured: bool) -> Section:
+def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) -> Section:
     from nutdamp.report.dispersion_tables import dispersion_screen
 
     blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
-    blocks += [Prose(f"Note: {remark}.") for remark in dispersed.study.remarks]
+    if note:
+        blocks.append(Prose(f"Note: {note}."))
     if pictured:
         blocks.append(dispersion_picture_of(dispersed, chosen.scheme))
     return Section("dispersion", "Dispersion", tuple(blocks))

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from nutdamp import compliance
 from nutdamp.flight import Residual
 from nutdamp.planning import Comparison, Plan
+from nutdamp.report import verdicts
 from nutdamp.report.end_tables import angle_names, angle_texts
 from nutdamp.report.page.document import Column, Facts, Sheet, facts_of, sheet_of
 from nutdamp.report.plan_tables import derived_table, pulse_table
 from nutdamp.report.text import MISSING, degrees, duration, moment
 from nutdamp.spacecraft import Spacecraft
-
-VERDICT = {True: "met", False: "not met", None: MISSING}
-"""What `Plan.meets_requirement` says."""
 
 
 def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
@@ -23,10 +22,9 @@ def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a 
 
 
 def _asked(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    asked, limits = spacecraft.requirement, spacecraft.limits
-    if asked is not None:
-        most = (("nutation", asked.nutation), ("shift of H", asked.momentum_shift))
-        yield "requirement", ", ".join(f"{name} at most {degrees(value)}" for name, value in most if value is not None)
+    limits = spacecraft.limits
+    if compliance.required(spacecraft):
+        yield "requirement", verdicts.required(spacecraft)
     yield "horizon", duration(spacecraft.horizon)
     kept = []
     if limits.earliest > 0.0:
@@ -51,7 +49,7 @@ def comparison_sheet(compared: Comparison) -> Sheet:
     rows = []
     for plan in compared.plans:
         cells = [cell(plan) if plan.feasible else "" for _, cell in columns]
-        rows.append((plan.scheme, *(cells if plan.feasible else ["infeasible", *cells[1:]])))
+        rows.append((plan.scheme, *(cells if plan.feasible else [verdicts.no_plan(plan), *cells[1:]])))
     mark = next((index for index, plan in enumerate(compared.plans) if plan is compared.recommended), None)
     names = (Column("scheme", number=False), *(column for column, _ in columns))
     return Sheet("What each scheme costs and leaves, flown through the real pulse widths", names, tuple(rows), mark)
@@ -87,8 +85,8 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         columns.append(
             (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
         )
-    if compared.spacecraft.requirement is not None:
-        columns.append((Column("requirement", number=False), lambda plan: VERDICT[plan.meets_requirement]))
+    if compliance.required(compared.spacecraft):
+        columns.append((Column("requirement", number=False), lambda plan: verdicts.VERDICT[plan.meets_requirement]))
     return columns
 
 

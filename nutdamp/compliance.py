@@ -1,0 +1,97 @@
+"""What a motion must end with: the requirement of the file, the spin rate of the goal, and what counts as damped.
+
+One home for what complies, for one plan or for many dispersed cases: every function works on numbers and on arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nutdamp.spacecraft import Spacecraft
+
+DAMPED_SHARE = 0.01
+"""Share of the initial nutation (of the turn to a target axis) that may be left where it counts as damped (reached)."""
+
+DAMPED_ANGLE = math.radians(1e-3)
+"""rad that may be left in any case."""
+
+SPIN_TOLERANCE = 1e-3
+"""By how much, relatively, the spin at the end may miss the one of the goal."""
+
+
+class Part(Enum):
+    """What is bounded: angles in rad, the spin rate in rad/s from the one of the goal."""
+
+    NUTATION = "nutation"
+    SHIFT = "momentum_shift"
+    DISTANCE = "axis_error"
+    SPIN = "spin"
+
+
+class Bound(NamedTuple):
+    """The most that may be left of a part; ``required`` by file or command line, else what counts as damped."""
+
+    part: Part
+    most: float
+    required: bool
+
+
+class Left(NamedTuple):
+    """What is left: ``nutation`` and ``aim`` rad (H from the target axis, else from where it was), ``spin`` rad/s.
+
+    Each is a number or an array over cases.
+    """
+
+    nutation: Any
+    aim: Any
+    spin: Any
+
+
+def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
+    """The bounds of the requirement, and of the spin where the goal names one; none where nothing is required."""
+    asked, goal = spacecraft.requirement, spacecraft.goal
+    bounds = []
+    if asked is not None and asked.nutation is not None:
+        bounds.append(Bound(Part.NUTATION, asked.nutation, True))
+    if asked is not None and asked.momentum_shift is not None:
+        bounds.append(Bound(Part.SHIFT if goal.axis is None else Part.DISTANCE, asked.momentum_shift, True))
+    if goal.spin is not None:
+        bounds.append(Bound(Part.SPIN, SPIN_TOLERANCE * abs(goal.spin), True))
+    return tuple(bounds)
+
+
+def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
+    """The bounds `required`; for nutation and target axis, where none is, those within which they count as damped."""
+    found = required(spacecraft)
+    limited = {bound.part for bound in found}
+    if Part.NUTATION not in limited:
+        found += (Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),)
+    if Part.DISTANCE not in limited and spacecraft.goal.axis is not None:
+        found += (Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),)
+    return found
+
+
+def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
+    """What is left of a part, to be held against the ``most`` of its bound."""
+    if part is Part.NUTATION:
+        return left.nutation
+    if part is Part.SPIN:
+        assert spacecraft.goal.spin is not None
+        return abs(left.spin - spacecraft.goal.spin)
+    return left.aim
+
+
+def severity(spacecraft: Spacecraft, left: Left) -> Any:
+    """The largest share of a bound that is `required` which is used up: 1 or less complies.
+
+    Without such bounds what is left in rad: nutation, with a target axis the distance from it where that is more.
+    """
+    limits = required(spacecraft)
+    if not limits:
+        return left.nutation if spacecraft.goal.axis is None else np.maximum(left.nutation, left.aim)
+    shares = [left_of(bound.part, left, spacecraft) / bound.most for bound in limits]
+    return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))

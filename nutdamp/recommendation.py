@@ -1,0 +1,180 @@
+"""Which of several plans to fly: the rule, on what the plans leave when flown and on what they cost.
+
+It gives data; `nutdamp.report.verdicts` has the words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, Protocol, TypeVar
+
+from nutdamp.compliance import DAMPED_ANGLE
+from nutdamp.flight import Residual
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft
+
+SAME_COST = 1e-3
+"""Costs that differ by less, relatively, are equal."""
+
+SAME_ANGLE = 1e-9
+"""rad by which shifts of H may differ and be equal: the rounding of a flight."""
+
+STEADIER_SHIFT = 0.2
+"""Share of the recommended plan's shift of H below which another plan keeps H so much better..."""
+
+STEADIER_COST = 1.1
+"""... that it is worth a remark, if it costs at most so many times as much."""
+
+
+class Standing(Enum):
+    """What the recommended plan reaches, and so what it was chosen among; from the best down."""
+
+    COMPLIES = "complies"
+    """Meets the requirement, and damps what that does not bound."""
+    MEETS = "meets"
+    """Meets the requirement, but leaves more of what that does not bound than counts as damped."""
+    MISSES = "misses"
+    """Does not meet the requirement; without one: does not damp."""
+
+
+class Ground(Enum):
+    """What decided among the plans of one standing."""
+
+    ONLY = "only"
+    LEFT = "left"
+    COST = "cost"
+    SHIFT = "shift"
+    END = "end"
+
+
+class Judged(Protocol):
+    """A plan with what the rule goes by."""
+
+    @property
+    def spacecraft(self) -> Spacecraft:
+        """What it was planned for."""
+        ...
+
+    @property
+    def pulses(self) -> Schedule:
+        """Its schedule."""
+        ...
+
+    @property
+    def flown(self) -> Residual | None:
+        """What it leaves, flown; None where it is infeasible."""
+        ...
+
+    @property
+    def standing(self) -> Standing:
+        """What it reaches."""
+        ...
+
+    @property
+    def severity(self) -> float:
+        """See `nutdamp.compliance.severity`."""
+        ...
+
+
+Plan = TypeVar("Plan", bound=Judged)
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation(Generic[Plan]):
+    """The plan to fly; None, as ``standing`` and ``ground``, where none is feasible.
+
+    It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
+    ``steadier`` would keep H much better for little more.
+    """
+
+    plan: Plan | None = None
+    standing: Standing | None = None
+    ground: Ground | None = None
+    count: int = 0
+    by_propellant: bool = True
+    steadier: Plan | None = None
+
+
+def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
+    """The plan to fly.
+
+    Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
+    is none, that with least nutation left (least distance from a target axis where that is more).
+    """
+    feasible = [one for one in plans if one.flown is not None]
+    if not feasible:
+        return Recommendation()
+    standing = next(one for one in Standing if any(plan.standing is one for plan in feasible))
+    those = [one for one in feasible if one.standing is standing]
+    if standing is Standing.COMPLIES:
+        best, ground = cheapest(those)
+        return Recommendation(best, standing, ground, len(those), by_propellant(those), _steadier(best, those))
+    best = _nearest(those)
+    ground = Ground.ONLY if len(those) == 1 else Ground.LEFT
+    return Recommendation(best, standing, ground, len(those), by_propellant(those))
+
+
+def cheapest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
+    """The plan of least propellant (impulse where one is not known), and what decided.
+
+    Costs within `SAME_COST` are equal: then less shift of H (distance from the target axis), then the earlier end.
+    """
+    if len(plans) == 1:
+        return plans[0], Ground.ONLY
+    known = by_propellant(plans)
+    least = min(_cost(one, known) for one in plans)
+    equal = [one for one in plans if _cost(one, known) <= least * (1.0 + SAME_COST)]
+    if len(equal) == 1:
+        return equal[0], Ground.COST
+    least = min(map(_off, equal))
+    still = [one for one in equal if _off(one) <= least + SAME_ANGLE]
+    return min(still, key=lambda one: one.pulses.end), Ground.SHIFT if len(still) == 1 else Ground.END
+
+
+def missed(spacecraft: Spacecraft, nutation: float, aim: float) -> float:
+    """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more."""
+    return nutation if spacecraft.goal.axis is None else max(nutation, aim)
+
+
+def _nearest(plans: Sequence[Plan]) -> Plan:
+    """The plan that leaves least; of those that leave as little, that which is nearest to the requirement, then cost.
+
+    Angles within `DAMPED_ANGLE` are as little.
+    """
+    least = min(map(_missed, plans))
+    near = [one for one in plans if _missed(one) <= least + DAMPED_ANGLE]
+    least = min(one.severity for one in near)
+    return cheapest([one for one in near if one.severity <= least * (1.0 + SAME_COST)])[0]
+
+
+def _steadier(best: Plan, plans: Sequence[Plan]) -> Plan | None:
+    """The cheapest plan that shifts H by less than a fifth for at most a tenth more; none where H has a target."""
+    if best.spacecraft.goal.axis is not None or _off(best) <= DAMPED_ANGLE:
+        return None
+    known = by_propellant(plans)
+    most = STEADIER_COST * _cost(best, known)
+    steadier = [one for one in plans if _off(one) < STEADIER_SHIFT * _off(best) and _cost(one, known) <= most]
+    return min(steadier, key=lambda one: _cost(one, known), default=None)
+
+
+def by_propellant(plans: Sequence[Plan]) -> bool:
+    """Whether the plans are compared by propellant: it is known for all of them; else by impulse."""
+    return all(one.pulses.propellant is not None for one in plans)
+
+
+def _cost(plan: Judged, known: bool) -> float:
+    """Propellant in kg where it is ``known`` for all plans compared, else impulse in N m s."""
+    propellant = plan.pulses.propellant
+    return propellant if known and propellant is not None else plan.pulses.total_impulse
+
+
+def _off(plan: Judged) -> float:
+    assert plan.flown is not None
+    return plan.flown.axis_error
+
+
+def _missed(plan: Judged) -> float:
+    assert plan.flown is not None
+    return missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error)

@@ -1,0 +1,346 @@
+"""The rule of the recommendation, on plans whose figures are given, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import channel, cross, judged, spinner
+
+from nutdamp import compliance, flight, planning, schemes
+from nutdamp.compliance import Part
+from nutdamp.planning import Comparison, Obstacle, Plan, compare
+from nutdamp.recommendation import Ground, Standing, recommend
+from nutdamp.report import verdicts
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement
+
+INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
+HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
+BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
+POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))
+"""A target 0.2 rad = 11.46° from H at t = 0."""
+
+COUNTS = 0.05
+"""Degrees that count as damped: 1 % of the 5° of these plans."""
+
+
+def chosen(*plans: Plan) -> str | None:
+    best = recommend(plans).plan
+    return None if best is None else best.scheme
+
+
+def said(*plans: Plan) -> str:
+    return verdicts.reason(Comparison(plans[0].spacecraft, plans))
+
+
+def warned(*plans: Plan) -> str:
+    return " ".join(verdicts.warnings(Comparison(plans[0].spacecraft, plans)))
+
+
+# --- which plan ------------------------------------------------------------------------------------------------------
+
+
+def test_nothing_feasible_recommends_nothing() -> None:
+    found = recommend([INFEASIBLE])
+    assert (found.plan, found.standing, found.ground) == (None, None, None)
+    assert chosen() is None
+    assert said(INFEASIBLE) == "no scheme is feasible"
+    assert warned(INFEASIBLE) == ""
+
+
+def test_infeasible_plans_are_passed_over() -> None:
+    assert chosen(INFEASIBLE, judged("a", 3.0)) == "a"
+
+
+def test_of_those_that_damp_the_least_propellant() -> None:
+    """One per cent of the initial 5° is as good as nothing; what leaves more is not considered, however cheap."""
+    clean = judged("clean", 1e-12, propellant=0.2)
+    assert chosen(judged("thrifty", 0.99 * COUNTS, propellant=0.1), clean) == "thrifty"
+    assert chosen(judged("thrifty", 1.01 * COUNTS, propellant=0.1), clean) == "clean"
+    assert chosen(judged("thrifty", 4.9, propellant=0.001), clean) == "clean"
+
+
+def test_below_a_thousandth_of_a_degree_it_counts_as_damped_whatever_the_initial_nutation() -> None:
+    def small(one: Plan) -> Plan:
+        return replace(one, spacecraft=spinner(degrees=0.02))
+
+    clean = small(judged("clean", 1e-12, propellant=0.2))
+    assert chosen(small(judged("thrifty", 0.99e-3, propellant=0.1)), clean) == "thrifty"
+    assert chosen(small(judged("thrifty", 1.01e-3, propellant=0.1)), clean) == "clean"
+
+
+def test_with_a_target_it_must_be_reached_too() -> None:
+    there = judged("there", 1e-12, shift=0.11, propellant=0.2, goal=POINTING)  # 1 % of the turn is 0.1146°
+    assert chosen(judged("beside", 1e-12, shift=0.12, propellant=0.1, goal=POINTING), there) == "there"
+    assert chosen(judged("near", 1e-12, shift=0.114, propellant=0.1, goal=POINTING), there) == "near"
+
+
+def test_where_nothing_damps_the_least_nutation_whatever_the_cost() -> None:
+    """nothing-damps.yaml: the cheapest plan left 98 % of the nutation."""
+    plans = [judged("two", 4.9, propellant=4.0), judged("four", 2.5, propellant=81.0), judged("one", 3.7, propellant=4)]
+    assert chosen(*plans) == "four"
+    found = recommend(plans)
+    assert (found.standing, found.ground, found.count) == (Standing.MISSES, Ground.LEFT, 3)
+
+
+def test_where_nothing_reaches_the_target_the_least_of_distance_and_nutation() -> None:
+    plans = [
+        judged("straight", 0.0, shift=9.0, goal=POINTING),
+        judged("near", 4.0, shift=3.0, goal=POINTING),
+        judged("wobbling", 6.0, shift=1.0, goal=POINTING),
+    ]
+    assert chosen(*plans) == "near"
+    assert said(*plans) == "comes nearest to the target of the 3 feasible plans"
+
+
+def test_plans_that_meet_the_requirement_come_first() -> None:
+    """Even if one that does not leaves less nutation for less propellant."""
+    drifting = judged("drifting", 0.01, shift=0.3, propellant=0.1, asked=BOTH)
+    meeting = judged("meeting", 0.4, shift=0.1, propellant=0.5, asked=BOTH)
+    assert chosen(drifting, meeting) == "meeting"
+
+
+def test_of_those_that_meet_the_requirement_the_least_propellant() -> None:
+    """The requirement says what is enough: 0.4° is, although it does not count as damped."""
+    thrifty = judged("thrifty", 0.4, propellant=0.1, asked=HALF_A_DEGREE)
+    assert chosen(thrifty, judged("clean", 0.0, propellant=0.2, asked=HALF_A_DEGREE)) == "thrifty"
+
+
+def test_what_a_requirement_does_not_bound_must_be_damped() -> None:
+    """Firing nothing keeps H best: that is no way to damp."""
+    keep = Requirement(momentum_shift=math.radians(0.2))
+    idle = judged("idle", 4.9, propellant=0.0, asked=keep)
+    damping = judged("damping", 0.01, shift=0.1, propellant=0.5, asked=keep)
+    assert idle.meets_requirement
+    assert chosen(idle, damping) == "damping"
+    worse = judged("worse", 3.0, shift=0.1, propellant=0.5, asked=keep)
+    assert chosen(idle, worse) == "worse"
+    assert recommend([idle, worse]).standing is Standing.MEETS
+    assert "no plan damps the nutation" in warned(idle, worse)
+
+
+def test_if_none_meets_it_the_least_flown_nutation_whatever_the_cost() -> None:
+    one = judged("one", 0.7, propellant=0.1, asked=HALF_A_DEGREE)
+    two = judged("two", 0.6, propellant=9.0, asked=HALF_A_DEGREE)
+    assert chosen(one, two) == "two"
+    assert warned(one, two).startswith("no plan meets the requirement. two leaves 0.6 deg of nutation (0.5 deg req")
+
+
+def test_if_none_meets_it_and_all_damp_the_nearest_to_the_requirement() -> None:
+    """Of two that leave no nutation but for rounding, rounding must not decide."""
+    far = judged("far", 1e-12, shift=3.5, propellant=0.1, asked=BOTH)
+    near = judged("near", 5e-12, shift=0.25, propellant=0.2, asked=BOTH)
+    assert chosen(far, near) == "near"
+    assert "near leaves 0.25 deg of shift of H (0.2 deg required)" in warned(far, near)
+
+
+def test_costs_within_a_thousandth_are_equal() -> None:
+    """12.6312 g against 12.6323 g: both print as 12.63 g, and one ends in half the time."""
+    late = judged("late", 0.0, shift=1.0, propellant=12.6312, end=28.0)
+    early = judged("early", 0.0, shift=1.0, propellant=12.6323, end=15.0)
+    assert chosen(late, early) == "early"
+    assert recommend([late, early]).ground is Ground.END
+    still = judged("still", 0.0, shift=0.5, propellant=12.6330, end=90.0)
+    assert chosen(late, early, still) == "still"
+    assert recommend([late, early, still]).ground is Ground.SHIFT
+    dearer = judged("dearer", 0.0, shift=0.0, propellant=12.6312 * 1.0011, end=1.0)
+    assert chosen(late, dearer) == "late"
+
+
+def test_where_a_propellant_is_not_known_the_impulse_decides() -> None:
+    plans = judged("a", 0.0, impulse=3.0, propellant=0.1), judged("b", 0.0, impulse=2.0)
+    assert chosen(*plans) == "b"
+    assert "least impulse of the 2 plans" in said(*plans)
+
+
+# --- the spin of the goal --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("spin", "meets"), [(3.0, True), (3.0029, True), (3.0031, False), (2.9969, False)])
+@pytest.mark.parametrize("asked", [None, HALF_A_DEGREE])
+def test_a_spin_is_part_of_the_requirement(asked: Requirement | None, spin: float, meets: bool) -> None:
+    one = judged("a", 0.0, asked=asked, goal=Goal(spin=3.0), spin=spin)
+    assert one.meets_requirement is meets
+    assert (one.standing is Standing.COMPLIES) == meets
+
+
+def test_a_plan_that_misses_the_spin_comes_after_one_that_does_not() -> None:
+    goal = Goal(spin=3.0)
+    cheap = judged("cheap", 0.0, propellant=0.1, goal=goal, spin=3.01)
+    assert chosen(cheap, judged("right", 0.0, propellant=0.2, goal=goal)) == "right"
+    assert "the spin at 28.743 rpm (28.648 rpm required)" in warned(cheap)
+
+
+def test_a_scheme_that_cannot_set_the_spin_says_so() -> None:
+    body = replace(spinner(channels=cross(20.0)), goal=Goal(spin=3.3))
+    compared = compare(body, (*schemes.CLASSIC, "half-cone"))
+    assert {one.feasible for one in compared.plans} == {False}
+    assert all("cannot set the spin" in (one.why or "") for one in compared.plans)
+    assert "optimal" in planning.usual(body)
+    assert planning.plan(body, "none").meets_requirement is False
+    kept = replace(body, goal=Goal(spin=3.0))
+    assert planning.plan(kept, "two-pulse").meets_requirement is True
+    assert planning.usual(kept) == schemes.CLASSIC
+
+
+def test_without_nutation_a_spin_to_set_is_something_to_do() -> None:
+    body = replace(spinner(degrees=0.0, channels=cross(20.0)), goal=Goal(spin=3.3))
+    assert not planning.plan(body, "four-pulse").feasible
+    assert planning.plan(replace(body, goal=Goal(spin=3.0)), "four-pulse").meets_requirement is True
+
+
+# --- keeping H -------------------------------------------------------------------------------------------------------
+
+
+def test_a_plan_that_keeps_h_for_little_more_is_mentioned() -> None:
+    cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
+    assert recommend([cheap, judged("still", 0.0, shift=0.35, propellant=13.1)]).steadier is not None
+    for shift, propellant in ((0.37, 13.1), (0.35, 13.3)):
+        assert recommend([cheap, judged("still", 0.0, shift=shift, propellant=propellant)]).steadier is None
+    compared = Comparison(cheap.spacecraft, (cheap, judged("still", 0.0, shift=0.01, propellant=12.8)))
+    assert verdicts.hints(compared) == (
+        "still shifts H by 0.01 deg instead of 1.8 deg, for 800 g more propellant (6.7 %).",
+    )
+
+
+def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:
+    cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
+    assert recommend([cheap, judged("idle", 4.0, shift=0.0, propellant=12.5)]).steadier is None
+    wandering = judged("cheap", 0.0, shift=0.11, propellant=12.0, goal=POINTING)
+    pointing = judged("still", 0.0, shift=0.0, propellant=12.5, goal=POINTING)
+    assert recommend([wandering, pointing]).steadier is None  # with a target H shall not stay
+
+
+# --- the words -------------------------------------------------------------------------------------------------------
+
+
+def test_reasons_say_what_decided() -> None:
+    damped, other = judged("a", 0.0, propellant=0.1), judged("b", 0.0, propellant=0.2)
+    assert said(damped) == "the only plan that damps"
+    assert said(judged("a", 0.1, asked=HALF_A_DEGREE), INFEASIBLE) == "the only plan that meets the requirement"
+    assert said(damped, other) == "least propellant of the 2 plans that damp"
+    near, nearer = judged("a", 0.0, goal=POINTING), judged("b", 0.0, impulse=2.0, goal=POINTING)
+    assert said(near, nearer) == "least impulse of the 2 plans that reach the target"
+    assert said(judged("a", 0.0, shift=1.0), judged("b", 0.0)).endswith("within 0.1 %; of these least shift of H")
+    assert said(judged("a", 0.0), judged("b", 0.0, end=2.0)).endswith("within 0.1 %; of these it ends first")
+    assert said(judged("a", 3.0), judged("b", 4.0)) == "leaves least nutation of the 2 feasible plans"
+    assert said(judged("a", 3.0), INFEASIBLE) == "the only feasible plan"
+
+
+def test_a_plan_that_complies_needs_no_warning() -> None:
+    assert warned(judged("a", 0.0)) == ""
+    assert warned(judged("a", 0.4, asked=HALF_A_DEGREE)) == ""
+
+
+def test_the_warning_says_how_far_the_pulses_come() -> None:
+    weak = spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0))
+    compared = compare(weak, ("four-pulse",))
+    (text,) = verdicts.warnings(compared)
+    made = compared.plans[0]
+    assert made.obstacle is Obstacle.LIMITS
+    assert text.startswith("no plan damps the nutation. four-pulse leaves ")
+    assert "(0.05 deg would count as damped)" in text
+    assert f"Its {len(made.pulses)} pulses, each as long as max_on_time allows, give " in text
+    assert "where damping takes 21 N m s" in text
+    assert "the horizon is 30 s" in text
+    assert "--scheme optimal may find more" in text
+
+
+@pytest.mark.parametrize(
+    ("limits", "disturbances", "planned", "obstacle", "text"),
+    [
+        (Limits(max_pulses=1), (), False, Obstacle.MAX_PULSES, "limits.max_pulses = 1 allows no more pulses."),
+        (Limits(), (Disturbance(0.5 + 0j),), False, Obstacle.UNPLANNED_DISTURBANCES, "--with-disturbances plans with"),
+        (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "Under the disturbances a tilt of 0."),
+        (Limits(tick=0.3), (), False, Obstacle.RESOLUTION, "limits.tick and the shortest on-times allow no less."),
+    ],
+)
+def test_the_warning_names_what_stands_in_the_way(
+    limits: Limits, disturbances: tuple[Disturbance, ...], planned: bool, obstacle: Obstacle, text: str
+) -> None:
+    body = spinner(channels=cross(8.0, max_on_time=0.6), limits=limits)
+    options = schemes.Options(with_disturbances=planned)
+    compared = compare(replace(body, disturbances=disturbances), ("four-pulse",), options)
+    assert compared.plans[0].obstacle is obstacle
+    assert text in verdicts.warnings(compared)[0]
+
+
+def test_the_parts_that_are_missed() -> None:
+    one = judged("a", 0.6, shift=0.3, asked=BOTH, goal=Goal(spin=3.0), spin=4.0)
+    assert [bound.part for bound in one.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
+    assert one.severity == pytest.approx(1.0 / 0.003)
+    assert Plan(one.spacecraft, "x", None, "why").severity == math.inf
+
+
+def test_the_severity_of_many_is_that_of_each() -> None:
+    body = replace(spinner(requirement=BOTH), goal=Goal(spin=3.0))
+    generator = np.random.default_rng(1)
+    nutation, aim = generator.uniform(0.0, 0.02, (2, 50))
+    spin = 3.0 + generator.normal(size=50) * 0.003
+    found = compliance.severity(body, compliance.Left(nutation, aim, spin))
+    for case in range(50):
+        alone = compliance.severity(body, compliance.Left(nutation[case], aim[case], spin[case]))
+        assert found[case] == alone
+        within = nutation[case] <= math.radians(0.5) and aim[case] <= math.radians(0.2)
+        assert (alone <= 1.0) == (within and abs(spin[case] / 3.0 - 1.0) <= 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("share", "required", "text"),
+    [
+        (0.9991, 0.997, "met: 99.9 % of cases comply (99.7 % required)"),
+        (0.8562, 0.997, "NOT met: 85.6 % of cases comply (99.7 % required)"),
+        (0.99696, 0.997, "NOT met: 99.696 % of cases comply (99.7 % required)"),
+        (0.99704, 0.997, "met: 99.704 % of cases comply (99.7 % required)"),
+        (0.997, 0.997, "met: 99.7 % of cases comply (99.7 % required)"),
+        (0.99999, 1e-9, "met: 99.999 % of cases comply (1e-07 % required)"),
+        (0.99996, 0.9973, "met: 99.996 % of cases comply (99.73 % required)"),
+        (1.0, 0.997, "met: 100.0 % of cases comply (99.7 % required)"),
+        (0.0, 0.5, "NOT met: 0.0 % of cases comply (50 % required)"),
+        (0.00004, 0.5, "NOT met: 0.004 % of cases comply (50 % required)"),
+        (0.9999999, 0.999999, "met: 99.99999 % of cases comply (99.9999 % required)"),
+    ],
+)
+def test_a_share_is_never_rounded_to_what_it_is_not(share: float, required: float, text: str) -> None:
+    assert verdicts.cases_verdict(share, required) == text
+
+
+# --- a scheme with a bug ---------------------------------------------------------------------------------------------
+
+
+def test_a_bug_of_one_scheme_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    from nutdamp.schemes import two_pulse
+
+    def broken(*_: object) -> Schedule:
+        raise ZeroDivisionError("float division by zero")
+
+    body = spinner(channels=cross(20.0))
+    whole = compare(body, schemes.CLASSIC)
+    monkeypatch.setattr(two_pulse, "schedule", broken)
+    compared = compare(body, schemes.CLASSIC)
+    (failed,) = compared.failed
+    assert failed.scheme == "two-pulse"
+    assert failed.why == "internal error, please report: ZeroDivisionError"
+    assert isinstance(failed.failure, ZeroDivisionError)
+    for one, other in zip(compared.plans, whole.plans, strict=True):
+        assert one.scheme == "two-pulse" or one.pulses.total_impulse == other.pulses.total_impulse
+    assert compared.recommended is not None
+
+
+def test_a_bug_that_shows_when_the_plan_is_judged_counts_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> object:
+        raise IndexError("list index out of range")
+
+    monkeypatch.setattr(flight, "momentum_gained", broken)
+    jet = channel("T", 0.0, 8.0, 0.0, isp=220.0, thrust=10.0, force=(10.0, 0.0, 0.0))
+    compared = compare(spinner(channels=(jet,), mass=100.0), ("one-pulse",))
+    assert [one.why for one in compared.failed] == ["internal error, please report: IndexError"]
+    assert compared.recommended is None
+
+
+def test_what_a_user_can_cure_is_no_bug() -> None:
+    with pytest.raises(KeyError):
+        compare(spinner(), ("two-pulse", "five-pulse"))
