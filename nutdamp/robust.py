@@ -139,13 +139,14 @@ def compare(
     trials: Sequence[Attempt],
     watch: Callable[[int], None] = lambda _: None,
     *,
+    samples: int = SAMPLES,
     impulses: bool = False,
     force: bool = False,
 ) -> RobustComparison:
     """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``watch`` is told how many trials are done. ``impulses``: in closed form. Raises BadRequest for a spacecraft without
-    dispersions, and for closed forms that err by too much unless ``force``.
+    ``samples`` cases; ``watch`` is told how many trials are done. ``impulses``: in closed form. Raises BadRequest for a
+    spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
     """
     body = comparison.spacecraft
     asked = body.requirement
@@ -160,9 +161,9 @@ def compare(
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                found[kind] = _dispersed(own, variant, probability, impulses=impulses, force=force)
+                found[kind] = _dispersed(own, variant, probability, samples, impulses=impulses, force=force)
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    equals = _equals(list(found.values()))
+    equals = _equals(list(found.values()), samples)
     chosen, ground = None, None
     if equals:
         best, ground = cheapest([one.plan for one in equals])
@@ -176,7 +177,7 @@ def compare(
         len(equals),
         by_propellant([one.plan for one in equals]),
         probability,
-        SAMPLES,
+        samples,
         SEED,
         not impulses,
     )
@@ -213,12 +214,12 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, planning.attempt(body, scheme, options))]
 
 
-def _dispersed(plan: Plan, variant: str, probability: float, *, impulses: bool, force: bool) -> Candidate:
+def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, impulses: bool, force: bool) -> Candidate:
     """How a plan fares in dispersed cases."""
     study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
     if impulses and not force:
         check_impulses(study)
-    results = run(Results(study, SAMPLES), threads=threads_here())
+    results = run(Results(study, samples), threads=threads_here())
     ends = []
     aim, _ = aim_output(plan.spacecraft)
     for output in ("nutation", aim):
@@ -228,12 +229,12 @@ def _dispersed(plan: Plan, variant: str, probability: float, *, impulses: bool, 
     return Candidate(plan, variant, ends[0], ends[1], results.met_fraction)
 
 
-def _equals(candidates: Sequence[Candidate]) -> list[Candidate]:
+def _equals(candidates: Sequence[Candidate], samples: int) -> list[Candidate]:
     """The candidates that are as good as the best, but for what the sampling may make of them."""
     if not candidates:
         return []
     best = min(candidates, key=lambda one: one.rank)
     if best.met is None:
         return [one for one in candidates if one.rank <= AS_GOOD * best.rank]
-    low, _ = binomial_interval(round(best.met * SAMPLES), SAMPLES, CONFIDENCE)
+    low, _ = binomial_interval(round(best.met * samples), samples, CONFIDENCE)
     return [one for one in candidates if one.met is not None and one.met >= low]

@@ -21,6 +21,9 @@ from nutdamp.schemes import CLASSIC, four_pulse
 from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
 from nutdamp.tolerances import Dispersions, Tolerance
 
+SAMPLES = 2_048
+"""Cases of each plan: enough for what is tested here."""
+
 EXACT = Dispersions(A=Tolerance("normal", 0.002, relative=True))
 """Dispersions that leave everything but A exactly known, and that nearly."""
 
@@ -46,7 +49,7 @@ def dispersed(
 
 def planned(body: Spacecraft, names: tuple[str, ...] = CLASSIC) -> robust.RobustComparison:
     compared = planning.compare(body, names)
-    return robust.compare(compared, robust.attempts(compared))
+    return robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
 
 
 def test_a_thruster_that_cannot_be_trusted_is_left_out() -> None:
@@ -116,7 +119,7 @@ def test_variants_are_other_alignments_later_starts_and_fewer_channels() -> None
 def test_how_far_it_is_can_be_watched() -> None:
     compared = planning.compare(dispersed(EXACT), ("four-pulse",))
     trials, told = robust.attempts(compared), list[int]()
-    robust.compare(compared, trials, told.append)
+    robust.compare(compared, trials, told.append, samples=SAMPLES)
     assert told == list(range(len(trials)))
 
 
@@ -154,13 +157,13 @@ def test_each_share_is_that_of_the_real_widths() -> None:
     """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
     body = dispersed(Dispersions(A=normal(0.002)), Requirement(None, math.radians(0.7)))
     compared = planning.compare(body, ("four-pulse",))
-    found = robust.compare(compared, robust.attempts(compared))
+    found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
     for one in found.candidates:
         results = run(Results(study_of(body, one.plan.pulses), found.samples))
         assert one.met == results.met_fraction
     with pytest.raises(BadRequest, match="errs by up to"):
-        robust.compare(compared, robust.attempts(compared), impulses=True)
-    forced = robust.compare(compared, robust.attempts(compared), impulses=True, force=True)
+        robust.compare(compared, robust.attempts(compared), samples=SAMPLES, impulses=True)
+    forced = robust.compare(compared, robust.attempts(compared), samples=SAMPLES, impulses=True, force=True)
     assert (forced.candidates[0].met, found.candidates[0].met) == (0.0, 1.0)
 
 
@@ -215,4 +218,4 @@ def test_nothing_feasible() -> None:
 def test_without_dispersions_there_is_nothing_to_go_by() -> None:
     compared = planning.compare(replace(dispersed(EXACT), dispersions=None), ("four-pulse",))
     with pytest.raises(BadRequest, match="no dispersions"):
-        robust.compare(compared, robust.attempts(compared))
+        robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
