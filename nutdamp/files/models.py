@@ -159,7 +159,7 @@ class SteerableSection(Section):
     """A torquer for any transverse axis; body-fixed during one pulse."""
 
     torque: Torque | None = Field(
-        default=None, description="Its torque, N m; left out: an ideal impulse without width.", examples=["20 N m"]
+        default=None, description="Torque, N m; without it ideal impulses of no duration.", examples=["20 N m"]
     )
     isp: PositiveTime | None = Field(
         default=None, description="Specific impulse, s, for the propellant.", examples=["220 s"]
@@ -186,7 +186,7 @@ class RequirementSection(Section):
 
 
 class GoalSection(Section):
-    """Where the motion is to end; without it the angular momentum stays where it is, and the spin as it comes."""
+    """Where the motion is to end; without it the angular momentum stays where it is, and the spin may change."""
 
     tilt: Tilt | None = Field(
         default=None,
@@ -195,14 +195,17 @@ class GoalSection(Section):
     )
     azimuth: Angle | None = Field(
         default=None,
-        description="Its direction about it, rad, from the side to which the spin axis leans at t = 0.",
+        description="Azimuth of the target axis about the angular momentum, rad, from the side to which the spin axis "
+        "leans at t = 0.",
         examples=["45 deg"],
     )
     right_ascension: Angle | None = Field(
-        default=None, description="Of the target axis in the attitude's frame, rad.", examples=["83.6 deg"]
+        default=None,
+        description="Right ascension of the target axis in the attitude's frame, rad.",
+        examples=["83.6 deg"],
     )
     declination: Declination | None = Field(
-        default=None, description="Of the target axis in the attitude's frame, rad.", examples=["22 deg"]
+        default=None, description="Declination of the target axis in the attitude's frame, rad.", examples=["22 deg"]
     )
     spin: Rate | None = Field(
         default=None, description="Spin rate about axis 3 at the end, rad/s, signed.", examples=["31 rpm"]
@@ -210,12 +213,12 @@ class GoalSection(Section):
 
 
 class LimitsSection(Section):
-    """What every schedule keeps."""
+    """What every schedule respects."""
 
     horizon: PositiveTime | None = Field(
         default=None, description="End of the planning time, s; default: 20 nutation periods.", examples=["120 s"]
     )
-    earliest: Time = Field(default=0.0, description="No pulse begins before, s; default 0.", examples=["5 s"])
+    earliest: Time = Field(default=0.0, description="Earliest start of a pulse, s; default 0.", examples=["5 s"])
     gap: Time = Field(default=0.0, description="Least time between two pulses, s; default 0.", examples=["0.5 s"])
     tick: PositiveTime | None = Field(
         default=None, description="Resolution of commanded starts and on-times, s; default: none.", examples=["1 ms"]
@@ -238,7 +241,7 @@ _KINDS: list[Any] = [
 
 
 class DisturbanceSection(Section):
-    """A torque that nobody commands, in the axes of the file."""
+    """A disturbance torque, in the axes of the file."""
 
     model_config = ConfigDict(json_schema_extra={"oneOf": _KINDS})
 
@@ -323,7 +326,7 @@ class SpacecraftFile(Section):
     )
     disturbances: list[DisturbanceSection] = Field(
         default=[],
-        description="Torques that nobody commands.",
+        description="Disturbance torques.",
         examples=[[{"name": "leak", "torque": ["20 mN m", 0, 0]}]],
     )
     dissipation: DissipationSection | None = Field(
@@ -335,14 +338,16 @@ class SpacecraftFile(Section):
         default=None, description="What a plan must reach.", examples=[{"nutation": "0.5 deg"}]
     )
     limits: LimitsSection | None = Field(
-        default=None, description="Limits that every schedule keeps.", examples=[{"horizon": "120 s"}]
+        default=None, description="Limits that every schedule respects.", examples=[{"horizon": "120 s"}]
     )
     goal: GoalSection | None = Field(
-        default=None, description="Where axis and spin are to end.", examples=[{"tilt": "10 deg", "azimuth": "45 deg"}]
+        default=None,
+        description="Where the spin axis and the spin are to end.",
+        examples=[{"tilt": "10 deg", "azimuth": "45 deg"}],
     )
     dispersions: DispersionsSection | None = Field(
         default=None,
-        description="How far the truth may be off what the file says.",
+        description="How far the real spacecraft may be off what the file says.",
         examples=[{"A": {"normal": "2 %"}}],
     )
 
