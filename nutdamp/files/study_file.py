@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from nutdamp import __version__
-from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS
 from nutdamp.dispersion.statistics import Sketch
-from nutdamp.dispersion.study import EARLY, Results, Study
+from nutdamp.dispersion.study import EARLY, KEPT_WORST, Results, Study
 from nutdamp.errors import BadRequest, CannotRead
 from nutdamp.files.output import whole_file
 
 ANOTHER = "it belongs to another study: spacecraft, schedule, dispersions, --seed, --flown and nutdamp must be the same"
+
+DAMAGED = "it is no file that --resume has written, or is damaged"
 
 
 def save_results(path: str, results: Results) -> None:
     """Keep what is done of a study, whole or not at all. Raises CannotWrite."""
     study, done = results.study, results.done
     arrays: dict[str, Any] = {
-        "made_by": np.array(f"nutdamp {__version__}"),
+        "made_by": np.array(_made_by()),
         "fingerprint": np.array(study.fingerprint),
         "counts": np.array([done, results.redrawn, results.met], dtype=np.int64),
         "worst_cases": results.worst.cases,
@@ -49,17 +50,46 @@ def load_results(path: str, study: Study, asked: int) -> Results:
     try:
         with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in kept.files}
-        if str(arrays["fingerprint"]) != study.fingerprint or str(arrays["made_by"]) != f"nutdamp {__version__}":
-            raise BadRequest(f"cannot resume from {path}: {ANOTHER}")
-        results = _results(study, arrays)
-    except OSError as reason:
-        raise CannotRead(path, reason.strerror or str(reason)) from reason
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as reason:
-        raise CannotRead(path, "it is no file that --resume has written") from reason
+        belongs = str(arrays["fingerprint"]) == study.fingerprint and str(arrays["made_by"]) == _made_by()
+        if belongs:
+            _check(arrays)
+    except Exception as reason:  # a damaged archive makes zipfile, zlib and numpy fail in many ways
+        if isinstance(reason, OSError) and reason.filename is not None:  # it was not even opened
+            raise CannotRead(path, str(reason.strerror)) from reason
+        raise CannotRead(path, DAMAGED) from reason
+    if not belongs:
+        raise BadRequest(f"cannot resume from {path}: {ANOTHER}")
     try:
-        return results.extended(asked)
+        return _results(study, arrays).extended(asked)
     except BadRequest as wrong:
         raise BadRequest(f"cannot resume from {path}: {wrong}") from wrong
+
+
+def _made_by() -> str:
+    return f"nutdamp {__version__}"
+
+
+def _check(arrays: dict[str, Any]) -> None:
+    """Raises ValueError or KeyError for arrays of a study that `save_results` does not write."""
+    done, redrawn, met = arrays["counts"].tolist()
+    worst, early, outputs = min(done, KEPT_WORST), min(done, EARLY), len(OUTPUTS)
+    forms: dict[str, tuple[type, tuple[int, ...]]] = {
+        "counts": (np.int64, (3,)),
+        "worst_cases": (np.int64, (worst,)),
+        "worst_severities": (np.float64, (worst,)),
+        "early": (np.float64, (ROWS, early)),
+    }
+    if "values" in arrays:
+        forms["values"] = (np.float64, (outputs, done))
+    else:
+        forms |= {"sketches": (np.int64, (outputs, len(Sketch().counts))), "extremes": (np.float64, (outputs, 2))}
+    for name, (kind, shape) in forms.items():
+        if arrays[name].dtype != kind or arrays[name].shape != shape:
+            raise ValueError(f"{name} is {arrays[name].dtype} {arrays[name].shape}, expected {kind} {shape}")
+    cases, counted = arrays["worst_cases"], arrays.get("sketches", np.full((1, 1), done))
+    possible = done > 0 and redrawn >= 0 and 0 <= met <= done and np.all((cases >= 0) & (cases < done))
+    if not (possible and np.all(counted >= 0) and np.all(counted.sum(axis=1) == done)):
+        raise ValueError("counts that no study has")
 
 
 def _results(study: Study, arrays: dict[str, Any]) -> Results:

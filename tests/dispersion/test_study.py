@@ -108,6 +108,68 @@ def test_what_is_no_study_file_is_refused(tmp_path: Path, content: bytes) -> Non
         load_results(str(path), a_study(), 10)
 
 
+def damaged(whole: bytes, random: np.random.Generator) -> bytes:
+    """The content of a file after a slip of hand, a bad disk or a full one."""
+    place, length = (int(number) for number in random.integers(0, len(whole), 2))
+    match int(random.integers(5)):
+        case 0:
+            return whole[:place]
+        case 1:
+            return whole[:place] + bytes(length) + whole[place + length :]
+        case 2:
+            return whole[:place] + random.bytes(4) + whole[place + 4 :]
+        case 3:
+            return whole[:place] + whole[place + length % 40 :]
+        case _:
+            return whole[:place] + bytes([whole[place] ^ 1 << int(random.integers(8))]) + whole[place + 1 :]
+
+
+def test_a_damaged_study_file_is_read_as_it_was_or_refused(tmp_path: Path) -> None:
+    study, path = a_study(), tmp_path / "study.npz"
+    save_results(str(path), run(Results(study, 100)))
+    whole, random, messages = path.read_bytes(), np.random.default_rng(5), []
+    for _ in range(1_000):
+        path.write_bytes(damaged(whole, random))
+        try:
+            same(run(Results(study, 100)), load_results(str(path), study, 100))
+        except CannotRead as wrong:
+            messages.append(str(wrong))
+    assert len(messages) > 500
+    assert set(messages) == {f"cannot read {path}: it is no file that --resume has written, or is damaged"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"counts": np.array([100, 0])},
+        {"counts": np.array([100.0, 0.0, 0.0])},
+        {"counts": np.array([100, 0, 101])},
+        {"counts": np.array([-1, 0, 0])},
+        {"counts": np.array([0, 0, 0])},
+        {"counts": np.array(["a", "b", "c"])},
+        {"worst_cases": np.array([100] * 100)},
+        {"worst_severities": np.zeros(3)},
+        {"early": np.zeros((10, 50))},
+        {"early": np.zeros(10)},
+        {"values": np.zeros((5, 99))},
+        {"values": np.zeros((5, 100), dtype=complex)},
+        {"values": None},
+        {"values": None, "sketches": np.zeros((5, 7), dtype=np.int64), "extremes": np.zeros((5, 2))},
+        {"values": None, "sketches": np.zeros((5, 262_144), dtype=np.int64), "extremes": np.zeros((5, 2))},
+        {"fingerprint": None},
+    ],
+    ids=lambda change: ",".join(f"{key} {getattr(value, 'shape', '')}" for key, value in change.items()),
+)
+def test_arrays_that_no_study_writes_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
+    path = tmp_path / "study.npz"
+    save_results(str(path), run(Results(a_study(), 100)))
+    with np.load(path) as kept:
+        arrays = {name: kept[name] for name in kept.files}
+    np.savez(path, **{name: value for name, value in {**arrays, **change}.items() if value is not None})
+    with pytest.raises(CannotRead, match="it is no file that --resume has written, or is damaged"):
+        load_results(str(path), a_study(), 200)
+
+
 def test_beyond_what_is_kept_singly_all_is_counted(
     plain: Results, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
