@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import channel, cross, judged, spinner
+from cases_dir import case
 
 from nutdamp import compliance, flight, planning, schemes
 from nutdamp.compliance import Part
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Comparison, Obstacle, Plan, compare
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.report import verdicts
@@ -34,6 +36,9 @@ def chosen(*plans: Plan) -> str | None:
 
 def said(*plans: Plan) -> str:
     return verdicts.reason(Comparison(plans[0].spacecraft, plans))
+
+
+NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
 
 
 def warned(*plans: Plan) -> str:
@@ -156,6 +161,22 @@ def test_where_a_propellant_is_not_known_the_impulse_decides() -> None:
     assert "least impulse of the 2 plans" in said(*plans)
 
 
+@pytest.mark.parametrize("degrees", [8, 60])
+def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -> None:
+    body = read_spacecraft(NOTHING_DAMPS.replace("8 deg", f"{degrees} deg"), "nothing-damps.yaml")
+    compared = compare(body, schemes.CLASSIC)
+    left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
+    assert compared.recommended is not None
+    assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
+    assert verdicts.reason(compared) == "leaves least nutation of the 3 feasible plans"
+    (warning,) = verdicts.warnings(compared)
+    assert warning.startswith(
+        f"no plan damps the nutation. four-pulse leaves {math.degrees(left['four-pulse']):.4g} deg"
+    )
+    assert "each as long as max_on_time allows" in warning
+    assert "--scheme optimal" not in warning  # the pulses fill the horizon
+
+
 # --- the spin of the goal --------------------------------------------------------------------------------------------
 
 
@@ -243,10 +264,10 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     assert made.obstacle is Obstacle.LIMITS
     assert text.startswith("no plan damps the nutation. four-pulse leaves ")
     assert "(0.05 deg would count as damped)" in text
-    assert f"Its {len(made.pulses)} pulses, each as long as max_on_time allows, give " in text
-    assert "where damping takes 21 N m s" in text
-    assert "the horizon is 30 s" in text
-    assert "--scheme optimal may find more" in text
+    given = made.pulses.total_impulse
+    assert f"Its {len(made.pulses)} pulses give {given:.4g} N m s, each as long as max_on_time allows; " in text
+    assert "damping takes 21 N m s" in text
+    assert text.endswith(f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s.")
 
 
 @pytest.mark.parametrize(
@@ -268,6 +289,15 @@ def test_the_warning_names_what_stands_in_the_way(
     assert text in verdicts.warnings(compared)[0]
 
 
+def test_a_scheme_that_was_not_compared_is_named_where_it_may_help() -> None:
+    far = judged("far", 1e-12, shift=3.5, impulse=20.0, asked=BOTH)
+    firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
+    said = "--scheme optimal was not compared; it may reach more."
+    assert said in warned(firing)
+    assert said not in warned(far)  # without channels it cannot
+    assert said not in warned(firing, replace(INFEASIBLE, scheme="optimal"))
+
+
 def test_the_parts_that_are_missed() -> None:
     one = judged("a", 0.6, shift=0.3, asked=BOTH, goal=Goal(spin=3.0), spin=4.0)
     assert [bound.part for bound in one.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
@@ -281,11 +311,11 @@ def test_the_severity_of_many_is_that_of_each() -> None:
     nutation, aim = generator.uniform(0.0, 0.02, (2, 50))
     spin = 3.0 + generator.normal(size=50) * 0.003
     found = compliance.severity(body, compliance.Left(nutation, aim, spin))
-    for case in range(50):
-        alone = compliance.severity(body, compliance.Left(nutation[case], aim[case], spin[case]))
-        assert found[case] == alone
-        within = nutation[case] <= math.radians(0.5) and aim[case] <= math.radians(0.2)
-        assert (alone <= 1.0) == (within and abs(spin[case] / 3.0 - 1.0) <= 1e-3)
+    for row in range(50):
+        alone = compliance.severity(body, compliance.Left(nutation[row], aim[row], spin[row]))
+        assert found[row] == alone
+        within = nutation[row] <= math.radians(0.5) and aim[row] <= math.radians(0.2)
+        assert (alone <= 1.0) == (within and abs(spin[row] / 3.0 - 1.0) <= 1e-3)
 
 
 @pytest.mark.parametrize(

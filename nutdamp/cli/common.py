@@ -26,7 +26,7 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion", "sphere", "history", "timeline")
 """Pictures that ``--plot`` can draw, the default first."""
 
-DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far the truth may be off. For example:
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
 
 dispersions:
   A: {normal: 2 %}

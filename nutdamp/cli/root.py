@@ -14,7 +14,7 @@ COMMANDS = {
     "plan": "Plan pulse schedules that damp the nutation, and compare them.",
     "simulate": "Propagate a scheme or a schedule; cone angles and axis track.",
     "trade": "What an earlier end costs: a front of cheapest schedules.",
-    "disperse": "Fly many dispersed truths; percentiles, tolerance budget.",
+    "disperse": "Fly many dispersed cases; percentiles, tolerance budget.",
     "verify": "Fly a schedule by independent means; an error budget.",
     "report": "One page to hand on: HTML, Markdown or PDF.",
     "animate": "Film the body cone rolling on the space cone.",

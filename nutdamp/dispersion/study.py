@@ -41,6 +41,9 @@ CHUNK = 8_192
 STRIDE = many.BLOCK
 """Cases that are always flown together, as real widths need it; chunks are multiples of it."""
 
+PORTION = 2 * STRIDE
+"""Cases that a thread takes at once where they are flown through real widths; blocks are multiples of it."""
+
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
 
@@ -262,13 +265,18 @@ def run(
 
 
 class _Round:
-    """Some cases of a study, flown by several threads that take one block after the other."""
+    """Some cases of a study, flown by several threads that take one portion after the other.
+
+    A portion is a block of draws; where flying takes much longer than drawing a part of it, so that few cases too
+    are shared by the threads.
+    """
 
     def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
         self.severity = np.empty(last - first)
         self.chunk = max(chunk // STRIDE, 1) * STRIDE
-        self.blocks = range(first // BLOCK, math.ceil(last / BLOCK))
+        self.portion = PORTION if results.study.flown else BLOCK
+        self.portions = range(first // self.portion, math.ceil(last / self.portion))
         self.taken = 0
         self.finished = 0
         self.redrawn = 0
@@ -277,7 +285,8 @@ class _Round:
 
     def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
         """How many cases were flown, always the first ones, and how many draws were made again."""
-        workers = [threading.Thread(target=self._work, args=(stopped,)) for _ in range(min(threads, len(self.blocks)))]
+        count = min(threads, len(self.portions))
+        workers = [threading.Thread(target=self._work, args=(stopped,)) for _ in range(count)]
         for worker in workers:
             worker.start()
         try:
@@ -285,45 +294,55 @@ class _Round:
                 while worker.is_alive():
                     worker.join(0.1)
                     if worker.is_alive():
-                        watch(min(self.first + self.finished * BLOCK, self.last))
+                        watch(max(self._flown, self.first))
         except BaseException:
-            self.taken = len(self.blocks)  # nothing more is begun
+            self.taken = len(self.portions)  # nothing more is begun
             for worker in workers:
                 worker.join()
             raise
         if self.failures:
             raise self.failures[0]
-        return min(
-            self.last, self.blocks[0] * BLOCK + self.finished * BLOCK
-        ) - self.first if self.finished else 0, self.redrawn
+        return max(self._flown - self.first, 0), self.redrawn
+
+    @property
+    def _flown(self) -> int:
+        """Where the cases end that are flown; below ``first`` where none is."""
+        return min(self.last, (self.portions[0] + self.finished) * self.portion)
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
             source = self.results.study.source()
+            drawn, block = None, -1
             while not stopped():
                 with self.lock:
-                    if self.taken >= len(self.blocks):
+                    if self.taken >= len(self.portions):
                         return
-                    block = self.blocks[self.taken]
+                    portion = self.portions[self.taken]
                     self.taken += 1
-                redrawn = self._block(source, block)
+                begin = max(self.first, portion * self.portion)
+                end = min(self.last, (portion + 1) * self.portion)
+                if drawn is None or begin // BLOCK != block:
+                    block = begin // BLOCK
+                    drawn = source.block(block)
+                redrawn = self._fly(drawn, block * BLOCK, begin, end)
                 with self.lock:
                     self.finished += 1
                     self.redrawn += redrawn
         except BaseException as failure:  # handed to the thread that waits
             with self.lock:
                 self.failures.append(failure)
-                self.taken = len(self.blocks)
+                self.taken = len(self.portions)
 
-    def _block(self, source: Source, block: int) -> int:
-        """Fly the part of a block that belongs to this round; returns how often its cases were drawn again."""
+    def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
+        """Fly the cases from ``begin`` to ``end`` of the block that starts at ``start``; returns how often they were
+        drawn again.
+        """
         study, early = self.results.study, self.results.early
-        draws, redrawn = source.block(block)
-        begin, end = max(self.first, block * BLOCK), min(self.last, (block + 1) * BLOCK)
+        draws, redrawn = drawn
         # Whole strides are flown, even where fewer cases are wanted: what flies them may let one depend on its stride.
         for low in range(begin - begin % STRIDE, end, self.chunk):
             high = min(low + self.chunk, end + -end % STRIDE)
-            rows = slice(low - block * BLOCK, high - block * BLOCK)
+            rows = slice(low - start, high - start)
             ends = study.flies(study.model.truth({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
             wanted = slice(max(low, begin), min(high, end))
             inner = slice(wanted.start - low, wanted.stop - low)
@@ -336,4 +355,4 @@ class _Round:
                 outcome = np.empty((ROWS, high - low))
                 vectors(study.model, ends, outcome)
                 early[:, wanted] = outcome[:, inner]
-        return int(np.count_nonzero((redrawn >= begin - block * BLOCK) & (redrawn < end - block * BLOCK)))
+        return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))

@@ -282,16 +282,18 @@ class _Series:
         self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in bodies.forcing.turning]
         self.sink = None if bodies.forcing.growth == 0.0 else _Sink(bodies, acceleration, rates, step)
+        # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
+        self.even_spin = not self.coupled and self.sink is None
         self.order = 0
 
     def converges(self) -> bool:
         """Take in as many orders as it needs; whether that is no more than there may be."""
         scale = REMAINDER * max(1.0, float(np.max(np.abs(self.rates[0] * self.step))))
-        while self.order < LARGEST_ORDER:
+        small = 0
+        while self.order < LARGEST_ORDER and small < 2:
             self._next()
-            if self.order >= 4 and all(self._size(order) < scale for order in (self.order, self.order - 1)):
-                return True
-        return False
+            small = small + 1 if self.order >= 3 and self._size(self.order) < scale else 0
+        return small == 2
 
     def end(self) -> tuple[Array, Array]:
         """Rates (3, n) and unit quaternions (4, n) at the end of the step."""
@@ -310,7 +312,12 @@ class _Series:
         scale = self.step / (k + 1)
         following = rates[k + 1, :3]
         parts = 3 if self.coupled else 2
-        products = np.einsum("kcn,kcn->cn", rates[: k + 1, 1 : 1 + parts], rates[k::-1, 2 : 2 + parts])
+        spins = min(k + 1, 2) if self.even_spin else k + 1
+        if self.even_spin:
+            latest = rates[k - spins + 1 : k + 1, 1::-1]  # ω2 and ω1
+            products = np.einsum("kn,kcn->cn", rates[spins - 1 :: -1, 2], latest)
+        else:
+            products = np.einsum("kcn,kcn->cn", rates[: k + 1, 1 : 1 + parts], rates[k::-1, 2 : 2 + parts])
         np.multiply(self.coupling[:parts], products, out=following[:parts])
         following[parts:] = 0.0
         if k == 0:
@@ -325,9 +332,8 @@ class _Series:
             speeds = rates[: k + 1, :3] + self.sink.slip[: k + 1]
         following *= scale
         rates[k + 1, 3:] = following[:2]
-        by_first, by_second, by_third = (
-            np.einsum("kcn,kn->cn", turns[: k + 1], speeds[k::-1, axis]) for axis in range(3)
-        )
+        by_first, by_second = (np.einsum("kcn,kn->cn", turns[: k + 1], speeds[k::-1, axis]) for axis in (0, 1))
+        by_third = np.einsum("kcn,kn->cn", turns[k - spins + 1 : k + 1], speeds[spins - 1 :: -1, 2])
         half = 0.5 * scale
         turns[k + 1, 0] = half * -(by_first[1] + by_second[2] + by_third[3])
         turns[k + 1, 1] = half * (by_first[0] + by_third[2] - by_second[3])

@@ -114,26 +114,35 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
         }[plan.obstacle]
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
-    untried = {one.scheme for one in compared.plans} & {"optimal"} == set()
-    if untried and body.channels and parts - {Part.SPIN}:
-        yield "The scheme optimal was not compared: --scheme optimal may find more."
+    tried = {one.scheme for one in compared.plans}
+    if "optimal" not in tried and body.channels and parts != {Part.SPIN} and not (_full(plan) and _to_the_end(plan)):
+        yield "--scheme optimal was not compared; it may reach more."
 
 
 def _spent(plan: Plan) -> str:
     """How much of what damping takes the pulses give, and what ends them."""
     body, pulses = plan.spacecraft, plan.pulses
-    count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
-    longest = {channel.name: channel.max_on_time for channel in body.channels}
-    full = bool(len(pulses)) and all(
-        pulse.on_time >= longest.get(pulse.channel, math.inf) * (1.0 - 1e-9) for pulse in pulses
-    )
-    width = ", each as long as max_on_time allows," if full else ""
-    blackout = " and blackout windows" if body.limits.blackout else ""
+    count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
+    width = ", each as long as max_on_time allows" if _full(plan) else ""
+    blackout = ", with blackout windows" if body.limits.blackout else ""
     return (
-        f"Its {count}{width} give {quantity(pulses.total_impulse, 'N m s')} where damping takes "
-        f"{quantity(body.least_impulse, 'N m s')}; the last ends at {moment(pulses.end)}, the horizon is "
-        f"{duration(body.horizon)}: on-times, horizon{blackout} allow no more."
+        f"Its {count} {quantity(pulses.total_impulse, 'N m s')}{width}; damping takes "
+        f"{quantity(body.least_impulse, 'N m s')}. The last one ends at {moment(pulses.end)} of a horizon of "
+        f"{duration(body.horizon)}{blackout}."
     )
+
+
+def _full(plan: Plan) -> bool:
+    """Whether every pulse is as long as its channel may be on."""
+    longest = {channel.name: channel.max_on_time for channel in plan.spacecraft.channels}
+    return all(pulse.on_time >= longest.get(pulse.channel, math.inf) * (1.0 - 1e-9) for pulse in plan.pulses)
+
+
+def _to_the_end(plan: Plan) -> bool:
+    """Whether less than one nutation period is left of the horizon after the last pulse."""
+    body = plan.spacecraft
+    period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
+    return body.horizon - plan.pulses.end < period
 
 
 def hints(compared: Comparison) -> tuple[str, ...]:
