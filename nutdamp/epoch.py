@@ -71,8 +71,13 @@ class Epoch:
 
     @property
     def text(self) -> str:
-        """``2026-03-01T12:00:00.000000000``, rounded to `DIGITS`; within a leap second the seconds are 60."""
+        """``2026-03-01T12:00:00.000000000``, rounded to `DIGITS`; within a leap second the seconds are 60.
+
+        Raises ValueError after the year 9999, where no such text can be written.
+        """
         day, second, part = self._calendar()
+        if day > datetime.date.max.toordinal():
+            raise ValueError("the date lies after the year 9999")
         date = datetime.date.fromordinal(day).isoformat()
         clock = min(second // 60, 1439)
         return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{DIGITS}d}"

@@ -149,7 +149,8 @@ def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
     if node is None or not isinstance(node.value, dict):
         return
     given = [key for key in node.value if key in KINDS]
-    if not given and (node.value or entry.path[1] not in BY_THRUSTER):
+    said = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
+    if not given and not said:
         yield Finding(entry.path, f"says no distribution; give {_example(entry.kind)}")
     for key in given[1:]:
         yield Finding((*entry.path, key), f"stands beside {given[0]}; keep one of the two", True)

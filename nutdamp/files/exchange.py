@@ -47,6 +47,10 @@ def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
     body = plan.spacecraft
     place = reference(body)
     end = plan.pulses.end + body.inertial_period if until is None else until
+    last = end if form in TRACKS else plan.pulses.end
+    if body.utc(last) is None:
+        cure = "an earlier --until" if form in TRACKS else "a shorter horizon"
+        raise BadRequest(f"the last date, {last:.4g} s after attitude.epoch, lies after the year 9999; {cure} helps")
     if form == "stk":
         from nutdamp.files.stk import stk_attitude
 

@@ -80,6 +80,27 @@ def test_without_epoch_and_frame_the_lines_to_add_are_shown(run: Run, tmp_path: 
     assert run("export", "pasted.yaml", "--format", "aem", "--scheme", "one-pulse").returncode == 0
 
 
+@pytest.mark.parametrize("epoch", ["9999-12-31T23:59:59Z", "9999-12-31T23:59:59.5Z"])
+def test_dates_after_the_year_9999_are_refused_and_planned_without(run: Run, tmp_path: Path, epoch: str) -> None:
+    (tmp_path / "late.yaml").write_text(DATED.replace("2026-03-01T12:00:00Z", epoch))
+    for form in ("apm", "aem", "stk"):
+        done = run("export", "late.yaml", "--format", form, "--scheme", "two-pulse")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "lies after the year 9999" in done.stderr
+        assert done.stderr.count("\n") == 1
+    planned = run("plan", "late.yaml", "--scheme", "two-pulse", "--json", "-")
+    assert planned.returncode == 0
+    assert [pulse.get("utc") for pulse in json.loads(planned.stdout)["plans"][0]["pulses"]][1] is None
+    assert run("plan", "late.yaml", "--scheme", "two-pulse").returncode == 0
+
+
+def test_a_million_billion_seconds_have_no_date(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "far.yaml").write_text(DATED + "limits: {horizon: 1e15, earliest: 9e14}\n")
+    done = run("plan", "far.yaml", "--scheme", "one-pulse")
+    assert done.returncode in (0, 3)
+    assert done.stderr == ""
+
+
 def test_formats_without_an_epoch_need_none(run: Run) -> None:
     for form in ("basilisk", "json"):
         assert run("export", "--format", form, "--scheme", "two-pulse").returncode == 0
