@@ -11,6 +11,8 @@ from types import FrameType
 
 import click
 
+from nutdamp.cli.screen import say
+
 DONE = 0
 UNREADABLE = 1
 INTERNAL = 1
@@ -36,13 +38,15 @@ def run(group: click.Group) -> None:
     except click.exceptions.Exit as leave:
         status = leave.exit_code
     except click.ClickException as wrong:
-        wrong.show()
+        message = io.StringIO()
+        wrong.show(file=message)
+        say(message.getvalue().rstrip("\n"))
         status = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
+        say("interrupted")
         status = INTERRUPTED
     except Terminated:
-        click.echo("terminated", err=True)
+        say("terminated")
         status = TERMINATED
     except BrokenPipeError:
         # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
@@ -53,7 +57,7 @@ def run(group: click.Group) -> None:
         if wrong.filename is not None:
             raise
         _silence_stdout()
-        click.echo(f"nutdamp: cannot write standard output: {wrong.strerror or wrong}", err=True)
+        say(f"nutdamp: cannot write standard output: {wrong.strerror or wrong}")
         status = UNREADABLE
     except Exception as wrong:
         status = _explain(wrong)
@@ -102,5 +106,5 @@ def _explain(wrong: Exception) -> int:
     }
     if not isinstance(wrong, errors.NutdampError):
         raise wrong
-    click.echo(str(wrong) if isinstance(wrong, errors.FaultyFile) else f"nutdamp: {wrong}", err=True)
+    say(str(wrong) if isinstance(wrong, errors.FaultyFile) else f"nutdamp: {wrong}")
     return next(status for kind, status in statuses.items() if isinstance(wrong, kind))

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
-from nutdamp.cli.common import DEFAULT_FILE, Input, deliver, load, quiet_option, remarks, set_option, show
+from nutdamp.cli.common import DEFAULT_FILE, Input, deliver, load, quiet_option, remarks, set_option
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.screen import say, show
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +39,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.files.check_json import failed_json
 
-            click.echo(str(wrong), err=True)
+            say(str(wrong))
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
             reports.append(failed_json(name, wrong))
             continue
@@ -54,7 +55,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
         try:
             deliver([(json, json_text(check_json(reports)))])
         except CannotWrite as wrong:
-            click.echo(f"nutdamp: {wrong}", err=True)
+            say(f"nutdamp: {wrong}")
             failures.add(UNREADABLE)
     if failures:
         sys.exit(max(failures))

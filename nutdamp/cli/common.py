@@ -11,10 +11,11 @@ import click
 
 from nutdamp.cli.failures import debug_option, show_failures
 from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
+from nutdamp.cli.screen import say, show
 from nutdamp.schemes import LEAST, Options
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+    from rich.console import RenderableType
 
     from nutdamp.errors import CannotWrite
     from nutdamp.files.settings import Setting
@@ -327,7 +328,7 @@ def require_dispersions(body: Spacecraft) -> None:
 
 def remarks(quiet: bool) -> Callable[[str], None]:
     """Prints remarks on standard error, unless ``quiet``."""
-    return (lambda _: None) if quiet else (lambda text: click.echo(text, err=True))
+    return (lambda _: None) if quiet else say
 
 
 def expect_places(*paths: str | None) -> None:
@@ -358,24 +359,6 @@ def deliver(outputs: Sequence[Output], *screens: RenderableType, unsaved: Sequen
     for screen in screens:
         show(screen)
     for failure in failures[:-1]:
-        click.echo(f"nutdamp: {failure}", err=True)
+        say(f"nutdamp: {failure}")
     if failures:
         raise failures[-1]
-
-
-def show(renderable: RenderableType) -> None:
-    """Print a result on standard output; in a file or a pipe without the blanks that fill up lines."""
-    shown = console()
-    if shown.is_terminal:
-        shown.print(renderable)
-        return
-    with shown.capture() as captured:
-        shown.print(renderable)
-    click.echo("\n".join(line.rstrip() for line in captured.get().split("\n")), nl=False)
-
-
-def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded, names such as [red] or :rocket: left alone."""
-    from rich.console import Console
-
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False)

@@ -29,6 +29,7 @@ from nutdamp.cli.common import (
 from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.screen import say
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def command(
         screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst))
     deliver(outputs, *screens, unsaved=unsaved)
     if stopped_by is not None and results.done < results.asked:
-        click.echo(f"interrupted: {results.done} of {results.asked} cases are done", err=True)
+        say(f"interrupted: {results.done} of {results.asked} cases are done")
         sys.exit(128 + stopped_by)
     if results.meets_requirement is False:
         sys.exit(REQUIREMENT_MISSED)

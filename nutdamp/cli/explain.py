@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.common import show
+from nutdamp.cli.screen import show
 
 if TYPE_CHECKING:
     from nutdamp.guide.topic import Topic

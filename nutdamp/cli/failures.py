@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nutdamp.cli.screen import say
+
 if TYPE_CHECKING:
     from nutdamp.planning import Comparison
 
@@ -28,6 +30,6 @@ def show_failures(compared: Comparison) -> bool:
         if click.get_current_context().meta.get(DEBUG):
             import traceback
 
-            click.echo("".join(traceback.format_exception(plan.failure)), err=True, nl=False)
-        click.echo(f"nutdamp: {plan.scheme}: {plan.why} (--debug shows the traceback)", err=True)
+            say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
+        say(f"nutdamp: {plan.scheme}: {plan.why} (--debug shows the traceback)")
     return bool(compared.failed)

@@ -28,6 +28,7 @@ from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.screen import say
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def command(
         outputs.append((plot, figures.plan_picture(figure, chosen, plot)))
     for path in (csv, plot):
         if path is not None and chosen is None:
-            click.echo(f"{path} was not written: no plan is feasible", err=True)
+            say(f"{path} was not written: no plan is feasible")
     screens: list[RenderableType] = []
     if not silent and dispersed is not None:
         from nutdamp.report.robust_tables import robust_screen

@@ -23,6 +23,7 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.screen import say
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -76,5 +77,5 @@ def command(
     deliver(outputs, *screens)
     if not found.agree:
         others = " and ".join(found.disagreeing)
-        click.echo(f"nutdamp: the flown motion and {others} do not agree; please report this", err=True)
+        say(f"nutdamp: the flown motion and {others} do not agree; please report this")
         sys.exit(UNREADABLE)

@@ -17,6 +17,7 @@ from nutdamp.files.output import csv_text, number
 from nutdamp.flight import Flight
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
+from nutdamp.units import shown
 
 HEADER = (
     "pulse",
@@ -143,6 +144,9 @@ class _Reader:
         given = self.spacecraft.inertia.axes.T @ np.array(impulse, dtype=float)
         torque = None if on_time == 0.0 else given / on_time
         name = cells.get("channel", "") or STEERABLE
+        if not name.isprintable():
+            self._fault(line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected")
+            return None
         self._compare(line, cells, t, on_time, torque)
         force, propellant = self._means(line, name, torque, on_time, given)
         return line, Pulse(t, on_time, name, given, torque, force, propellant)

@@ -1,0 +1,60 @@
+"""What reaches the terminal: results on standard output, messages on standard error, no control characters in either.
+
+Names of files, channels or units come from elsewhere; on a terminal their control characters could clear the screen,
+change its title or pass for output of this program.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+
+LAYOUT = "\n\t"
+"""Characters that do not print and may pass."""
+
+
+def visible(text: str) -> str:
+    """``text`` with control characters, and others that do not print, as their escapes, such as ``\\x1b``."""
+    if text.isprintable():
+        return text
+    return "".join(char if char.isprintable() or char in LAYOUT else ascii(char)[1:-1] for char in text)
+
+
+def say(text: str) -> None:
+    """Print a message on standard error."""
+    click.echo(visible(text), err=True)
+
+
+def show(renderable: RenderableType) -> None:
+    """Print a result on standard output; in a file or a pipe without the blanks that fill up lines."""
+    shown, renderable = console(), _Visible(renderable)
+    if shown.is_terminal:
+        shown.print(renderable)
+        return
+    with shown.capture() as captured:
+        shown.print(renderable)
+    click.echo("\n".join(line.rstrip() for line in captured.get().split("\n")), nl=False)
+
+
+def console() -> Console:
+    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded, names such as [red] or :rocket: left alone."""
+    from rich.console import Console
+
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False)
+
+
+class _Visible:
+    """Something to print, with all its text made `visible`; the codes of colours stay."""
+
+    def __init__(self, renderable: RenderableType) -> None:
+        self.renderable = renderable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.renderable, options):
+            yield Segment(text if control else visible(text), style, control)
