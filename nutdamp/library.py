@@ -14,18 +14,17 @@ file; arrays with named fields carry the names and units of the CSV files.
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import arguments, planning
 from nutdamp import flight as flights
-from nutdamp import planning, schemes
 from nutdamp import spacecraft as craft
 from nutdamp.errors import BadRequest, Infeasible, printable
 from nutdamp.flight import Residual
@@ -158,7 +157,7 @@ class Flight:
         from nutdamp.files.output import write_whole
         from nutdamp.files.track_csv import track_csv
 
-        write_whole(fspath(path), track_csv(self.sampled, self.core.spacecraft.inertia))
+        write_whole(arguments.path("path", path), track_csv(self.sampled, self.core.spacecraft.inertia))
 
     def figure(self, name: str = "overview") -> Figure:
         """A matplotlib figure: ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``.
@@ -167,6 +166,7 @@ class Flight:
         """
         from nutdamp.report import figures
 
+        arguments.instance("name", name, str, "the name of a figure")
         try:
             return figures.named(name, self.core, self.sampled)
         except KeyError:
@@ -263,13 +263,10 @@ class Plan:
         """
         self._feasible_only()
         body, pulses = self.core.spacecraft, self.core.pulses
-        end = pulses.end + body.inertial_period if until is None else until
-        if not (end > 0.0 and math.isfinite(end)):
-            raise BadRequest(f"until = {end:g} s: a finite time after t = 0 is wanted")
-        if samples < 2:
-            raise BadRequest(f"samples = {samples}: a track has two rows or more")
+        end = arguments.end_of_flight(pulses.end + body.inertial_period if until is None else until)
+        count = arguments.rows(samples)
         made = (flights.by_impulses if by_impulses else flights.flown)(body, pulses, end)
-        return Flight(made, made.track(samples, end), by_impulses)
+        return Flight(made, made.track(count, end), by_impulses)
 
     def to_numpy(self) -> Table:
         """The pulses with the columns of `to_csv` as fields; empty where infeasible."""
@@ -283,7 +280,7 @@ class Plan:
         from nutdamp.files.pulses_csv import pulses_csv
 
         self._feasible_only()
-        write_whole(fspath(path), pulses_csv(self.core.flight))
+        write_whole(arguments.path("path", path), pulses_csv(self.core.flight))
 
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` says of it."""
@@ -378,14 +375,15 @@ def load(path: str | PathLike[str], *, set: Mapping[str, object] | None = None) 
     from nutdamp.files.settings import settings_of
     from nutdamp.files.spacecraft_file import load_spacecraft
 
-    return Spacecraft(load_spacecraft(fspath(path), settings_of(set or {})))
+    return Spacecraft(load_spacecraft(arguments.path("path", path), settings_of(arguments.changes(set))))
 
 
 def read(text: str, name: str = "text") -> Spacecraft:
     """The spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file ``name``."""
     from nutdamp.files.spacecraft_file import read_spacecraft
 
-    return Spacecraft(read_spacecraft(text, name))
+    arguments.instance("text", text, str, "the text of a spacecraft file (nutdamp.load reads files)")
+    return Spacecraft(read_spacecraft(text, arguments.instance("name", name, str, "a text")))
 
 
 def example() -> Spacecraft:
@@ -400,9 +398,8 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Options | None = None) ->
 
     Raises BadRequest for a scheme that there is not, or an option that makes no sense.
     """
-    _known(scheme)
-    _sensible(options)
-    return Plan(planning.plan(spacecraft.core, scheme, options))
+    (name,) = arguments.scheme_names([scheme])
+    return Plan(planning.plan(_core(spacecraft), name, arguments.options(options)))
 
 
 def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Options | None = None) -> Comparison:
@@ -410,11 +407,9 @@ def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Options 
 
     Default: the classic three, or those that point where the file has a target axis.
     """
-    names = names or planning.usual(spacecraft.core)
-    for scheme in names:
-        _known(scheme)
-    _sensible(options)
-    return Comparison(planning.compare(spacecraft.core, names, options))
+    core = _core(spacecraft)
+    chosen = arguments.scheme_names(names) or planning.usual(core)
+    return Comparison(planning.compare(core, chosen, arguments.options(options)))
 
 
 def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
@@ -424,24 +419,15 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
     """
     from nutdamp.files.pulses_csv import read_pulses
 
-    schedule, remarks = read_pulses(fspath(path), spacecraft.core)
-    for remark in (*remarks, *planning.broken_limits(spacecraft.core, schedule)):
+    core, name = _core(spacecraft), arguments.path("path", path)
+    schedule, remarks = read_pulses(name, core)
+    for remark in (*remarks, *planning.broken_limits(core, schedule)):
         warnings.warn(remark, stacklevel=2)
-    return Plan(planning.Plan(spacecraft.core, printable(fspath(path)), schedule))
+    return Plan(planning.Plan(core, printable(name), schedule))
 
 
-def _known(scheme: str) -> None:
-    if scheme not in schemes.NAMES:
-        raise BadRequest(f"there is no scheme {scheme!r}; there are {', '.join(schemes.NAMES)}")
-
-
-def _sensible(options: Options | None) -> None:
-    if options is None:
-        return
-    if options.on_time is not None and not options.on_time > 0.0:
-        raise BadRequest(f"on_time = {options.on_time:g} s: a time above zero is wanted")
-    if options.least not in schemes.LEAST:
-        raise BadRequest(f"least = {options.least!r}: one of {', '.join(schemes.LEAST)} is wanted")
+def _core(spacecraft: Spacecraft) -> craft.Spacecraft:
+    return arguments.instance("spacecraft", spacecraft, Spacecraft, "a Spacecraft, as nutdamp.load gives it").core
 
 
 def _html(block: Block) -> str:

@@ -226,6 +226,8 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
+    if scheme not in schemes.NAMES:
+        raise KeyError(scheme)
     spun = _spun(spacecraft)
     if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))

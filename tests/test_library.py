@@ -5,10 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +20,7 @@ from process import Run
 from scipy.spatial.transform import Rotation
 
 import nutdamp
-from nutdamp import errors
+from nutdamp import errors, planning
 from nutdamp.files import pulses_csv, track_csv
 
 ROOT = Path(__file__).parent.parent
@@ -179,6 +183,102 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(craft: nutdamp.Spacec
             call()
         assert issubclass(kind, nutdamp.NutdampError)
     assert list(tmp_path.iterdir()) == []
+
+
+WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
+    "an option of 0": (
+        lambda craft, _: nutdamp.plan(craft, "rhumb-line", nutdamp.Options(per_turn=0)),
+        "per_turn = 0: expected a whole number of at least 1",
+    ),
+    "a negative count": (
+        lambda craft, _: nutdamp.plan(craft, "half-cone", nutdamp.Options(cones=-3)),
+        "cones = -3: expected a whole number of at least 1",
+    ),
+    "a negative angle": (
+        lambda craft, _: nutdamp.plan(craft, "optimal", nutdamp.Options(shift=-0.1)),
+        "shift = -0.1: expected an angle of at least 0, in rad",
+    ),
+    "an angle beside freedom": (
+        lambda craft, _: nutdamp.compare(craft, ["optimal"], nutdamp.Options(shift=0.1, free_axis=True)),
+        "shift = 0.1: expected none beside a free axis",
+    ),
+    "a time that is no number": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time=math.nan)),
+        "on_time = nan: expected a time above zero, in s",
+    ),
+    "a time as text": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time="3 s")),  # type: ignore[arg-type]
+        "on_time = '3 s': expected a time above zero, in s",
+    ),
+    "a flag as number": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(coarse=1)),  # type: ignore[arg-type]
+        "coarse = 1: expected True or False",
+    ),
+    "options as mapping": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", {"on_time": 3}),  # type: ignore[arg-type]
+        "options: expected nutdamp.Options(…), got a dict",
+    ),
+    "a file name as spacecraft": (
+        lambda *_: nutdamp.plan("spacecraft.yaml", "two-pulse"),  # type: ignore[arg-type]
+        "spacecraft: expected a Spacecraft, as nutdamp.load gives it, got 'spacecraft.yaml'",
+    ),
+    "a core as spacecraft": (
+        lambda craft, _: nutdamp.compare(craft.core),
+        "expected a Spacecraft, as nutdamp.load gives it, got a nutdamp.spacecraft.Spacecraft",
+    ),
+    "a mapping as text": (
+        lambda *_: nutdamp.read({"name": "X"}),  # type: ignore[arg-type]
+        "text: expected the text of a spacecraft file (nutdamp.load reads files), got a dict",
+    ),
+    "a number as file": (lambda *_: nutdamp.load(3), "path: expected the name of a file, got 3"),  # type: ignore[arg-type]
+    "bytes as file": (lambda *_: nutdamp.load(b"x"), "expected the name of a file, got a bytes"),  # type: ignore[arg-type]
+    "a number as schedule": (
+        lambda craft, _: nutdamp.load_schedule(3, craft),  # type: ignore[arg-type]
+        "path: expected the name of a file, got 3",
+    ),
+    "a number to change": (
+        lambda *_: nutdamp.load("x", set={3: 4}),  # type: ignore[dict-item]
+        "set: expected a mapping such as {'limits.horizon': '300 s'}, got a dict",
+    ),
+    "one name for several": (
+        lambda craft, _: nutdamp.compare(craft, "two-pulse"),
+        "names: expected a list of schemes, such as ['two-pulse'], got 'two-pulse'",
+    ),
+    "an array as scheme": (
+        lambda craft, _: nutdamp.plan(craft, np.zeros(2)),  # type: ignore[arg-type]
+        "there is no scheme a numpy.ndarray; there are one-pulse",
+    ),
+    "an end as text": (lambda _, plan: plan.fly(until="3"), "until = '3': expected a time after t = 0, in s"),
+    "half a sample": (lambda _, plan: plan.fly(samples=2.5), "samples = 2.5: expected a whole number of at least 2"),
+    "a number as output": (lambda _, plan: plan.to_csv(3), "path: expected the name of a file, got 3"),
+    "a list as figure": (lambda _, plan: plan.fly().figure([]), "expected the name of a figure, got a list"),
+}
+
+
+@pytest.mark.parametrize(("call", "message"), WRONG.values(), ids=WRONG)
+def test_a_wrong_argument_is_told_with_what_was_expected(
+    craft: nutdamp.Spacecraft, call: Callable[[Any, Any], object], message: str
+) -> None:
+    with pytest.raises(errors.BadRequest, match=re.escape(message)):
+        call(craft, nutdamp.plan(craft, "none"))
+
+
+def test_numbers_of_numpy_are_numbers(craft: nutdamp.Spacecraft) -> None:
+    options = nutdamp.Options(on_time=np.float64(0.5), per_turn=np.int64(2))  # type: ignore[arg-type]
+    plan = nutdamp.plan(craft, "four-pulse", options)
+    assert max(plan.to_numpy()["on_time_s"]) == 0.5
+    flight = plan.fly(until=np.float64(3.0), samples=np.int64(5))  # type: ignore[arg-type]
+    assert len(flight.track.t) >= 5
+
+
+def test_an_unknown_scheme_is_refused_without_nutation_too() -> None:
+    calm = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n")
+    assert nutdamp.plan(calm, "two-pulse").feasible
+    with pytest.raises(errors.BadRequest, match="there is no scheme 'three-pulse'"):
+        nutdamp.plan(calm, "three-pulse")
+    for call in (planning.plan, planning.alternatives):
+        with pytest.raises(KeyError):
+            call(calm.core, "three-pulse")
 
 
 class _Tags(HTMLParser):

@@ -159,12 +159,8 @@ def scheme_options(command: Command) -> Command:
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
         chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
-        if chosen.on_time is not None and chosen.on_time <= 0.0:
-            raise click.BadParameter("a time above zero is wanted", param_hint="--on-time")
-        if chosen.shift is not None and chosen.shift < 0.0:
-            raise click.BadParameter("an angle of at least 0 is wanted", param_hint="--shift")
-        if chosen.shift is not None and chosen.free_axis:
-            raise click.UsageError("either --shift, how far H may end from its target, or --free-axis, anywhere")
+        for name, problem in chosen.faults():
+            raise click.BadParameter(problem, param_hint=f"--{name.replace('_', '-')}")
         aim = Aim(*(parameters.pop(name) for name in Aim._fields))
         return command(*args, options=chosen, aim=aim, **parameters)
 

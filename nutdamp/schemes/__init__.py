@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple, cast
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+from nutdamp.units import LARGEST
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
@@ -51,6 +55,42 @@ class Options(NamedTuple):
     shift: float | None = None
     cones: int | None = None
     per_turn: int = 1
+
+    def faults(self) -> Iterator[tuple[str, str]]:
+        """Options that make no sense: name, and what is expected of it."""
+        for name, (sensible, expected) in _SENSIBLE.items():
+            if not sensible(getattr(self, name)):
+                yield name, f"expected {expected}"
+        if self.shift is not None and self.free_axis:
+            yield "shift", "expected none beside a free axis, where H may end anywhere"
+
+
+def is_number(value: Any) -> bool:
+    """Whether Python or numpy would call it a real number, of sensible size."""
+    return issubclass(type(value), Real) and type(value) is not bool and abs(value) <= LARGEST
+
+
+def is_count(value: Any) -> bool:
+    """Whether it is a whole number of at least 1."""
+    return issubclass(type(value), Integral) and type(value) is not bool and value >= 1
+
+
+def _flag(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+_SENSIBLE: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "on_time": (lambda value: value is None or (is_number(value) and value > 0.0), "a time above zero, in s"),
+    "coarse": (_flag, "True or False"),
+    "literal": (_flag, "True or False"),
+    "with_disturbances": (_flag, "True or False"),
+    "least": (lambda value: isinstance(value, str) and value in LEAST, f"one of {', '.join(LEAST)}"),
+    "free_axis": (_flag, "True or False"),
+    "shift": (lambda value: value is None or (is_number(value) and value >= 0.0), "an angle of at least 0, in rad"),
+    "cones": (lambda value: value is None or is_count(value), "a whole number of at least 1"),
+    "per_turn": (is_count, "a whole number of at least 1"),
+}
+"""For each option whether a value makes sense, and what does."""
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
