@@ -53,6 +53,20 @@ class BadRequest(NutdampError):
     """A call or a command line that asks for something impossible, whatever the spacecraft."""
 
 
+class Unsuitable(BadRequest):
+    """A value of the spacecraft file that does not do for what is asked, and else is none of its faults.
+
+    ``where`` is the path of keys to it, such as ``("attitude", "epoch")``.
+    """
+
+    def __init__(self, where: tuple[str, ...], problem: str) -> None:
+        self.where, self.problem = where, problem
+        super().__init__(where, problem)
+
+    def __str__(self) -> str:
+        return f"{'.'.join(self.where)}: {self.problem}"
+
+
 class CannotRead(NutdampError):
     """A file that could not be read."""
 

@@ -21,6 +21,7 @@ FAULTS = [Fault("b.yaml", 3, 1, "mass", "zero"), Fault("a.yaml", 0, 0, "", "empt
         errors.NutdampError("anything"),
         errors.FaultyFile(FAULTS),
         errors.BadRequest("no such scheme"),
+        errors.Unsuitable(("attitude", "epoch"), "before 1972"),
         errors.CannotRead("in.yaml", "no such file"),
         errors.CannotWrite("out.csv", "permission denied"),
         errors.MissingExtra("plot", "a picture"),

@@ -12,6 +12,7 @@ import click
 from nutdamp.cli.failures import debug_option, show_failures
 from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
 from nutdamp.cli.screen import say, show
+from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 from nutdamp.schemes import LEAST, Options
 
 if TYPE_CHECKING:
@@ -78,10 +79,25 @@ def spacecraft_argument(command: Command) -> Command:
 
     @functools.wraps(command)
     def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
-        return command(*args, spacecraft=Input(spacecraft, settings), **parameters)
+        given = Input(spacecraft, settings)
+        try:
+            return command(*args, spacecraft=given, **parameters)
+        except Unsuitable as wrong:
+            raise placed(wrong, given) from None
 
     argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
     return cast(Command, argument(set_option(gathered)))
+
+
+def placed(wrong: Unsuitable, given: Input) -> NutdampError:
+    """The error as a fault with the place of the value in the spacecraft file, where it comes from one."""
+    if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
+        return wrong
+    from nutdamp.files.yaml_tree import dotted, read_tree
+
+    text, name = source(given.path, lambda _: None)
+    place = read_tree(text, name)[0].place_of(wrong.where)
+    return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
 class Aim(NamedTuple):

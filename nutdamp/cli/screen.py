@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nutdamp.errors import printable
+
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 
-LAYOUT = "\n\t"
-"""Characters that do not print and may pass."""
-
 
 def visible(text: str) -> str:
-    """``text`` with control characters, and others that do not print, as their escapes, such as ``\\x1b``."""
-    if text.isprintable():
-        return text
-    return "".join(char if char.isprintable() or char in LAYOUT else ascii(char)[1:-1] for char in text)
+    """`errors.printable` of each line of a text."""
+    return text if text.isprintable() else "\n".join(printable(line) for line in text.split("\n"))
 
 
 def say(text: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.inputs import Input
-from nutdamp.errors import BadRequest
+from nutdamp.errors import Unsuitable
 
 Array = NDArray[np.float64]
 Draws = Mapping[str, "Array | float"]
@@ -45,7 +45,7 @@ class Source:
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
         """Deviations of the cases of block ``number`` (from 0), and which rows were drawn again (as often as it was).
 
-        The arrays are used anew for the next block. Raises BadRequest where no physical case is found.
+        The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
         """
         self._fill(self._table, number, 0)
         draws = self._named(self._table)
@@ -55,9 +55,8 @@ class Source:
         while len(rows):
             attempt += 1
             if attempt > MOST_ATTEMPTS:
-                raise BadRequest(
-                    "dispersions: hardly any draw gives a body or a thrust that can be (C > 2A, thrust < 0)"
-                )
+                problem = "hardly any draw gives a body or a thrust that can be (C > 2A, thrust < 0)"
+                raise Unsuitable(("dispersions",), problem)
             redrawn.append(rows)
             again = np.empty((len(self._random), len(rows)))
             self._fill(again, number, attempt)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from typing import TYPE_CHECKING
 
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
     from nutdamp.planning import Plan
@@ -50,7 +50,7 @@ def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
     last = end if form in TRACKS else plan.pulses.end
     if body.utc(last) is None:
         cure = "an earlier --until" if form in TRACKS else "a shorter horizon"
-        raise BadRequest(f"the last date, {last:.4g} s after attitude.epoch, lies after the year 9999; {cure} helps")
+        raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
     if form == "stk":
         from nutdamp.files.stk import stk_attitude
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.epoch import Epoch
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, Unsuitable
 from nutdamp.flight import Flight, Leg
 from nutdamp.rounding import cleaned
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -69,13 +69,12 @@ def reference(spacecraft: Spacecraft) -> Reference:
             f"this format needs {names}, which the spacecraft file does not give; {verb}\nattitude:\n{lines}"
         )
     if given.frame not in FRAMES:
-        raise BadRequest(
-            f"attitude.frame: {given.frame!r} is no frame that the format knows; one of {', '.join(FRAMES)} is wanted"
-        )
+        problem = f"{given.frame!r} is no frame that the format knows; one of {', '.join(FRAMES)} is wanted"
+        raise Unsuitable(("attitude", "frame"), problem)
     try:
         return Reference(Epoch.parse(given.epoch), given.frame)
     except ValueError as wrong:
-        raise BadRequest(f"attitude.epoch: {wrong}") from None
+        raise Unsuitable(("attitude", "epoch"), str(wrong)) from None
 
 
 def stretches(flown: Flight, until: float) -> Iterator[Stretch]:

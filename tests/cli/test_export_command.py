@@ -86,7 +86,8 @@ def test_dates_after_the_year_9999_are_refused_and_planned_without(run: Run, tmp
     for form in ("apm", "aem", "stk"):
         done = run("export", "late.yaml", "--format", form, "--scheme", "two-pulse")
         assert (done.returncode, done.stdout) == (2, "")
-        assert "lies after the year 9999" in done.stderr
+        assert "late.yaml:5:19: attitude.epoch: " in done.stderr
+        assert "the year 9999 is over" in done.stderr
         assert done.stderr.count("\n") == 1
     planned = run("plan", "late.yaml", "--scheme", "two-pulse", "--json", "-")
     assert planned.returncode == 0
@@ -99,6 +100,20 @@ def test_a_million_billion_seconds_have_no_date(run: Run, tmp_path: Path) -> Non
     done = run("plan", "far.yaml", "--scheme", "one-pulse")
     assert done.returncode in (0, 3)
     assert done.stderr == ""
+
+
+def test_an_epoch_that_only_messages_cannot_hold_is_refused_with_its_place(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "old.yaml").write_text(DATED.replace("2026", "1960"))
+    done = run("export", "old.yaml", "--format", "aem", "--scheme", "two-pulse")
+    assert done.returncode == 2
+    assert done.stderr.startswith("old.yaml:5:19: attitude.epoch: '1960-03-01T12:00:00Z' lies before 1972")
+    # What no file says has no place in one.
+    for path, stdin in (("-", DATED.replace("2026", "1960")), ("old.yaml", None)):
+        epoch = "1961-03-01T12:00:00Z" if stdin is None else "1960-03-01T12:00:00Z"
+        setting = () if stdin is not None else ("--set", f"attitude.epoch={epoch}")
+        done = run("export", path, "--format", "aem", "--scheme", "two-pulse", *setting, stdin=stdin)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"nutdamp: attitude.epoch: '{epoch}' lies before 1972")
 
 
 def test_formats_without_an_epoch_need_none(run: Run) -> None:

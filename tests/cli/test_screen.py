@@ -20,7 +20,7 @@ SCHEDULE = "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0
 
 def test_what_does_not_print_is_shown_as_its_escape() -> None:
     assert visible("a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028") == r"a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028"
-    assert visible("two lines\n\tωθ° ×…") == "two lines\n\tωθ° ×…"
+    assert visible("two lines\nωθ° ×…\n") == "two lines\nωθ° ×…\n"
     assert visible("not UTF-8: \udcff") == r"not UTF-8: \udcff"
 
 
