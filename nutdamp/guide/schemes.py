@@ -142,9 +142,9 @@ SCHEMES = (
             "Σ J_j d_j e^(iω3t_j)  = Δh        H on its target",
         ),
         "J_j N m s impulse of pulse j at t_j s, d_j its torque direction in the body as a unit complex number, c_j its "
-        "cost, Δh N m s the shift of H wanted (0: it stays). The first is exact for symmetric bodies, the second holds "
-        "for small angles; finite widths multiply them by sinc(aω3τ/2) and sinc(ω3τ/2). Four real equations: there "
-        "is an optimum with at most four pulses.",
+        "cost, Δh N m s the required shift of H (0: it stays). The first is exact for symmetric bodies, the second "
+        "holds for small angles; finite widths multiply them by sinc(aω3τ/2) and sinc(ω3τ/2). Four real equations: "
+        "there is an optimum with at most four pulses.",
         "Where propellant, time or the number of pulses counts and thrusters are fixed in the body. `nutdamp trade` "
         "shows what an earlier end costs.",
         (
