@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.errors import Infeasible
+from nutdamp.schemes import linear
 from nutdamp.schemes.influence import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -44,6 +44,9 @@ LOOK = 0.05
 
 SIDES = 32
 """Directions in which H may end off the target, where it may."""
+
+TINIEST = 1e-6
+"""Coefficient below which an equation is not scaled up any more."""
 
 SOME = 1e-12
 """Share of what is needed below which an on-time is rounding."""
@@ -92,13 +95,15 @@ class Columns(NamedTuple):
 class Solution:
     """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
 
-    ``off`` (2,) N m s is how far from the target H is to end, where it may.
+    Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the target H is to end,
+    where it may. ``prices`` (equations,) are what one more N m s of each goal costs, zero where that is not known.
     """
 
     burns: tuple[Burn, ...]
     cost: float
     unmet: float
     off: Vector
+    prices: Vector
 
 
 @dataclass(eq=False)
@@ -106,16 +111,15 @@ class Program:
     """The linear program of one spacecraft.
 
     ``costs`` (channels,) per second of on-time. ``influence`` holds the equations, which may be exchanged for others
-    between solutions. ``ideal``: channels give any impulse at any moment, which no real one can do cheaper. ``off``
-    N m s is how far from its target H may end. ``haste``: by how much (relatively) the end of the horizon seems dearer
-    than its beginning, among equals the early moments are taken. ``forbidden`` (channels, slots) may not be used.
+    between solutions. ``off`` N m s is how far from its target H may end. ``haste``: by how much (relatively) the end
+    of the horizon seems dearer than its beginning, among equals the early moments are taken. ``forbidden`` (channels,
+    slots) may not be used.
     """
 
     spacecraft: Spacecraft
     channels: tuple[Channel, ...]
     costs: Vector
     influence: Influence
-    ideal: bool = False
     off: float = 0.0
     haste: float = 0.0
     width: float = field(init=False)
@@ -145,40 +149,49 @@ class Program:
         strength = np.linalg.norm(self._torques, axis=1)
         self._unit = self._scale / strength  # s of firing that are worth all there is to do
         self._direction = self._torques / strength[:, None]
-        self._strong = (self._unit < self.width) | self.ideal
+        self._strong = self._unit < self.width
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
         self._grid: Vector | None = None
 
     def solve(self, columns: Columns | None = None) -> Solution:
         """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation."""
+        nothing = np.zeros(len(self.influence.goal))
+        if self._scale == 0.0:
+            return Solution((), 0.0, 0.0, np.zeros(2), nothing)
         generate = columns is None
         chosen = self._first() if columns is None else columns
-        amounts, duals, slack = self._master(chosen)
+        found = self._master(chosen)
+        if found is None:
+            return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            new = self._priced(duals, chosen)
-            if not len(new.t):
+            new = self._priced(found.prices, chosen)
+            more = chosen.joined(new)
+            better = self._master(more) if len(new.t) else None
+            if better is None:  # nothing lowers the cost any more, or what would is lost on the solver
                 break
-            chosen = chosen.joined(new)
-            amounts, duals, slack = self._master(chosen)
+            chosen, found = more, better
         if generate:
             self._pool = chosen
+        count, equations = len(chosen.t), len(nothing)
+        amounts, slack = found.x[:count], found.x[count:]
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             self._burns(chosen.of(used), on_times),
             float(self.costs[chosen.channel[used]] @ on_times),
-            float(slack[: 2 * len(duals)].sum()),
-            self._off_by(slack[2 * len(duals) :]),
+            float(slack[: 2 * equations].sum()),
+            self._off_by(slack[2 * equations :]),
+            found.prices * self._dearest / self._scale,
         )
 
-    def _master(self, columns: Columns) -> tuple[Vector, Vector, Vector]:
-        """Amounts (n,) in units of all there is to do, prices (equations,), and slacks, of the columns' program."""
-        from scipy.optimize import linprog  # here, because it takes longer to load than most plans
-
+    def _master(self, columns: Columns) -> linear.Optimum | None:
+        """Amounts (n,) in units of all there is to do, and slacks, of the columns' program; prices (equations,)."""
         count = len(self.influence.goal)
         ring = self._ring()
         matrix = np.hstack([self._coefficients(columns), np.eye(count), -np.eye(count), ring])
+        # Rows and columns to coefficients about one: axial torques may be small beside the transverse ones.
+        level = np.abs(matrix[:, : len(columns.t)]).max(axis=1, initial=TINIEST)
         cost = np.concatenate(
             [
                 self._price[columns.channel] / self._dearest * self._dearness(columns.t),
@@ -195,24 +208,10 @@ class Program:
         longest = np.zeros((0, len(cost)))
         if columns.burn.max(initial=-1) >= 0:
             longest = self._longest(columns, len(cost))
-        bounds = [(0.0, upper) for upper in most.tolist()]
-        for presolve in (True, False):  # rarely the solver loses its way after presolving
-            found = linprog(
-                cost,
-                A_eq=matrix,
-                b_eq=self.influence.goal / self._scale,
-                A_ub=np.vstack([shares, longest]),
-                b_ub=np.concatenate([np.full(len(shares), self.off / self._scale), np.ones(len(longest))]),
-                bounds=bounds,
-                method="highs-ds",
-                options={"presolve": presolve},
-            )
-            if found.success:
-                break
-        else:
-            raise Infeasible(f"not found: the linear program's solver gave up ({found.message})")
-        x = np.asarray(found.x)
-        return x[: len(columns.t)], np.asarray(found.eqlin.marginals), x[len(columns.t) :]
+        limits = np.concatenate([np.full(len(shares), self.off / self._scale), np.ones(len(longest))])
+        goal = self.influence.goal / self._scale / level
+        found = linear.least(cost, matrix / level[:, None], goal, most, np.vstack([shares, longest]), limits)
+        return None if found is None else found._replace(prices=found.prices / level)
 
     def _longest(self, columns: Columns, count: int) -> Vector:
         """Rows (burns, ``count``) that hold each burn's on-time, over the longest that its channel may be on."""
