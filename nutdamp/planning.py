@@ -147,18 +147,17 @@ class Plan:
         scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
         if spent is None:
             return ()
-        gap = 100.0 * (spent / bounds.first_order - 1.0)
-        beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: that holds for small angles"
-        proof = (
-            ""
-            if bounds.rigorous is None
-            else f"; no schedule of the channels that leaves as little takes less than "
-            f"{_down(scale * bounds.rigorous):.4g} {unit}"
-        )
-        return (
-            f"{scale * spent:.4g} {unit}; first-order least within {bounds.within:.4g} s "
-            f"{scale * bounds.first_order:.4g} {unit} ({beside}){proof}",
-        )
+        told = [f"{scale * spent:.4g} {unit}"]
+        if bounds.first_order is not None:
+            gap = 100.0 * (spent / bounds.first_order - 1.0) if bounds.first_order > 0.0 else math.inf
+            beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: that holds for small angles"
+            told.append(
+                f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
+            )
+        if bounds.rigorous is not None:
+            least = f"{_down(scale * bounds.rigorous):.4g} {unit}"
+            told.append(f"no schedule of the channels that leaves as little takes less than {least}")
+        return ("; ".join(told),) if len(told) > 1 else ()
 
     @property
     def obstacle(self) -> Obstacle:

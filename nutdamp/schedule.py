@@ -89,11 +89,12 @@ def steerable_pulse(
 class Bounds(NamedTuple):
     """Costs that other schedules of the channels cannot go below ``within`` so many s, in ``unit`` (kg or N m s).
 
-    ``first_order`` is that of the small-angle program. ``rigorous`` holds at any angle for all schedules that leave no
-    more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation, disturbances.
+    ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous`` holds at any angle
+    for all schedules that leave no more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation,
+    disturbances.
     """
 
-    first_order: float
+    first_order: float | None
     rigorous: float | None
     unit: str
     within: float

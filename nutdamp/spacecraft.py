@@ -238,7 +238,7 @@ class Spacecraft:
         body, inertial = cones.body_period(self.inertia.A, self.inertia.C, self.spin), self.inertial_period
         return 20.0 * (max(body, inertial) if math.isfinite(body) else inertial)
 
-    @property
+    @cached_property
     def initial(self) -> SpinState:
         """The motion at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
         omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
@@ -250,13 +250,13 @@ class Spacecraft:
             quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
         return SpinState(omega, spin, quaternion)
 
-    @property
+    @cached_property
     def momentum(self) -> Vector:
         """Angular momentum at t = 0 in the inertial frame, (3,) N m s."""
         start = self.initial
         return attitude.rotate(start.quaternion, start.rates * np.asarray(self.inertia.moments))
 
-    @property
+    @cached_property
     def target_axis(self) -> Vector:
         """Direction in which the angular momentum is to end, (3,) unit vector in the inertial frame."""
         if self.goal.axis is not None:

@@ -7,6 +7,7 @@ those along a flight, at its true angles.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,6 +17,9 @@ from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
+
+MOST_GROWN = 30.0
+"""Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,8 @@ class Influence:
 
     def of(self, schedule: Schedule, step: float) -> Vector:
         """What all pulses add, (equations,) N m s, each taken in parts of at most ``step`` s."""
+        if not len(schedule):
+            return np.zeros(len(self.turning))
         counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
         widths = np.repeat([pulse.on_time for pulse in schedule], counts) / np.repeat(counts, counts)
         parts = np.concatenate([np.arange(count) + 0.5 for count in counts])
@@ -58,16 +64,22 @@ class Influence:
 
 
 def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
-    """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H."""
-    inertia, spin, goal = spacecraft.inertia, spacecraft.spin, spacecraft.goal
+    """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
+
+    What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
+    """
+    inertia, spin, goal, growth = spacecraft.inertia, spacecraft.spin, spacecraft.goal, spacecraft.growth
+    last = min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
     shift = -square_to_target(spacecraft) @ spacecraft.momentum
     if np.any(shift):  # as long as the way there is on the sphere
         shift *= spacecraft.turning_impulse / np.linalg.norm(shift)
     final = spin if goal.spin is None else goal.spin
-    every = np.array([*(-inertia.A * spacecraft.omega0[:2]), *shift, inertia.C * (final - spin)])
+    there = -inertia.A * spacecraft.omega0[:2] * math.exp(growth * last)
+    every = np.array([*there, *shift, inertia.C * (final - spin)])
 
     def rows(times: Vector) -> Vector:
         turned = np.exp(1j * np.outer(times, [inertia.a * spin, spin]))
+        turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
         shifts = np.zeros((len(times), 2, 3))
         shifts[:, :, :2] = _complex_product(turned[:, 1])
         return _all_rows(turned[:, 0], shifts)[:, equations.chosen]
@@ -119,14 +131,15 @@ def square_to_target(spacecraft: Spacecraft) -> Vector:
 
 
 def _turned_back(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> Vector:
-    """e^{ia∫ω3dt}, less what dissipation has added: turns ω at ``times`` (n,) s back to t = 0."""
+    """e^{ia∫ω3dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
     turned = (spacecraft.spin + 0.5 * drift * times) * times
     for pulse in schedule:
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
-    return np.asarray(np.exp(1j * inertia.a * turned - spacecraft.growth * times))
+    grown = np.minimum(-spacecraft.growth * (times - schedule.end), MOST_GROWN)
+    return np.asarray(np.exp(1j * inertia.a * turned + grown))
 
 
 def _complex_product(factors: Vector) -> Vector:

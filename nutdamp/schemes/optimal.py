@@ -19,17 +19,14 @@ import numpy as np
 
 from nutdamp import flight
 from nutdamp.errors import Infeasible
-from nutdamp.schedule import Bounds, Schedule
-from nutdamp.schemes import Options, bounds, influence, optimal_starts
-from nutdamp.schemes.advice import no_channels
-from nutdamp.schemes.bounds import Left
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options, influence, optimal_starts
 from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
-from nutdamp.schemes.influence import Equations
 from nutdamp.schemes.optimal_descent import Task
+from nutdamp.schemes.optimal_problem import LEFT, Problem
 from nutdamp.schemes.polish import polish
 from nutdamp.schemes.program import Burn, Program, Solution
 from nutdamp.schemes.trim import keeps_limits
-from nutdamp.schemes.windows import usable
 from nutdamp.spacecraft import Spacecraft
 
 CHOICES = 3
@@ -65,17 +62,11 @@ HALVINGS = 3
 HASTE = 0.0008
 """How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
 
-LEFT = math.radians(1e-6)
-"""rad of nutation and distance from the target, and share of the spin, below which a plan has been found."""
-
 NEAR = 0.05
 """rad left from which a flight is near enough to be polished."""
 
-LATEST = 64.0
-"""Times the horizon up to which a feasible one is looked for, to name it."""
-
-SHARPEST, SHARP = 1e-3, 0.02
-"""Relative accuracy of a least time: by the program of small angles, and by schedules found."""
+SHARP = 0.02
+"""Relative accuracy of a least time by schedules found."""
 
 NOT_FOUND = (
     "not found: the program has solutions, but on the true motion the search did not settle on one that "
@@ -123,50 +114,8 @@ class _Found(NamedTuple):
     made: Schedule
 
 
-class _Search:
-    """What stays the same while a schedule is looked for."""
-
-    def __init__(self, spacecraft: Spacecraft, options: Options) -> None:
-        self.spacecraft, self.options = spacecraft, options
-        asked = spacecraft.goal.spin is not None
-        self.channels = tuple(usable(spacecraft, axial=asked))
-        if not self.channels:
-            raise Infeasible(no_channels(spacecraft))
-        if asked and not any(channel.axial for channel in self.channels):
-            raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
-        self.equations = Equations(shift=not options.free_axis, spin=asked)
-        flows = [channel.mass_flow for channel in self.channels]
-        known = [flow for flow in flows if flow is not None]
-        if options.least != "impulse" and len(known) == len(flows):
-            self.costs, self.unit = np.array(known), "kg"
-        else:
-            self.costs = np.array([float(np.linalg.norm(channel.torque)) for channel in self.channels])
-            self.unit = "N m s"
-
-    def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
-        """The linear program of small angles, with another horizon or other equations if given."""
-        body, equations = spacecraft or self.spacecraft, equations or self.equations
-        aim = influence.small_angles(body, equations)
-        off = 0.0
-        if self.options.shift is not None and equations.shift:
-            final = body.spin if body.goal.spin is None else body.goal.spin
-            off = body.inertia.C * abs(final) * math.sin(min(self.options.shift, 0.5 * math.pi))
-        return Program(body, self.channels, self.costs, aim, off=off)
-
-    def within(self, horizon: float) -> Spacecraft:
-        """The spacecraft with another horizon."""
-        return replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=horizon))
-
-    def feasible(self, horizon: float) -> bool:
-        """Whether the program of small angles has a solution within ``horizon`` s."""
-        return self.program(self.within(horizon)).solve().unmet <= UNMET
-
-    def least_horizon(self, low: float, high: float) -> float:
-        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow."""
-        while high - low > SHARPEST * high:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.feasible(middle) else (middle, high)
-        return high
+class _Search(Problem):
+    """The search for the cheapest schedule."""
 
     def sooner(self) -> _Search:
         """The same search with the shortest horizon in which a schedule is found."""
@@ -196,13 +145,14 @@ class _Search:
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        solved = first.unmet <= UNMET
+        solved = not UNMET < first.unmet < math.inf  # infinite where the solver gave up: then it may have solutions
+        self.check_number(first)
         best = self.programmed(first) if solved else None
         if self.doubtful(best, first):
             best = self.cheaper(best, self.descended(best))
         if best is None:
             raise Infeasible(NOT_FOUND if solved else self.cure())
-        return self.with_bounds(best, first) if solved else best
+        return self.with_bounds(best, first)
 
     def programmed(self, first: Solution) -> Schedule | None:
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
@@ -318,7 +268,7 @@ class _Search:
         found: list[_Found] = []
         last = math.inf
         for turn in range(AIMS):
-            if solution.unmet > LOST:
+            if solution.unmet > LOST or not solution.burns:
                 break
             try:
                 solution = repaired(program, solution)
@@ -343,68 +293,3 @@ class _Search:
         if best is None or (best.left > 0.0 and self.spacecraft.limits.tick is None):
             return None
         return best.made
-
-    def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
-        """The schedule with what any other must cost."""
-        body = self.spacecraft
-        first = first or self.program().solve()
-        left = self.leaves(flight.flown(body, made))
-        rigorous = bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
-        return Schedule(made.pulses, made.notes, Bounds(first.cost, rigorous, self.unit, body.horizon))
-
-    def prices(self) -> dict[str, float]:
-        """Cost per second, in the unit of the bounds, of every channel of which it is known."""
-        flows = {channel.name: channel.mass_flow for channel in self.spacecraft.channels}
-        if self.unit == "kg":
-            return {name: flow for name, flow in flows.items() if flow is not None}
-        return {channel.name: float(np.linalg.norm(channel.torque)) for channel in self.spacecraft.channels}
-
-    def price(self, made: Schedule) -> float:
-        """What a schedule costs by the program's own prices."""
-        price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
-        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
-
-    def left(self, flown: flight.Flight) -> float:
-        """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
-        nutation, off, spin = self.leaves(flown)
-        return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
-
-    def leaves(self, flown: flight.Flight) -> Left:
-        """What a flight leaves of what is asked for."""
-        residual, goal = flown.residual, self.spacecraft.goal
-        off = residual.axis_error if self.equations.shift else 0.0
-        return Left(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
-
-    def cure(self) -> str:
-        """Why the program has no solution, and which limit to relax."""
-        body = self.spacecraft
-        names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
-        nutation = Equations(shift=False)
-        left = self.program(body, nutation).solve().unmet
-        if left <= UNMET:
-            wanted = "H not be kept where it is" if body.goal.axis is None else "H not be brought to the target"
-            if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
-                wanted = "the spin not be brought to the rate asked for"
-            what = f"within {horizon:.4g} s the nutation can be taken out, but {wanted}"
-        else:
-            what = (
-                f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
-                f"{100.0 * min(left, 1.0):.2g} % of it stays"
-            )
-        return f"{what}; {self.relaxed()}"
-
-    def relaxed(self) -> str:
-        """The limit that has to be relaxed, and how far."""
-        body = self.spacecraft
-        horizon = later = body.horizon
-        while later < LATEST * horizon:
-            later *= 2.0
-            if self.feasible(later):
-                needed = self.least_horizon(0.5 * later, later)
-                more = "" if self.options.free_axis or not self.equations.shift else ", or use --free-axis"
-                return f"set limits.horizon to {needed:.4g} s or later ({needed - horizon:.3g} s more){more}"
-        if body.limits.blackout:
-            free = replace(body, limits=replace(body.limits, blackout=()))
-            if self.program(free).solve().unmet <= UNMET:
-                return "shorten the blackout windows (without any it can be done)"
-        return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"

@@ -31,6 +31,9 @@ SLACK_COST = 1e3
 PRICE = 1e-7
 """Relative reduced cost below which a column cannot lower the cost any more."""
 
+PEAK = 1e-6
+"""The same for the best moment of a strong channel, which may lie ever so little beside one taken."""
+
 BEST = 250
 """Columns taken in per round, the best priced first."""
 
@@ -122,6 +125,7 @@ class Program:
     influence: Influence
     off: float = 0.0
     haste: float = 0.0
+    end: float = field(init=False)
     width: float = field(init=False)
     centres: Vector = field(init=False)
     forbidden: NDArray[np.bool_] = field(init=False)
@@ -129,9 +133,9 @@ class Program:
     def __post_init__(self) -> None:
         body, limits = self.spacecraft, self.spacecraft.limits
         slot = 2 * math.pi / max(abs(body.inertia.a * body.spin), abs(body.spin)) / SLOTS
-        horizon = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
-        count = max(math.ceil((horizon - limits.earliest) / slot), 1)
-        edges = np.linspace(limits.earliest, horizon, count + 1)
+        self.end = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
+        count = max(math.ceil((self.end - limits.earliest) / slot), 1)
+        edges = np.linspace(limits.earliest, self.end, count + 1)
         self.width = float(edges[1] - edges[0])
         self.centres = 0.5 * (edges[1:] + edges[:-1])
         blocked = np.zeros(count, dtype=bool)
@@ -153,6 +157,11 @@ class Program:
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
         self._grid: Vector | None = None
+
+    @property
+    def strong(self) -> NDArray[np.bool_]:
+        """Channels (channels,) that give all that is needed within one slot, and so act at a moment."""
+        return np.asarray(self._strong)
 
     def solve(self, columns: Columns | None = None) -> Solution:
         """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation."""
@@ -298,7 +307,7 @@ class Program:
         aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
         aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
         t = times[every, inner] + aside * 0.25 * self.width
-        good = worth[every, best] > PRICE
+        good = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best]) > PEAK
         return _alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:

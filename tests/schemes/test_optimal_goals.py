@@ -49,6 +49,7 @@ def test_the_axis_ends_on_its_target(
     # |dH/dt| <= |M|: no schedule turns H with less
     assert made.pulses.total_impulse >= max(body.least_impulse, body.turning_impulse) * (1 - 1e-9)
     assert made.pulses.bounds is not None
+    assert made.pulses.bounds.first_order is not None
     assert made.pulses.cost <= 1.03 * made.pulses.bounds.first_order
 
 

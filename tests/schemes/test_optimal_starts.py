@@ -72,6 +72,7 @@ def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
     assert made.schedule is not None, made.why
     assert made.schedule.bounds is not None
     assert made.schedule.propellant is not None
+    assert made.schedule.bounds.first_order is not None
     assert made.schedule.propellant <= 1.01 * made.schedule.bounds.first_order
     assert violations(spacecraft, made.pulses) == []
     flown = Outcome(spacecraft, made.pulses)
