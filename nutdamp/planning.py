@@ -262,8 +262,14 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Options |
 
 
 def known(spacecraft: Spacecraft, options: schemes.Options) -> Spacecraft:
-    """The spacecraft as the schemes are to know it: with its disturbances only where they are asked for."""
-    return spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
+    """The spacecraft as the schemes are to know it: with its disturbances only where they are asked for.
+
+    A spin that nothing can change, and that is the one of the goal, is no goal for them.
+    """
+    body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
+    if body.goal.spin is None or not _spun(body) or body.spin_drift or any(one.axial for one in body.channels):
+        return body
+    return replace(body, goal=replace(body.goal, spin=None))
 
 
 def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes.Options) -> Plan:

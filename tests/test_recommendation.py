@@ -207,6 +207,11 @@ def test_a_scheme_that_cannot_set_the_spin_says_so() -> None:
     assert planning.usual(kept) == schemes.CLASSIC
 
 
+def test_a_spin_that_is_kept_by_itself_takes_no_channel() -> None:
+    body = replace(spinner(channels=cross(20.0)), goal=Goal(spin=3.0))
+    assert planning.plan(body, "optimal").meets_requirement is True
+
+
 def test_without_nutation_a_spin_to_set_is_something_to_do() -> None:
     body = replace(spinner(degrees=0.0, channels=cross(20.0)), goal=Goal(spin=3.3))
     assert not planning.plan(body, "four-pulse").feasible
