@@ -14,7 +14,7 @@ from nutdamp.dispersion.study import EARLY, KEPT_WORST, Results, Study
 from nutdamp.errors import BadRequest, CannotRead
 from nutdamp.files.output import whole_file
 
-ANOTHER = "it belongs to another study: spacecraft, schedule, dispersions, --seed, --flown and nutdamp must be the same"
+ANOTHER = "it belongs to another study: spacecraft, schedule, dispersions, --seed, --impulses and version must agree"
 
 DAMAGED = "it is no file that --resume has written, or is damaged"
 
