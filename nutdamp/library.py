@@ -417,7 +417,7 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
 
     Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
     """
-    from nutdamp.files.pulses_csv import read_pulses
+    from nutdamp.files.schedule_file import read_pulses
 
     core, name = _core(spacecraft), arguments.path("path", path)
     schedule, remarks = read_pulses(name, core)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,15 @@ from nutdamp.spacecraft import Channel, Steerable, Vector
 
 STEERABLE = "steerable"
 """Channel name of the pulses of a steerable torquer."""
+
+
+RESOLUTION = 1e-4
+"""Part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more."""
+
+TOUCHING = 1e-9
+"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be told apart."""
+
+Label = TypeVar("Label")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +51,32 @@ class Pulse:
         return self.t + 0.5 * self.on_time
 
     @property
+    def resolved(self) -> bool:
+        """Whether times can be told apart finely enough to say how long it is; an ideal impulse has no length."""
+        return self.on_time == 0.0 or math.ulp(self.end) <= RESOLUTION * self.on_time
+
+    @property
     def magnitude(self) -> float:
         """|J| in N m s."""
         return float(np.linalg.norm(self.impulse))
+
+
+def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Label]]:
+    """Labels of pulses that begin while their channel still fires an earlier one, each with the label of that."""
+    firing: dict[str, tuple[Label, float]] = {}
+    found = []
+    for label, pulse in sorted(pulses, key=lambda one: one[1].start):
+        before, end = firing.get(pulse.channel, (label, -math.inf))
+        if pulse.start < end - touching(end):
+            found.append((label, before))
+        if pulse.end > end:
+            firing[pulse.channel] = label, pulse.end
+    return found
+
+
+def touching(time: float) -> float:
+    """By how much two pulses may overlap at ``time`` s that only touch, s."""
+    return max(TOUCHING, math.ulp(time)) if math.isfinite(time) else 0.0
 
 
 def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:

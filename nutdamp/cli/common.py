@@ -308,7 +308,7 @@ def plan_or_read(
 
     tell_unread(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
-        from nutdamp.files.pulses_csv import read_pulses
+        from nutdamp.files.schedule_file import read_pulses
 
         pulses, warnings = read_pulses(schedule, body)
         for warning in (*warnings, *planning.broken_limits(body, pulses)):

@@ -49,7 +49,7 @@ SAVED_EVERY = 30.0
 @click.command("disperse")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to disperse; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file: start_s, on_time_s, channel.")
 @scheme_options
 @click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
 @click.option(

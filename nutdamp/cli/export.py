@@ -37,7 +37,7 @@ from nutdamp.schemes import NAMES, Options
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file: start_s, on_time_s, channel.")
 @scheme_options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @click.command("simulate")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
-@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file: start_s, on_time_s, channel.")
 @scheme_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option("--until", type=Quantity("time"), help="End; default last pulse + one inertial period.")

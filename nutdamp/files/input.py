@@ -25,9 +25,17 @@ def read_bytes(path: str, most: int = -1) -> bytes:
         raise CannotRead(path, reason.lower()) from error
 
 
-def read_utf8(path: str) -> str:
-    """The text of a file, without a byte order mark; raises CannotRead, or FaultyFile where it is not UTF-8."""
-    return utf8_text(read_bytes(path), path)
+def read_limited(path: str, most: int) -> bytes:
+    """What is in a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is larger."""
+    data = read_bytes(path, most + 1)
+    if len(data) > most:
+        raise FaultyFile([Fault(path, 1, 1, "", f"larger than {most >> 20} MiB")])
+    return data
+
+
+def read_utf8(path: str, most: int) -> str:
+    """The text of a file of at most ``most`` bytes, without a byte order mark; raises CannotRead or FaultyFile."""
+    return utf8_text(read_limited(path, most), path)
 
 
 def utf8_text(data: bytes, name: str) -> str:

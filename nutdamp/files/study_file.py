@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from nutdamp.errors import BadRequest, CannotRead
 from nutdamp.files.output import whole_file
 
 ANOTHER = "it belongs to another study: spacecraft, schedule, dispersions, --seed, --impulses and version must agree"
+
+MOST_BYTES = 1 << 30
+"""Of a file of results: more than those of `EXACT_CASES` cases take."""
 
 DAMAGED = "it is no file that --resume has written, or is damaged"
 
@@ -48,8 +53,11 @@ def load_results(path: str, study: Study, asked: int) -> Results:
     if not Path(path).exists():
         return Results(study, asked)
     try:
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
-            arrays = {name: kept[name] for name in kept.files}
+        with Path(path).open("rb") as stream:
+            _expect_unpacked(stream)
+            stream.seek(0)
+            with np.load(stream, allow_pickle=False) as kept:
+                arrays = {name: kept[name] for name in kept.files}
         belongs = str(arrays["fingerprint"]) == study.fingerprint and str(arrays["made_by"]) == _made_by()
         if belongs:
             _check(arrays)
@@ -63,6 +71,15 @@ def load_results(path: str, study: Study, asked: int) -> Results:
         return _results(study, arrays).extended(asked)
     except BadRequest as wrong:
         raise BadRequest(f"cannot resume from {path}: {wrong}") from wrong
+
+
+def _expect_unpacked(stream: IO[bytes]) -> None:
+    """Raises ValueError for an archive that unfolds to more than it takes itself, as `save_results` writes none."""
+    size = os.fstat(stream.fileno()).st_size
+    with zipfile.ZipFile(stream) as archive:
+        unfolded = sum(entry.file_size for entry in archive.infolist())
+    if size > MOST_BYTES or unfolded > size:
+        raise ValueError(f"{unfolded} bytes in a file of {size}")
 
 
 def _made_by() -> str:

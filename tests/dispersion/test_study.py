@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -168,6 +170,22 @@ def test_arrays_that_no_study_writes_are_refused(tmp_path: Path, change: dict[st
     np.savez(path, **{name: value for name, value in {**arrays, **change}.items() if value is not None})
     with pytest.raises(CannotRead, match="it is no file that --resume has written, or is damaged"):
         load_results(str(path), a_study(), 200)
+
+
+def test_an_archive_that_unfolds_is_refused_before_it_does(tmp_path: Path) -> None:
+    """512 MiB of zeros in a file of half a megabyte: no more memory than the file is taken."""
+    path = tmp_path / "study.npz"
+    save_results(str(path), run(Results(a_study(), 100)))
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive, archive.open("more.npy", "w") as entry:
+        for _ in range(512):
+            entry.write(bytes(1 << 20))
+    tracemalloc.start()
+    try:
+        with pytest.raises(CannotRead, match="it is no file that --resume has written, or is damaged"):
+            load_results(str(path), a_study(), 200)
+        assert tracemalloc.get_traced_memory()[1] < 16 << 20
+    finally:
+        tracemalloc.stop()
 
 
 def test_beyond_what_is_kept_singly_all_is_counted(

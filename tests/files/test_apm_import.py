@@ -15,7 +15,8 @@ from nutdamp.errors import FaultyFile
 from nutdamp.files.apm_import import imported
 from nutdamp.files.ccsds.apm_reader import read_apm
 from nutdamp.files.exchange import export_text
-from nutdamp.files.pulses_csv import pulses_csv, read_pulses
+from nutdamp.files.pulses_csv import pulses_csv
+from nutdamp.files.schedule_file import read_pulses
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.planning import Plan

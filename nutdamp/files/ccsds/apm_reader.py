@@ -19,7 +19,7 @@ from nutdamp.files.ccsds.kvn import from_kvn
 from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, VERSION, Block, Keyword
 from nutdamp.files.ccsds.xml import from_xml, is_xml
 from nutdamp.files.frames import FRAMES
-from nutdamp.files.input import read_bytes, utf8_text
+from nutdamp.files.input import read_limited, utf8_text
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Vector
 
@@ -70,9 +70,13 @@ class ApmContents:
     remarks: tuple[str, ...]
 
 
+MOST_BYTES = 16 << 20
+"""Of a message: many times more than its most manoeuvres take."""
+
+
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    data = read_bytes(path)
+    data = read_limited(path, MOST_BYTES)
     blocks, faults = from_xml(data, path) if is_xml(data) else from_kvn(utf8_text(data, path), path)
     _refuse_other_versions(path, blocks[0], faults)
     contents = _Reader(path, blocks, faults).read()

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from nutdamp.errors import CannotRead, Fault, FaultyFile
 from nutdamp.files.apm_import import imported
-from nutdamp.files.ccsds.apm_reader import ApmContents, euler, read_apm
+from nutdamp.files.ccsds.apm_reader import MOST_BYTES, ApmContents, euler, read_apm
 from nutdamp.files.exchange import export_text
 from nutdamp.physics import attitude
 
@@ -474,3 +474,13 @@ def test_what_is_not_in_its_encoding_is_refused(folder: Path, data: bytes, probl
 def test_the_message_in_shift_jis_is_told_what_it_lacks() -> None:
     with pytest.raises(FaultyFile, match="INERTIA: missing"):
         read_apm(str(case("crash-xml-encoding.apm.txt")))
+
+
+@pytest.mark.parametrize("start", [b"CCSDS_APM_VERS = 2.0\n", b"<?xml version='1.0'?>\n"])
+def test_a_message_that_is_none_by_its_size_is_refused(tmp_path: Path, start: bytes) -> None:
+    path = tmp_path / "huge.apm"
+    with path.open("wb") as stream:
+        stream.write(start)
+        stream.truncate(MOST_BYTES + 1)
+    with pytest.raises(FaultyFile, match="larger than 16 MiB"):
+        read_apm(str(path))

@@ -1,0 +1,285 @@
+"""Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
+
+Those are start_s (or t_s, the centre), on_time_s and channel. What a channel of the spacecraft file does follows from
+there; the columns of torque, impulse, propellant and date are looked at only to say where they contradict. Pulses of
+the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the schedule.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from nutdamp.epoch import Epoch
+from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.input import read_utf8
+from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
+from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, overlapping
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.units import shown
+
+AGREES = 1e-6
+"""Relative difference up to which columns of a schedule say the same."""
+
+LARGEST = 1e15
+"""Larger magnitudes are no schedule of a spacecraft, and would overflow later."""
+
+MOST_BYTES = 32 << 20
+"""Of a schedule file: many times more than its most pulses take."""
+
+MOST_PULSES = 100_000
+"""Rows of a schedule file."""
+
+STARTS = ("start_s", "t_s")
+
+Cells = dict[str, str]
+
+
+def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
+    """A schedule from a CSV file, and warnings: what columns contradict and so are ignored, channels not in the file.
+
+    Raises CannotRead, and FaultyFile with every fault of the file.
+    """
+    name = str(path)
+    reader = csv.reader(io.StringIO(read_utf8(name, MOST_BYTES), newline=""))
+    try:
+        rows = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as reason:
+        raise FaultyFile([Fault(name, reader.line_num, 1, "", f"not CSV: {reason}")]) from reason
+    if not rows:
+        raise FaultyFile([Fault(name, 1, 1, "", f"empty; the first line names the columns: {','.join(HEADER)}")])
+    if len(rows) > MOST_PULSES + 1:
+        raise FaultyFile([Fault(name, rows[-1][0], 1, "", f"more than {MOST_PULSES} pulses")])
+    return _Reader(name, spacecraft, [entry.strip() for entry in rows[0][1]]).read(rows[1:])
+
+
+class _Reader:
+    """Rows of one file into pulses, collecting faults, contradictions and warnings."""
+
+    def __init__(self, name: str, spacecraft: Spacecraft, header: list[str]) -> None:
+        self.name, self.spacecraft, self.header = name, spacecraft, header
+        self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.faults: list[Fault] = []
+        self.warnings: dict[str, list[tuple[int, str]]] = {}
+
+    def read(self, rows: list[tuple[int, list[str]]]) -> tuple[Schedule, list[str]]:
+        self._columns()
+        pulses = [(line, pulse) for line, row in rows if (pulse := self._pulse(line, row)) is not None]
+        for line, other in overlapping(pulses):
+            self._fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
+        if self.faults:
+            raise FaultyFile(self.faults)
+        return Schedule(tuple(pulse for _, pulse in pulses)), [self._told(found) for found in self.warnings.values()]
+
+    def _columns(self) -> None:
+        """Look at the first line. Raises FaultyFile."""
+        if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
+            raise FaultyFile([Fault(self.name, 1, 1, "", "columns are separated by commas, not by semicolons or tabs")])
+        if not set(STARTS) & set(self.header):
+            self._fault(1, STARTS[0], f"the column is missing (or {STARTS[1]}, the centre of each pulse)")
+        bare = not {*TORQUE, *IMPULSE} & set(self.header)  # else a pulse without channel is one of the torquer
+        for column in ("on_time_s", "channel") if bare else ("on_time_s",):
+            if column not in self.header:
+                self._fault(1, column, "the column is missing")
+        for column in {entry for entry in self.header if self.header.count(entry) > 1}:
+            self._fault(1, column, "the column stands twice")
+        if self.faults:
+            raise FaultyFile(self.faults)
+        for column in self.header:
+            if column not in HEADER and column != UTC:
+                self._warn(1, column, f"the column {shown(column)} is not known: ignored")
+
+    def _pulse(self, line: int, row: list[str]) -> Pulse | None:
+        """The pulse of one row; None where it has faults."""
+        if len(row) != len(self.header):
+            self._fault(line, "", f"{len(row)} values under {len(self.header)} columns")
+            return None
+        cells = dict(zip(self.header, (entry.strip() for entry in row), strict=True))
+        name = cells.get("channel") or STEERABLE
+        if not name.isprintable():
+            self._fault(line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected")
+            return None
+        timing = self._timing(line, cells)
+        if timing is None:
+            return None
+        t, on_time = timing
+        channel = self.channels.get(name)
+        if channel is not None and on_time > 0.0:
+            return self._of_channel(line, cells, channel_pulse(channel, t, on_time))
+        return self._as_given(line, cells, name, t, on_time)
+
+    def _timing(self, line: int, cells: Cells) -> tuple[float, float] | None:
+        """Centre and on-time, s; the start rules where there is one."""
+        column = next((column for column in STARTS if cells.get(column)), None)
+        if column is None:
+            self._fault(line, STARTS[0], "the time is missing")
+            return None
+        time, on_time = self._number(line, cells, column), self._number(line, cells, "on_time_s")
+        if time is None or on_time is None:
+            return None
+        if on_time < 0.0:
+            self._fault(line, "on_time_s", f"{on_time:g} s is negative; an ideal impulse has 0")
+            return None
+        start = time if column == STARTS[0] else time - 0.5 * on_time
+        if start < -1e-9:
+            self._fault(line, column, f"the pulse would start at {start:g} s, before t = 0")
+            return None
+        t = max(start, 0.0) + 0.5 * on_time if column == STARTS[0] else max(time, 0.5 * on_time)
+        if not Pulse(t, on_time, "", np.zeros(3)).resolved:
+            step = math.ulp(t + 0.5 * on_time)
+            self._fault(line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart")
+            return None
+        self._compare(line, cells, (STARTS[1],), [t], f"start_s + on_time_s/2 = {t:g}", scale=max(t, on_time))
+        return t, on_time
+
+    def _of_channel(self, line: int, cells: Cells, pulse: Pulse) -> Pulse:
+        """A pulse of a channel of the spacecraft file, which says what it does."""
+        inertia, named = self.spacecraft.inertia, shown(pulse.channel)
+        assert pulse.torque is not None
+        torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
+        self._compare(line, cells, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
+        self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × on_time_s, {_vector(impulse)}")
+        if pulse.propellant is not None:
+            used = f"{pulse.propellant:g} by the spacecraft file"
+            self._compare(line, cells, ("propellant_kg",), [pulse.propellant], used)
+        self._compare_dates(line, cells, pulse)
+        return pulse
+
+    def _as_given(self, line: int, cells: Cells, name: str, t: float, on_time: float) -> Pulse | None:
+        """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
+        inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.faults)
+        torque = self._vector(line, cells, TORQUE) if on_time > 0.0 else None
+        impulse = self._vector(line, cells, IMPULSE)
+        if torque is not None:
+            self._compare(line, cells, IMPULSE, torque * on_time, f"torque × on_time_s, {_vector(torque * on_time)}")
+            impulse = torque * on_time
+        if impulse is None:
+            if len(self.faults) == faults:
+                self._fault(line, "on_time_s" if channel else "channel", self._missing(name, channel, on_time))
+            return None
+        given = inertia.axes.T @ impulse
+        push = None if on_time == 0.0 else given / on_time
+        pulse = Pulse(t, on_time, name, given, push, None, self._propellant(line, name, channel, given, push))
+        self._compare_dates(line, cells, pulse)
+        return pulse
+
+    def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
+        """What a row lacks whose torque or impulse does not follow from the spacecraft file."""
+        impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
+        columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
+        if channel is not None:
+            return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
+        known = f" (it has {', '.join(map(shown, self.channels))})" if self.channels else ""
+        kind = "a steered pulse" if name == STEERABLE else f"{shown(name)}, not in the spacecraft file{known},"
+        return f"{kind} needs {columns}"
+
+    def _propellant(
+        self, line: int, name: str, channel: Channel | None, impulse: Vector, torque: Vector | None
+    ) -> float | None:
+        """Propellant of a pulse that flies as the schedule has it, kg; warns of what is not as in the file."""
+        if channel is not None:
+            ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
+            self._warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
+            return None
+        torquer = self.spacecraft.torquer
+        if name != STEERABLE or torquer is None:
+            known = ", ".join(map(shown, self.channels)) or STEERABLE
+            text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
+            self._warn(line, f"unknown {name}", text)
+            return None
+        size = 0.0 if torque is None else float(np.linalg.norm(torque))
+        if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
+            text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
+            self._warn(line, "steerable torque", text)
+        rate = torquer.propellant_per_impulse
+        return None if rate is None else rate * float(np.linalg.norm(impulse))
+
+    # --- cells -------------------------------------------------------------------------------------------------------
+
+    def _number(self, line: int, cells: Cells, column: str) -> float | None:
+        """The number in a cell that must have one; None for a fault."""
+        try:
+            value = float(cells[column])
+        except ValueError:
+            self._fault(line, column, f"{shown(cells[column])} is not a number")
+            return None
+        if not abs(value) <= LARGEST:
+            self._fault(line, column, f"{shown(cells[column])} is not a finite number of sensible size")
+            return None
+        return value
+
+    def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
+        """Three numbers; None where none is given, or one is a fault."""
+        if not any(cells.get(column) for column in columns):
+            return None
+        for column in columns:
+            cells.setdefault(column, "")
+        numbers = [self._number(line, cells, column) for column in columns]
+        return None if None in numbers else np.array(numbers, dtype=float)
+
+    def _compare(
+        self,
+        line: int,
+        cells: Cells,
+        columns: Sequence[str],
+        expected: Sequence[float] | Vector,
+        meant: str,
+        scale: float | None = None,
+    ) -> None:
+        """Warn where ``columns`` are given and say something else than what counts."""
+        texts = [cells.get(column, "") for column in columns]
+        if not any(texts):
+            return
+        try:
+            off = float(np.linalg.norm(np.array([float(text) for text in texts]) - expected))
+        except ValueError:
+            off = math.inf
+        if not off <= AGREES * (float(np.linalg.norm(expected)) if scale is None else scale):
+            named = columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
+            given = ", ".join(map(_brief, texts))
+            given = given if len(columns) == 1 else f"({given})"
+            self._warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
+
+    def _compare_dates(self, line: int, cells: Cells, pulse: Pulse) -> None:
+        expected = self.spacecraft.utc(pulse.start)
+        if not cells.get(UTC) or expected is None:
+            return
+        try:
+            off = abs(Epoch.parse(cells[UTC]).since(Epoch.parse(expected)))
+        except ValueError:
+            off = math.inf
+        if not off <= AGREES * max(pulse.t, 1.0):
+            self._warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
+
+    # --- what is told ------------------------------------------------------------------------------------------------
+
+    def _fault(self, line: int, where: str, problem: str) -> None:
+        self.faults.append(Fault(self.name, line, 1, where, problem))
+
+    def _warn(self, line: int, subject: str, text: str) -> None:
+        """Keep a warning; of several on one ``subject`` the first is told, with the number of others."""
+        self.warnings.setdefault(subject, []).append((line, text))
+
+    def _told(self, found: list[tuple[int, str]]) -> str:
+        line, text = found[0]
+        others = len(found) - 1
+        more = f" (and so in {others} more row{'s' if others > 1 else ''})" if others else ""
+        return f"{self.name}:{line}: {text}{more}"
+
+
+def _vector(parts: Vector) -> str:
+    return "(" + ", ".join(f"{part:g}" for part in parts.tolist()) + ")"
+
+
+def _brief(text: str) -> str:
+    """The text of a cell, a number in six digits."""
+    try:
+        return f"{float(text):g}"
+    except ValueError:
+        return shown(text)
