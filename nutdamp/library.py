@@ -106,9 +106,10 @@ class Spacecraft:
 
     def to_dict(self) -> dict[str, Any]:
         """What the JSON files say of a spacecraft."""
+        from nutdamp.files.output import finite
         from nutdamp.files.plan_json import spacecraft_json
 
-        return spacecraft_json(self.core)
+        return finite(spacecraft_json(self.core))
 
     def __repr__(self) -> str:
         inertia = self.inertia
@@ -284,9 +285,10 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` says of it."""
+        from nutdamp.files.output import finite
         from nutdamp.files.plan_json import plan_json
 
-        return plan_json(self.core)
+        return finite(plan_json(self.core))
 
     def _feasible_only(self) -> None:
         if not self.feasible:
@@ -351,10 +353,11 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` gives."""
+        from nutdamp.files.output import finite
         from nutdamp.files.plan_json import comparison_json
         from nutdamp.report import verdicts
 
-        return comparison_json(self.core, verdicts.spoken(self.core))
+        return finite(comparison_json(self.core, verdicts.spoken(self.core)))
 
     def __repr__(self) -> str:
         chosen = self.core.recommended

@@ -306,3 +306,12 @@ def test_notebooks_show_small_tables() -> None:
         assert "table" in tags.seen or not plan.feasible or "infeasible" in shown._repr_html_()
         assert "b" not in tags.seen
         assert repr(shown).startswith(f"<{type(shown).__name__}")
+
+
+def test_dictionaries_hold_no_number_that_json_has_not() -> None:
+    """A sphere has no nutation period in the body, and an ideal torquer no torque and no propellant."""
+    ball = nutdamp.read("name: Ball\ninertia: {A: 100, C: 100}\nstate: {spin: 3, nutation: 5 deg}\n")
+    compared = nutdamp.compare(ball)
+    assert ball.to_dict()["body_nutation_period_s"] is None
+    for one in (ball, compared, *compared):
+        json.dumps(one.to_dict(), allow_nan=False)
