@@ -13,7 +13,7 @@ from nutdamp.cli.failures import debug_option, show_failures
 from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
-from nutdamp.schemes import LEAST, Options
+from nutdamp.schemes import AIMED, LEAST, SUNLIT, Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -156,17 +156,21 @@ READ_BY = {
 """Options of planning that only some schemes read; the others are for all."""
 
 
-SUN_SCHEME = "rhumb-line"
-"""The scheme that reads the direction of the Sun."""
-
-
 def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
-    """Say what was asked for that none of the schemes ``names`` heeds."""
+    """Say what was asked for that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
     for option, readers in READ_BY.items():
         if getattr(options, option) != Options._field_defaults[option] and not set(readers) & set(names):
             remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
-    if body.goal.sun is not None and SUN_SCHEME not in names:
-        remark(f"--sun does nothing here: it is for {SUN_SCHEME}")
+    if body.goal.sun is not None:
+        deaf = [name for name in names if name not in SUNLIT]
+        if len(deaf) == len(names):
+            raise click.UsageError(f"--sun is for {' and '.join(SUNLIT)}, which is not planned here")
+        if deaf:
+            remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(deaf)} plan without it")
+    if names and body.goal.axis is None and set(names) <= set(AIMED):
+        turns, needs = ("turns", "needs") if len(names) == 1 else ("turn", "need")
+        problem = f"{turns} the spin axis to a target and {needs} one: --target, or goal in the file"
+        raise click.UsageError(f"{' and '.join(names)} {problem}")
 
 
 def scheme_options(command: Command) -> Command:

@@ -165,12 +165,16 @@ def json_text(data: dict[str, Any]) -> str:
     return re.sub("[\x7f-\x9f\u2028\u2029]", lambda found: f"\\u{ord(found[0]):04x}", text) + "\n"
 
 
-def finite(value: Any) -> Any:
+def finite(data: dict[str, Any]) -> dict[str, Any]:
     """The data with numbers that are not finite as None."""
+    return {key: _finite(entry) for key, entry in data.items()}
+
+
+def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: finite(entry) for key, entry in value.items()}
+        return finite(value)
     if isinstance(value, list | tuple):
-        return [finite(entry) for entry in value]
+        return [_finite(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

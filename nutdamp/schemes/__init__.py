@@ -21,6 +21,12 @@ CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
 POINTING = ("two-pulse", "half-cone", "rhumb-line", "optimal")
 """The schemes that can turn the spin axis to a target axis, planned when there is one and none is named."""
 
+AIMED = ("half-cone", "rhumb-line")
+"""The schemes that do nothing else, and need a target."""
+
+SUNLIT = ("rhumb-line",)
+"""The schemes that keep their pulses at a fixed phase to the Sun, where the goal says where it is."""
+
 SPINNING = ("optimal",)
 """The schemes that can set the spin rate."""
 
