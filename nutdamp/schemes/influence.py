@@ -21,6 +21,9 @@ from nutdamp.spacecraft import Spacecraft, Vector
 MOST_GROWN = 30.0
 """Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost."""
 
+KNOTS = 400
+"""Even moments, besides the edges of pulses, at which ω3 is read from a flight with dissipation."""
+
 
 @dataclass(frozen=True, slots=True)
 class Equations:
@@ -97,7 +100,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
     def rows(times: Vector) -> Vector:
         _, quaternions = flight.motion(times)
         columns = [attitude.rotate(quaternions, axis) @ across.T for axis in np.eye(3)]
-        back = _turned_back(flight.spacecraft, flight.schedule, times)
+        back = _turned_back(flight, times)
         return _all_rows(back, np.stack(columns, axis=-1))[:, equations.chosen]
 
     here = Influence(rows, np.zeros(0), _turning(flight.spacecraft)[equations.chosen])
@@ -107,7 +110,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
 def misses(flight: Flight, equations: Equations) -> Vector:
     """What a flight leaves of the equations, (equations,) N m s; zero where it ends as asked."""
     body, end = flight.spacecraft, flight.settled
-    back = _turned_back(body, flight.schedule, np.array([flight.schedule.end]))[0]
+    back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back
     momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.moments))
     final = end.spin if body.goal.spin is None else body.goal.spin
@@ -130,16 +133,32 @@ def square_to_target(spacecraft: Spacecraft) -> Vector:
     return np.array([first, sense * np.cross(axis, first)])
 
 
-def _turned_back(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> Vector:
+def _turned_back(flight: Flight, times: Vector) -> Vector:
     """e^{ia∫ω3dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
+    spacecraft, schedule = flight.spacecraft, flight.schedule
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
+    if spacecraft.growth != 0.0:
+        return _turned_back_by_flight(flight, times)
     turned = (spacecraft.spin + 0.5 * drift * times) * times
     for pulse in schedule:
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
-    grown = np.minimum(-spacecraft.growth * (times - schedule.end), MOST_GROWN)
-    return np.asarray(np.exp(1j * inertia.a * turned + grown))
+    return np.asarray(np.exp(1j * inertia.a * turned))
+
+
+def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
+    """`_turned_back` where dissipation changes ω3: on coasts it is ω/ω3, or tan θ, that grows by e^{κt} exactly."""
+    body = flight.spacecraft
+    edges = [leg.start for leg in flight.legs]
+    knots = np.unique(np.concatenate([edges, np.linspace(0.0, max(float(np.max(times)), edges[-1]), KNOTS)]))
+    spins = flight.motion(knots)[0][:, 2]
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))])
+    grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
+    least = math.exp(-MOST_GROWN) * abs(body.spin)
+    now, then = (np.maximum(np.abs(np.interp(at, knots, spins)), least) for at in (times, flight.schedule.end))
+    phase = body.inertia.a * np.interp(times, knots, turned)
+    return np.asarray(np.exp(1j * phase + grown) * then / now)
 
 
 def _complex_product(factors: Vector) -> Vector:
