@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from nutdamp.physics import attitude, energy_sink, rates, rigid
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.rigid import Forcing, Piece
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import Track, make_track, widest
 
@@ -283,9 +283,10 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     setting, state = make_setting(spacecraft), spacecraft.initial
     legs: list[Leg] = []
     now = 0.0
-    for index, (pulse, kick) in enumerate(zip(schedule, effective_impulses(spacecraft, schedule), strict=True)):
+    for index, pulse in enumerate(schedule):
         path, state = setting.path(state, now, pulse.t)
         legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
+        kick = _effective_impulse(spacecraft, pulse, state.spin)
         state = setting.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
         now = pulse.t
     last = max(until, schedule.end)
@@ -299,22 +300,24 @@ def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np
 
     With I1 ≠ I2 by the rate of a small nutation, which turns on an ellipse: exact for small angles.
     """
-    inertia, spin = spacecraft.inertia, spacecraft.spin
-    drift = spacecraft.spin_drift
-    impulses = np.empty(len(schedule), dtype=complex)
-    for index, pulse in enumerate(schedule):
-        axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
-        factor = rates.width_factor(
-            inertia.body_rate,
-            spin + drift * pulse.start,
-            axial_torque / inertia.C,
-            pulse.on_time,
-            growth=spacecraft.growth,
-            drift=drift,
-        )
-        impulses[index] = complex(pulse.impulse[0], pulse.impulse[1]) * factor
-        spin += float(pulse.impulse[2]) / inertia.C
-    return impulses
+    arcs = by_impulses(spacecraft, schedule).legs[:-1]  # each up to its pulse
+    spins = [float(leg.path.motion(np.array([leg.end]))[0][0, 2]) for leg in arcs]
+    return np.array([_effective_impulse(spacecraft, *one) for one in zip(schedule, spins, strict=True)], dtype=complex)
+
+
+def _effective_impulse(spacecraft: Spacecraft, pulse: Pulse, spin: float) -> complex:
+    """What ``pulse`` acts like on ω at its centre, N m s; ``spin`` is ω3 there before it acts, rad/s."""
+    inertia, drift = spacecraft.inertia, spacecraft.spin_drift
+    axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
+    factor = rates.width_factor(
+        inertia.body_rate,
+        spin - 0.5 * drift * pulse.on_time,
+        axial_torque / inertia.C,
+        pulse.on_time,
+        growth=spacecraft.growth,
+        drift=drift,
+    )
+    return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
 
 def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:

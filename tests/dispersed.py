@@ -68,6 +68,11 @@ def with_jets(
     return Model(replace(body, dispersions=everything(scale)), Schedule(pulses))
 
 
+def sinking(model: Model, time_constant: float = 15.0) -> Model:
+    """The same with energy dissipation."""
+    return Model(replace(model.spacecraft, dissipation=time_constant), model.schedule)
+
+
 def steered(
     *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
 ) -> Model:

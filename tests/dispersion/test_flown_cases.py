@@ -38,7 +38,14 @@ def disturbed() -> Model:
     return Model(body, model.schedule)
 
 
-@pytest.mark.parametrize("model", [*MODELS.values(), disturbed()], ids=[*MODELS, "disturbances, dissipation"])
+SINKING = [dispersed.sinking(MODELS["prolate"]), dispersed.sinking(MODELS["oblate, spin reversed"], 5.0)]
+
+
+@pytest.mark.parametrize(
+    "model",
+    [*MODELS.values(), disturbed(), *SINKING],
+    ids=[*MODELS, "disturbances, dissipation", "prolate, dissipation", "oblate, dissipation"],
+)
 def test_each_case_is_the_flight_of_its_own_spacecraft(model: Model) -> None:
     draws = dispersed.first_cases(Study(model), CASES)
     found = np.empty((5, CASES))

@@ -32,6 +32,10 @@ MODELS = {
     "near a sphere": dispersed.with_jets(moments=(100.0, 100.0, 100.0)),
     "steerable, oblate, spin reversed": dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-4.0),
 }
+SINKING = {
+    "prolate": dispersed.sinking(MODELS["prolate"]),
+    "steerable, oblate, spin reversed": dispersed.sinking(MODELS["steerable, oblate, spin reversed"], 4.0),
+}
 
 
 def outputs(model: Model, draws: object) -> np.ndarray:
@@ -88,9 +92,10 @@ def test_the_swarm_is_the_reference_integrator() -> None:
     assert rotation[0] == pytest.approx(alone.rotation, abs=1e-11)
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_each_case_is_the_impulse_sum_of_its_own_spacecraft(name: str) -> None:
-    model = MODELS[name]
+@pytest.mark.parametrize(
+    "model", [*MODELS.values(), *SINKING.values()], ids=[*MODELS, *(f"{n}, sink" for n in SINKING)]
+)
+def test_each_case_is_the_impulse_sum_of_its_own_spacecraft(model: Model) -> None:
     draws = dispersed.first_cases(Study(model), CASES)
     found = outputs(model, draws)
     for case in range(0, CASES, 5):
@@ -99,8 +104,31 @@ def test_each_case_is_the_impulse_sum_of_its_own_spacecraft(name: str) -> None:
         assert found[1, case] == pytest.approx(left.momentum_shift, abs=1e-12)
 
 
-def test_no_draw_is_the_estimate_itself() -> None:
-    model = MODELS["prolate"]
+@pytest.mark.parametrize("name", SINKING)
+def test_cases_with_dissipation_agree_with_an_independent_integrator(name: str) -> None:
+    """Kicks at the pulse centres, by DOP853 on H in space and the attitude."""
+    model = SINKING[name]
+    draws = dispersed.first_cases(Study(model), CASES)
+    found = outputs(model, draws)
+    for case in range(0, CASES, 10):
+        true, schedule = realised(model, dispersed.one_of(draws, case))
+        kicks = [
+            reference.Kick(pulse.t, np.array([acting.real, acting.imag, pulse.impulse[2]]))
+            for pulse, acting in zip(schedule, flight.effective_impulses(true, schedule), strict=True)
+        ]
+        until = max(pulse.t for pulse in schedule)
+        start = reference.frame_n(true.inertia.moments, true.omega0)
+        end = reference.fly(true.inertia.moments, true.omega0, kicks, until, start, true.growth)
+        before = start @ (np.asarray(true.inertia.moments) * true.omega0)
+        shift = reference.angle(before, reference.momentum(true.inertia.moments, end))
+        sense = math.copysign(1.0, true.spin)
+        assert found[0, case] == pytest.approx(reference.nutation(true.inertia.moments, end.rates, sense), abs=1e-9)
+        assert found[1, case] == pytest.approx(shift, abs=1e-9)
+        assert found[3, case] == pytest.approx(end.rates[2] - true.spin, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", [MODELS["prolate"], SINKING["prolate"]], ids=["free", "sink"])
+def test_no_draw_is_the_estimate_itself(model: Model) -> None:
     left = flight.by_impulses(model.spacecraft, model.schedule).residual
     found = Study(model).outputs_of({})
     assert found[:3] == pytest.approx([left.nutation, left.momentum_shift, left.axis_error], abs=1e-13)

@@ -22,7 +22,11 @@ def outcome(model: Model, draws: dict[str, float]) -> np.ndarray:
     return out[:, 0]
 
 
-@pytest.mark.parametrize("model", [dispersed.with_jets(), dispersed.steered(spin=-3.0)], ids=["jets", "steered"])
+@pytest.mark.parametrize(
+    "model",
+    [dispersed.with_jets(), dispersed.steered(spin=-3.0), dispersed.sinking(dispersed.with_jets())],
+    ids=["jets", "steered", "jets, dissipation"],
+)
 def test_derivatives_agree_with_central_differences(model: Model) -> None:
     found = first_order(model)
     for column, entry in enumerate(found.inputs):
