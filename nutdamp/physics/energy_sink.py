@@ -43,6 +43,10 @@ TINY = 1e-200
 """Keeps quotients like asinh x / x defined at zero, and changes nothing elsewhere."""
 
 
+SMALLEST = 1e-150
+"""Least cosine of a nutation angle that is told from zero: its square is a number still."""
+
+
 class Course(NamedTuple):
     """What the sink does to an arc, by numbers that multiply or add to the free arc of the same body.
 
@@ -97,6 +101,20 @@ def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent:
         cosine=grown,
         sine=0.5 * cosine * of.expm1(x) / (size * grown),
     )
+
+
+def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: float) -> float:
+    """Time in s after which `Course.turned` is ``turned`` s: its inverse; infinite where it never comes to be.
+
+    With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))): of flat spin no
+    turn is left to come.
+    """
+    c = max(abs(cosine), SMALLEST)
+    z = growth * c * turned
+    slowed = math.expm1(min(2.0 * z, FOR_EVER)) * sine_squared / (2.0 * c * (1.0 + c))
+    if slowed >= 1.0:
+        return math.inf
+    return (z - math.log1p(-slowed)) / growth if growth != 0.0 else turned
 
 
 def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> Course:

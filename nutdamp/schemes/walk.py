@@ -22,6 +22,10 @@ MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
 
 
+TRIMMED = 1e-4
+"""Share of A|ω0| that is left to trimming under dissipation: `rates.width_factor` knows it at small angles only."""
+
+
 class Walk:
     """The transverse rate as it will be, and the pulses chosen so far.
 
@@ -46,8 +50,9 @@ class Walk:
 
     @property
     def settled(self) -> bool:
-        """Whether what is left is rounding."""
-        return self.left <= 1e-13 * self.C * abs(self.spin)
+        """Whether what is left is rounding; under dissipation, what the last pulse can be trimmed by."""
+        trimmed = 0.0 if self.spacecraft.growth == 0.0 else TRIMMED * self.spacecraft.least_impulse
+        return self.left <= max(1e-13 * self.C * abs(self.spin), trimmed)
 
     @property
     def full(self) -> bool:
@@ -80,6 +85,23 @@ class Walk:
             omega, spin, turned = omega * found.transverse, spin * found.axial, found.turned
         angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
         return omega * cmath.exp(-1j * angle), spin + drift * since
+
+    def _sink(self) -> tuple[float, float, float]:
+        """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
+        axial, across = (self.C * self.spin) ** 2, (self.A * abs(self.omega)) ** 2
+        size = axial + across
+        if size == 0.0:
+            return self.spacecraft.growth, 1.0, 0.0
+        return self.spacecraft.growth, math.sqrt(axial / size), across / size
+
+    def _turned(self, time: float) -> float:
+        """How long, s, the present spin takes to turn the body as far as it turns from now to ``time`` s."""
+        since = time - self.now
+        return since if self.spacecraft.growth == 0.0 else energy_sink.course(*self._sink(), since).turned
+
+    def _when(self, turned: float) -> float:
+        """The moment at which `_turned` is ``turned`` s."""
+        return self.now + (turned if self.spacecraft.growth == 0.0 else energy_sink.time_to_turn(*self._sink(), turned))
 
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
@@ -142,22 +164,24 @@ class Walk:
     def align(self, channel: Channel, on_time: float) -> Pulse | None:
         """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
         on_time = self.windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
-        probe = channel_pulse(channel, 0.0, on_time)
+        probe = channel_pulse(channel, self.now, on_time)
         turn = damping.phase_to_oppose(self.omega, self.acts(probe))
         if math.isinf(self.period):
             start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
-        first = self.now + turn / (self.a * self.spin)
+        first = turn / (self.a * self.spin)  # and the times below: as long as it takes at the present spin
         # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
         slack = min(SLACK, 1e-3 * on_time) if self.pulses else 0.0
 
         def alignment(ready: float) -> float:
             """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
-            return math.ceil((ready + 0.5 * on_time - first - slack) / self.period)
+            return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
 
         turns = alignment(self.ready)
         for _ in range(len(self.windows.limits.blackout) + MISSED):
-            centre = first + turns * self.period
+            centre = self._when(first + turns * self.period)
+            if math.isinf(centre):  # dissipation stops the spin before
+                return None
             if not self.uniform:
                 centre = self._opposed_near(channel, centre, on_time)
             start = centre - 0.5 * on_time
