@@ -93,6 +93,8 @@ def _off_limits() -> str:
 
 def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
     widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in pulses), default=0.0)
+    if widest == 0.0:
+        return "placed for free motion of a symmetric body, two impulses could not be trimmed to the target"
     return (
         f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
         "target; half-cone with more cones or rhumb-line take smaller ones"

@@ -8,6 +8,9 @@ import math
 from nutdamp.schemes.walk import Walk
 from nutdamp.spacecraft import Channel, Spacecraft
 
+FADED = 1e-6
+"""Share of the nutation below which there is nothing left for pulses to do: dissipation has taken it out before."""
+
 
 def no_channels(spacecraft: Spacecraft) -> str:
     """No body-fixed channel can damp."""
@@ -40,12 +43,20 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         )
     walk = Walk(spacecraft, endless=True)
     pulses = [walk.align(channel, max(channel.min_on_time, 1e-6 * walk.period)) for channel in channels]
-    ends = [pulse.end for pulse in pulses if pulse is not None and walk.helps(pulse)]
+    there = [pulse for pulse in pulses if pulse is not None]
+    if not there:
+        return "no channel ever opposes the nutation" + (
+            ": dissipation brings the body into flat spin before, where ω stands still in it" if walk.growing else ""
+        )
+    ends = [pulse.end for pulse in there if walk.helps(pulse)]
     if not ends:
-        least = min(walk.left_after(pulse) for pulse in pulses if pulse is not None)
+        best = min(there, key=walk.left_after)
+        left = walk.A * abs(walk.omega_at(best.t))
+        if left < FADED * walk.left:
+            return f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
         return (
-            f"every channel's shortest pulse is too strong: {walk.left:.4g} N m s are to be taken out, "
-            f"and firing would leave {least:.4g} N m s; lower min_on_time"
+            f"every channel's shortest pulse is too strong: {left:.4g} N m s are to be taken out, "
+            f"and firing would leave {walk.left_after(best):.4g} N m s; lower min_on_time"
         )
     return (
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "

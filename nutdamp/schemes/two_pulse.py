@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import damping, rates
+from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, trim
-from nutdamp.schemes.advice import no_channels
+from nutdamp.schemes.advice import FADED, no_channels
 from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
@@ -326,9 +326,23 @@ def _place(
     windows, a, spin = Windows(spacecraft), spacecraft.inertia.a, spacecraft.spin
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     factor = 1.0 if literal else 1.0 / math.cos(0.5 * miss)
+    # Both together oppose ω0 where the middle between their directions does.
+    phase = damping.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
+    if a == 0.0 and abs(phase) > ALIGNED:
+        return None
+    period = 2 * math.pi / abs(a * spin) if a != 0.0 else math.inf
+
+    def opposed_from(time: float) -> float:
+        if a == 0.0:
+            return time
+        return phase / (a * spin) + max(math.ceil((time - phase / (a * spin)) / period), 0) * period
+
+    grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
+    if grown < FADED:
+        return None
     on_times, short = [], 0.0
     for channel, half in ((one, halves.first), (two, halves.second)):
-        wanted = half * factor
+        wanted = grown * half * factor
         rate = channel.axial / spacecraft.inertia.C
         on_time = rates.on_time_for(wanted, abs(channel.transverse), a, spin, rate, channel.max_on_time)
         longest = min(channel.max_on_time, math.pi / abs(a * spin) if a != 0.0 else math.inf)
@@ -337,17 +351,7 @@ def _place(
         short += abs(wanted - reached) / (spacecraft.least_impulse * factor)
     if short >= 1.0:
         return None
-    # Both together oppose ω0 where the middle between their directions does.
-    phase = damping.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
-    earliest = spacecraft.limits.earliest
-    if a == 0.0:
-        if abs(phase) > ALIGNED:
-            return None
-        period, first = math.inf, earliest + 0.5 * on_times[0]
-    else:
-        period = 2 * math.pi / abs(a * spin)
-        first = phase / (a * spin)
-        first += max(math.ceil((earliest + 0.5 * on_times[0] - first) / period), 0) * period
+    first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
     if wait - 0.5 * sum(on_times) < spacecraft.limits.gap:
         return None
     while first + wait + 0.5 * on_times[1] <= windows.horizon:
@@ -361,11 +365,17 @@ def _place(
             made = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
             return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
-        if a == 0.0:
-            first += delay
-        else:
-            first += max(math.ceil(delay / period), 1) * period
+        first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
+
+
+def _grown(spacecraft: Spacecraft, time: float) -> float:
+    """By what factor dissipation changes the transverse rate until ``time`` s."""
+    if spacecraft.growth == 0.0:
+        return 1.0
+    inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
+    found = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
+    return float(found.transverse)
 
 
 def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
@@ -375,6 +385,8 @@ def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
             "in a sphere (a = 0) ω stands still in the body, and no two of the channels "
             f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
         )
+    if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
+        return f"dissipation takes the nutation out before the channels ({names}) come to oppose it"
     return (
         f"no two of the channels ({names}) bring H back and oppose the nutation within the horizon of "
         f"{spacecraft.horizon:.4g} s, the on-times, gap and blackout windows"

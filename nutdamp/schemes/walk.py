@@ -55,6 +55,11 @@ class Walk:
         return self.left <= max(1e-13 * self.C * abs(self.spin), trimmed)
 
     @property
+    def growing(self) -> bool:
+        """Whether the nutation grows by itself."""
+        return self.spacecraft.growth > 0.0
+
+    @property
     def full(self) -> bool:
         """Whether no more pulses are allowed."""
         return len(self.pulses) >= self.most
