@@ -36,9 +36,6 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "spin axis", f"{found.kind} moment of inertia; {stable}{warning}"
     body, despun, inertial = found.rates
     yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
-    if spacecraft.growth != 0.0:
-        what = "grows" if spacecraft.growth > 0.0 else "decays"
-        yield "dissipation", f"the nutation {what} e-fold in {duration(abs(1.0 / spacecraft.growth))}"
     if not spacecraft.inertia.aligned:
         yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):

@@ -58,6 +58,8 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
+    if spacecraft.dissipation is not None:
+        table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
     beyond = _beyond_floors(spacecraft)
     floor = f"no bound with {beyond}" if beyond else "no schedule needs less"
     table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
@@ -72,6 +74,16 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     for name, value in more:
         table.add_row(name, value)
     return table
+
+
+def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
+    """What energy dissipation does to the nutation, and whether it is as slow as the model of it takes for granted."""
+    if spacecraft.growth == 0.0:
+        return "none: a sphere has no energy to lose"
+    what = "grows" if spacecraft.growth > 0.0 else "decays"
+    slow = time_constant >= spacecraft.inertial_period
+    rough = "" if slow else "; less than one inertial period: results are rough"
+    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
 def _beyond_floors(spacecraft: Spacecraft) -> str:
