@@ -163,6 +163,7 @@ def test_the_first_order_least_knows_dissipation() -> None:
         one = plan(body, "optimal")
         bounds = one.pulses.bounds
         assert bounds is not None
+        assert bounds.first_order is not None
         assert bounds.rigorous is None
         assert one.pulses.total_impulse == pytest.approx(bounds.first_order, rel=0.01)
         assert (bounds.first_order < 0.6 * body.least_impulse) == (A < C)
