@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 
@@ -37,12 +38,22 @@ class Fault(NamedTuple):
         place = f"{file}:{self.line}:{self.column}" if self.line else file
         return f"{place}: {self.where}: {self.problem}" if self.where else f"{place}: {self.problem}"
 
+    @property
+    def as_warning(self) -> str:
+        """How it is told where the file is taken all the same."""
+        return str(self._replace(problem=f"warning: {self.problem}"))
+
+
+def in_order(faults: Iterable[Fault]) -> list[Fault]:
+    """Faults in the order of their file."""
+    return sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
+
 
 class FaultyFile(NutdampError):
     """An input file says something that cannot be; carries all its faults, in the order of the file."""
 
     def __init__(self, faults: list[Fault]) -> None:
-        self.faults = sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
+        self.faults = in_order(faults)
         super().__init__(self.faults)
 
     def __str__(self) -> str:

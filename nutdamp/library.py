@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from nutdamp import arguments, planning
 from nutdamp import flight as flights
 from nutdamp import spacecraft as craft
-from nutdamp.errors import BadRequest, Infeasible, printable
+from nutdamp.errors import BadRequest, Fault, Infeasible, printable
 from nutdamp.flight import Residual
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Options
@@ -378,15 +378,19 @@ def load(path: str | PathLike[str], *, set: Mapping[str, object] | None = None) 
     from nutdamp.files.settings import settings_of
     from nutdamp.files.spacecraft_file import load_spacecraft
 
-    return Spacecraft(load_spacecraft(arguments.path("path", path), settings_of(arguments.changes(set))))
+    name, changes = arguments.path("path", path), settings_of(arguments.changes(set))
+    doubts: list[Fault] = []
+    return _with_warnings(load_spacecraft(name, changes, doubts.append), doubts)
 
 
 def read(text: str, name: str = "text") -> Spacecraft:
     """The spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file ``name``."""
     from nutdamp.files.spacecraft_file import read_spacecraft
 
+    doubts: list[Fault] = []
     arguments.instance("text", text, str, "the text of a spacecraft file (nutdamp.load reads files)")
-    return Spacecraft(read_spacecraft(text, arguments.instance("name", name, str, "a text")))
+    body = read_spacecraft(text, arguments.instance("name", name, str, "a text"), warn=doubts.append)
+    return _with_warnings(body, doubts)
 
 
 def example() -> Spacecraft:
@@ -427,6 +431,13 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
     for remark in (*remarks, *planning.broken_limits(core, schedule)):
         warnings.warn(remark, stacklevel=2)
     return Plan(planning.Plan(core, printable(name), schedule))
+
+
+def _with_warnings(body: craft.Spacecraft, doubts: list[Fault]) -> Spacecraft:
+    """The spacecraft of a file; warns of numbers that are hardly what was meant, where the library was called."""
+    for doubt in doubts:
+        warnings.warn(doubt.as_warning, stacklevel=3)
+    return Spacecraft(body)
 
 
 def _core(spacecraft: Spacecraft) -> craft.Spacecraft:

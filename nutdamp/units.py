@@ -39,8 +39,8 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3}),
-    "length": Kind("a length", {"m": 1.0, "mm": 1e-3}),
-    "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0}),
+    "length": Kind("a length", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3}),
+    "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "hours": 3600.0}),
     "force": Kind("a force", {"N": 1.0, "mN": 1e-3}),
     "torque": Kind("a torque", {"N m": 1.0, "mN m": 1e-3}),
     "inertia": Kind("a moment of inertia", {"kg m^2": 1.0}),
@@ -57,13 +57,23 @@ LARGEST = 1e15
 _QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
-# "Nm" and "kgm^2" are as clear as "N m" and "kg m^2", and much used.
-_SPELLINGS: dict[str, tuple[str, float]] = {
-    spelling: (name, factor)
+_WORDS = {"deg": "(deg(rees?)?|°)", "s": "s(ec)?", "hours": "hours?", "rpm": "[rR][pP][mM]"}
+"""Regular expressions of words within units that are spelt in several ways."""
+
+
+def _spellings(unit: str) -> str:
+    """Regular expression (ECMA 262 and Python) of all that is read as ``unit``."""
+    words = (_WORDS.get(word, word) for word in re.split(r"([ /])", unit))
+    # "Nm" and "kgm^2" are as clear as "N m" and "kg m^2", and much used.
+    return "".join("[ *·]*" if word == " " else word.replace("^2", "(\\^2|²)") for word in words)
+
+
+_UNITS = [
+    (re.compile(_spellings(unit)), name, factor)
     for name, kind in KINDS.items()
     for unit, factor in kind.factors.items()
-    for spelling in (unit, unit.replace(" ", ""))
-}
+]
+"""What is read as a unit, its kind and its factor to SI."""
 
 
 def parse(value: object, kind: str, *, bare: bool = False) -> float:
@@ -98,28 +108,28 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     # A "unit" that starts like the rest of a number is a decimal comma or a thousands separator.
     if match is None or re.match(r"[0-9.,_']", match[2]):
         raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
-    number, unit = float(match[1]), re.sub(r"[\s*·]+", " ", match[2]).replace("²", "^2")
+    number, unit = float(match[1]), re.sub(r"\s+", " ", match[2])
     if not unit and bare:
         return number, 1.0
     if not wanted.factors:
         raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
     if not unit:
         raise ValueError(f"{shown(text)} has no unit; add {wanted.units}, or leave the quotes out")
-    if unit not in _SPELLINGS:
+    found = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
+    if found is None:
         noun = wanted.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
         raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {wanted.units}{hint}")
-    found, factor = _SPELLINGS[unit]
-    if found != kind:
-        raise ValueError(f"{shown(text)} is {KINDS[found].noun}; {wanted.noun} is wanted: {wanted.wanted}")
-    return number, factor
+    if found[0] != kind:
+        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; {wanted.noun} is wanted: {wanted.wanted}")
+    return number, found[1]
 
 
 def pattern(kind: str) -> str:
     """Regular expression (ECMA 262 and Python) of the texts that `parse` takes for ``kind``; for JSON Schema."""
-    units = [unit.replace("^2", "(\\^2|²)").replace(" ", "[ *·]*") for unit in KINDS[kind].factors]
-    return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({'|'.join(units)})\s*$"
+    units = "|".join(map(_spellings, KINDS[kind].factors))
+    return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})\s*$"
 
 
 def shown(value: object) -> str:

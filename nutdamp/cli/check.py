@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
+    from nutdamp.errors import Fault
     from nutdamp.files.settings import Setting
 
 
@@ -34,14 +35,15 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
     for name in files or (None,):
+        doubts: list[Fault] = []
         try:
-            report, screen = _looked_into(Input(name, settings), remarks(quiet))
+            report, screen = _looked_into(Input(name, settings), remarks(quiet), doubts)
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.files.check_json import failed_json
 
             say(str(wrong))
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
-            reports.append(failed_json(name, wrong))
+            reports.append(failed_json(name, wrong, doubts))
             continue
         reports.append(report)
         if not silent:
@@ -61,8 +63,10 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
         sys.exit(max(failures))
 
 
-def _looked_into(given: Input, remark: Callable[[str], None]) -> tuple[dict[str, Any], RenderableType]:
-    """What follows from a file, for JSON and for the screen.
+def _looked_into(
+    given: Input, remark: Callable[[str], None], doubts: list[Fault]
+) -> tuple[dict[str, Any], RenderableType]:
+    """What follows from a file, for JSON and for the screen; warnings are added to ``doubts``.
 
     Raises CannotRead, and FaultyFile also for what turns out to be wrong only when consequences are worked out.
     """
@@ -70,8 +74,8 @@ def _looked_into(given: Input, remark: Callable[[str], None]) -> tuple[dict[str,
     from nutdamp.files.check_json import checked_json
     from nutdamp.report.check_tables import check_screen
 
-    spacecraft = load(given, remark)
+    spacecraft = load(given, remark, doubts=doubts)
     try:
-        return checked_json(given.path, spacecraft), check_screen(spacecraft)
+        return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft)
     except NutdampError as wrong:
         raise FaultyFile([Fault(given.path or DEFAULT_FILE, 1, 1, "", str(wrong))]) from wrong

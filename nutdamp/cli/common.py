@@ -18,7 +18,7 @@ from nutdamp.schemes import AIMED, LEAST, SUNLIT, Options
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from nutdamp.errors import CannotWrite
+    from nutdamp.errors import CannotWrite, Fault
     from nutdamp.files.settings import Setting
     from nutdamp.planning import Plan
     from nutdamp.spacecraft import Spacecraft, Vector
@@ -266,14 +266,21 @@ def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
     figures.ending(path)
 
 
-def load(given: Input, remark: Callable[[str], None], aim: Aim | None = None) -> Spacecraft:
+def load(
+    given: Input, remark: Callable[[str], None], aim: Aim | None = None, doubts: list[Fault] | None = None
+) -> Spacecraft:
     """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example.
 
-    ``aim`` takes the place of the goal in the file.
+    ``aim`` takes the place of the goal in the file; warnings are added to ``doubts``.
     """
     from nutdamp.files.spacecraft_file import read_spacecraft
 
-    body = read_spacecraft(*source(given.path, remark), given.settings)
+    def warn(doubt: Fault) -> None:
+        remark(doubt.as_warning)
+        if doubts is not None:
+            doubts.append(doubt)
+
+    body = read_spacecraft(*source(given.path, remark), given.settings, warn)
     return body if aim is None else aim.applied(body)
 
 

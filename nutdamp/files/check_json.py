@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from nutdamp import __version__, survey
-from nutdamp.errors import CannotRead, FaultyFile
+from nutdamp.errors import CannotRead, Fault, FaultyFile
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.spacecraft import Spacecraft
 
@@ -16,25 +17,37 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
     return {"nutdamp": __version__, "files": reports}
 
 
-def failed_json(name: str | None, wrong: FaultyFile | CannotRead) -> dict[str, Any]:
-    """A file that could not be read or says something that cannot be."""
+def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+    """A file that could not be read or says something that cannot be; ``doubts`` are warnings."""
     if isinstance(wrong, CannotRead):
         faults: list[dict[str, Any]] = [{"line": None, "column": None, "where": "", "problem": wrong.reason}]
     else:
-        faults = [
-            {"line": fault.line, "column": fault.column, "where": fault.where, "problem": fault.problem}
-            for fault in wrong.faults
-        ]
-    return {"file": name, "valid": False, "faults": faults, "spacecraft": None, "channels": [], "two_pulse": None}
+        faults = _faults_json(wrong.faults)
+    return {
+        "file": name,
+        "valid": False,
+        "faults": faults,
+        "warnings": _faults_json(doubts),
+        "spacecraft": None,
+        "channels": [],
+        "two_pulse": None,
+    }
 
 
-def checked_json(name: str | None, spacecraft: Spacecraft) -> dict[str, Any]:
+def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+    return [
+        {"line": fault.line, "column": fault.column, "where": fault.where, "problem": fault.problem} for fault in faults
+    ]
+
+
+def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
     pair = survey.nearest_pair(spacecraft)
     return {
         "file": name,
         "valid": True,
         "faults": [],
+        "warnings": _faults_json(doubts),
         "spacecraft": spacecraft_json(spacecraft),
         "channels": [
             {

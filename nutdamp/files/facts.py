@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,10 @@ from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.units import parse
 
 Vector = NDArray[np.float64]
+
+
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
+"""Keys for single parts of an inertia tensor, which a file gives as a whole."""
 
 
 class Finding(NamedTuple):

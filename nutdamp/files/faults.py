@@ -13,22 +13,25 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from nutdamp.errors import Fault, FaultyFile
+from nutdamp.errors import Fault, FaultyFile, in_order
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
-from nutdamp.files.facts import Finding
+from nutdamp.files.facts import MOMENT, Finding
 from nutdamp.files.fields import section_of
 from nutdamp.files.models import SpacecraftFile
+from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import findings
 from nutdamp.files.settings import Setting, overlay
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 
 
-def read_contents(text: str, name: str, settings: Sequence[Setting] = ()) -> SpacecraftFile:
+def read_contents(
+    text: str, name: str, settings: Sequence[Setting] = (), warn: Callable[[Fault], None] = lambda _: None
+) -> SpacecraftFile:
     """The checked contents of a spacecraft file with ``settings`` in place of what it says.
 
-    Raises `FaultyFile` with all faults, sorted by place.
+    ``warn`` is given what is hardly meant. Raises `FaultyFile` with all faults, sorted by place.
     """
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
@@ -40,6 +43,8 @@ def read_contents(text: str, name: str, settings: Sequence[Setting] = ()) -> Spa
         judged = {finding.path for finding in found if not finding.at_key}
         found += [finding for finding in _type_errors(error) if finding.path not in judged]
     faults += [_placed(finding, root, name) for finding in found]
+    for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
+        warn(doubt)
     if faults:
         raise FaultyFile(faults)
     return contents
@@ -74,6 +79,8 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
             cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
             if meant and meant not in node.value:
                 node.value[meant], node.keys[meant] = dropped, node.keys[key]
+            elif "tensor" in fields and MOMENT.fullmatch(key):
+                cure = "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
             elif ":" in key:
                 cure = "put a space behind the colon"
             yield Finding((*path, key), f"unknown key; {cure}", at_key=True)

@@ -32,13 +32,22 @@ class Quantity:
     def check(self, value: object) -> float:
         """SI value; raises ValueError, which says what would be right."""
         result = parse(value, self.kind)
-        if not all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items()):
-            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted")
+        if not self._allows(result):
+            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted{self._degrees(value)}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             raise ValueError(
                 f"{shown(value)} is too small to be real; {self.range} is wanted, in SI at least {SMALLEST:g}"
             )
         return result
+
+    def _degrees(self, value: object) -> str:
+        """A hint for an angle without unit that would be in range in degrees."""
+        if self.kind != "angle" or isinstance(value, str) or not self._allows(parse(f"{value} deg", "angle")):
+            return ""
+        return f" (read as radians; write {value} deg)"
+
+    def _allows(self, result: float) -> bool:
+        return all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items())
 
     @property
     def range(self) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.facts import Facts, Finding
+from nutdamp.files.facts import MOMENT, Facts, Finding
 from nutdamp.files.fields import SMALLEST
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
 from nutdamp.physics import stability
@@ -90,10 +90,10 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         if len(keys) > 1:
             yield Finding(("inertia", "tensor"), "stands beside A or C; keep either tensor, or A and C", True)
         tensor = tensor_of(facts)
-        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, _spin(facts))
+        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, spin_of(facts))
         if fault is not None:
             yield fault
-    elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict):
+    elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict) and not _of_tensor(facts):
         missing = {"A": "transverse", "C": "axial"}
         for key, what in missing.items():
             if key not in keys:
@@ -102,6 +102,12 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     if A is not None and C is not None and C > 2 * A > 0:
         problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2, as in no body; at most 2 A (a flat disc)"
         yield Finding(("inertia", "C"), problem)
+
+
+def _of_tensor(facts: Facts) -> bool:
+    """Whether there are keys that belong into a tensor; that is a fault already."""
+    node = facts.root.get("inertia")
+    return node is not None and any(map(MOMENT.fullmatch, node.keys))
 
 
 def tensor_of(facts: Facts) -> Vector | None:
@@ -152,7 +158,7 @@ def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
     return Finding(("inertia", "tensor"), problem)
 
 
-def _spin(facts: Facts) -> float | None:
+def spin_of(facts: Facts) -> float | None:
     """The rate about principal axis 3; None where it is zero or cannot be read."""
     spin = _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
     return spin if spin is not None and abs(spin) >= SMALLEST else None
@@ -384,7 +390,7 @@ def _goal(facts: Facts) -> Iterator[Finding]:
     elif in_sky and not facts.has("attitude"):
         problem = "needs attitude, which says where the body points at t = 0; without it give tilt and azimuth"
         yield Finding(("goal", in_sky[0]), problem, True)
-    final, spin = facts.number("rate", "goal", "spin"), _spin(facts)
+    final, spin = facts.number("rate", "goal", "spin"), spin_of(facts)
     if final is not None and abs(final) < SMALLEST:
         yield Finding(("goal", "spin"), "zero; a rate about axis 3 is wanted")
     elif final is not None and spin is not None and final * spin < 0.0:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import Fault
 from nutdamp.files.dispersion_models import dispersions
 from nutdamp.files.faults import read_contents
 from nutdamp.files.models import (
@@ -48,17 +49,21 @@ __all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spac
 Vector = NDArray[np.float64]
 
 
-def load_spacecraft(path: str | Path, settings: Sequence[Setting] = ()) -> Spacecraft:
+Warn = Callable[[Fault], None]
+"""Is given each number that is hardly what was meant."""
+
+
+def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
-    return read_spacecraft(read_text(Path(path)), str(path), settings)
+    return read_spacecraft(read_text(Path(path)), str(path), settings, warn)
 
 
-def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = ()) -> Spacecraft:
+def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in the text of a file; ``name`` stands for the file in messages.
 
     ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
     """
-    contents = read_contents(text, name, settings)
+    contents = read_contents(text, name, settings, warn)
     inertia = _inertia(contents.inertia)
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}

@@ -151,7 +151,7 @@ def test_every_key_of_the_models_is_in_the_file_topic() -> None:
 
 def test_units_and_defaults_of_keys() -> None:
     rows = {key.path: words(key.row[1]) for key in keys()}
-    assert rows["limits.horizon"].endswith("default: 20 nutation periods. unit s, ms or min; example: 120 s")
+    assert rows["limits.horizon"].endswith("default: 20 nutation periods. unit s, ms, min or hours; example: 120 s")
     assert rows["state.spin"].endswith("unit rad/s, deg/s or rpm; required; example: 30 rpm")
     assert rows["thrusters.force"] == "Thrust, N. unit N or mN; default none; example: 10 N"
     assert "EME2000, J2000 or GCRF; default none" in rows["attitude.frame"]

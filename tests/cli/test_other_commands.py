@@ -101,6 +101,20 @@ def test_a_bad_file_counts_before_a_report_that_cannot_be_written(run: Run, tmp_
     assert run("check", "good.yaml", "--json", "/dev/full").returncode == 1
 
 
+def test_check_reports_warnings_on_screen_and_in_json(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "fast.yaml").write_text(GOOD.replace("3]", "300]"))
+    done = run("check", "fast.yaml", "--json", "check.json")
+    place = "fast.yaml:3:18: omega0[2]: warning: "
+    problem = "300 is read as 300 rad/s; write 300 deg/s if that is meant, else 300 rad/s"
+    assert (done.returncode, done.stderr) == (0, f"{place}{problem}\n")
+    (found,) = json.loads((tmp_path / "check.json").read_text())["files"]
+    assert found["valid"]
+    assert found["warnings"] == [{"line": 3, "column": 18, "where": "omega0[2]", "problem": problem}]
+    for command in (("plan",), ("simulate", "--scheme", "none"), ("report", "-o", "r.md"), ("verify",)):
+        assert run(command[0], "fast.yaml", *command[1:]).stderr.startswith(place)
+    assert run("check", "fast.yaml", "--quiet").stderr == ""
+
+
 def test_a_missing_file_alone_is_exit_1(run: Run) -> None:
     assert run("check", "missing.yaml").returncode == 1
 

@@ -162,6 +162,25 @@ def test_slips_do_not_validate(path: str, value: object) -> None:
     assert not VALIDATOR.is_valid(changed(path, value))
 
 
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("thrusters.0.position", ["30 cm", "0.001 km", "5mm"]),
+        ("thrusters.0.min_on_time", "0.02 sec"),
+        ("limits.horizon", "2 hours"),
+        ("omega0.2", "30 RPM"),
+        ("omega0.1", "2 degrees/sec"),
+        ("omega0.1", "2°/s"),
+        ("requirement.nutation", "0.5°"),
+        ("requirement.nutation", "0.5 degrees"),
+        ("dispersions.A", {"normal": "2 %"}),
+        ("dispersions.timing", {"normal": "0.1 sec"}),
+    ],
+)
+def test_all_spellings_of_units_validate(path: str, value: object) -> None:
+    assert VALIDATOR.is_valid(changed(path, value))
+
+
 def test_every_key_is_explained() -> None:
     for schema in (SCHEMA, *SCHEMA["$defs"].values()):
         assert schema["additionalProperties"] is False

@@ -17,9 +17,12 @@ from nutdamp.units import KINDS, LARGEST, parse, pattern, shown
         ("250 g", "mass", 0.25),
         ("0.8 m", "length", 0.8),
         ("5 mm", "length", 0.005),
+        ("5 cm", "length", 0.05),
+        ("5 km", "length", 5000.0),
         ("120 s", "time", 120.0),
         ("20 ms", "time", 0.02),
         ("2 min", "time", 120.0),
+        ("2 hours", "time", 7200.0),
         ("10 N", "force", 10.0),
         ("10 mN", "force", 0.01),
         ("8 N m", "torque", 8.0),
@@ -41,7 +44,7 @@ def test_every_unit_of_the_table(text: str, kind: str, value: float) -> None:
 
 def test_the_table_holds_nothing_else() -> None:
     units = {unit for kind in KINDS.values() for unit in kind.factors}
-    assert len(units) == 19
+    assert len(units) == 22
 
 
 @pytest.mark.parametrize(
@@ -50,6 +53,35 @@ def test_the_table_holds_nothing_else() -> None:
 def test_spellings_of_one_quantity(text: str) -> None:
     assert parse(text, "torque") == 8.0
     assert re.search(pattern("torque"), text)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        ("180 degrees", "angle", math.pi),
+        ("180 degree", "angle", math.pi),
+        ("180°", "angle", math.pi),
+        ("180 °", "angle", math.pi),
+        ("180 °/s", "rate", math.pi),
+        ("180 degrees/sec", "rate", math.pi),
+        ("3 rad/sec", "rate", 3.0),
+        ("60 RPM", "rate", 2 * math.pi),
+        ("60Rpm", "rate", 2 * math.pi),
+        ("3 sec", "time", 3.0),
+        ("1 hour", "time", 3600.0),
+    ],
+)
+def test_spellings_of_words_within_units(text: str, kind: str, value: float) -> None:
+    assert parse(text, kind) == pytest.approx(value, rel=1e-15)
+    assert re.search(pattern(kind), text)
+
+
+@pytest.mark.parametrize("unit", ["Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"])
+def test_other_spellings_are_refused(unit: str) -> None:
+    for kind in KINDS:
+        with pytest.raises(ValueError, match="is not a"):
+            parse(f"5 {unit}", kind)
+        assert not re.search(pattern(kind), f"5 {unit}")
 
 
 @pytest.mark.parametrize("text", ["120 kg m²", "120 kgm^2", "120 kg*m²", "120kg·m^2"])
@@ -70,7 +102,7 @@ def test_numbers_are_si() -> None:
 def test_a_bare_number_in_a_text_is_for_command_lines() -> None:
     assert parse("30", "time", bare=True) == 30.0
     assert parse("-.5", "number", bare=True) == -0.5
-    with pytest.raises(ValueError, match="'30' has no unit; add s, ms or min, or leave the quotes out"):
+    with pytest.raises(ValueError, match="'30' has no unit; add s, ms, min or hours, or leave the quotes out"):
         parse("30", "time")
 
 
@@ -102,7 +134,7 @@ def test_a_bare_number_in_a_text_is_for_command_lines() -> None:
         ("1", "number", "'1' is not a plain number: no unit, no quotes"),
         ("1 m", "number", "'1 m' is not a plain number: no unit, no quotes"),
         (True, "mass", "true stands where a mass is wanted"),
-        (None, "time", "nothing stands where a time is wanted: a number in s, or a text in s, ms or min"),
+        (None, "time", "nothing stands where a time is wanted: a number in s, or a text in s, ms, min or hours"),
         ([1], "time", "a list stands where a time is wanted"),
         ({}, "number", "a mapping stands where a plain number is wanted: no unit, no quotes"),
         (math.nan, "mass", "nan is not a finite number"),
