@@ -45,7 +45,7 @@ DEARER = 0.03
 """Share above it from which shorter horizons are looked at too."""
 
 WAYS = 3
-"""Schedules of other schemes that are corrected to cost less."""
+"""Schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks."""
 
 SHORT = 4.0
 """Inertial nutation periods up to which very many starts are tried."""
@@ -179,7 +179,7 @@ class _Search(Problem):
         body = self.spacecraft
         short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
         strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
-        if first.unmet > UNMET:  # at large angles H may be brought there all the same
+        if UNMET < first.unmet < math.inf:  # at large angles H may be brought there all the same
             return short
         if made is None:
             return True
@@ -195,15 +195,20 @@ class _Search(Problem):
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
         found: list[_Found] = []
-        for made in optimal_starts.schedules(self.task(), () if known is None else (known,)):
-            if self.spacecraft.limits.tick is not None:
-                missed = influence.misses(flight.flown(self.spacecraft, made), self.equations)
-                off = missed[2:4] if self.options.shift is not None else np.zeros(2)
-                made = polish(self.spacecraft, made, self.equations, off, self.program().width)
+        every = optimal_starts.schedules(self.task(), () if known is None else (known,))
+        if self.spacecraft.limits.tick is not None:
+            every = [self.on_ticks(made) for made in every[:WAYS]]
+        for made in every:
             left = self.left(flight.flown(self.spacecraft, made))
             if keeps_limits(self.spacecraft, made.pulses):
                 found.append(_Found(0.0 if left <= LEFT else left, self.worth(made), made))
         return self.best(found)
+
+    def on_ticks(self, made: Schedule) -> Schedule:
+        """An exact schedule on the ticks of the commands."""
+        missed = influence.misses(flight.flown(self.spacecraft, made), self.equations)
+        off = missed[2:4] if self.options.shift is not None else np.zeros(2)
+        return polish(self.spacecraft, made, self.equations, off, self.program().width)
 
     def worth(self, made: Schedule) -> float:
         """What is to be least: the cost, or the number of pulses."""

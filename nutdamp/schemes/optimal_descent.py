@@ -9,6 +9,7 @@ differences of flights, which cost little where hundreds are flown at a time.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -92,14 +93,14 @@ class Task:
         self._forced = setting.constant, setting.forcing
         self._coasting = np.zeros(3), setting.forcing._replace(turning=())
         self._start = np.asarray(setting.moments, dtype=float), start.rates, start.quaternion
-        self._across = influence.square_to_target(body)
+        self._target, self._across = body.target_axis, influence.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """What the flights of ``x`` (b, …) leave of the equations, (b, equations), over |H|.
 
         Pulses act as so many ``kicks`` spread over them, without disturbances; 0 is the true motion.
         """
-        parts = [slice(begin, begin + many.BLOCK) for begin in range(0, len(x), many.BLOCK)]
+        parts = [slice(begin, begin + many.BLOCK) for begin in range(0, len(x) or 1, many.BLOCK)]
         return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])
 
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
@@ -119,7 +120,9 @@ class Task:
                 many.advance(bodies, rates, turn, begin, on_time, torque)
                 now = begin + on_time
         momentum = rates * moments
-        shift = attitude.rotate(turn.T, momentum.T) @ self._across.T
+        inertial = attitude.rotate(turn.T, momentum.T)
+        shift = inertial @ self._across.T
+        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
         every = np.column_stack([momentum[:2].T, shift, self.body.inertia.C * (rates[2] - self.spin)])
@@ -130,7 +133,7 @@ class Task:
         number = x.shape[1]
         moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
         there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
-        changes = there.reshape(*moved.shape[:2], -1) - here[:, None, :]
+        changes = there.reshape(*moved.shape[:2], len(self.chosen)) - here[:, None, :]
         return np.swapaxes(changes, 1, 2) / DIFFERENCE
 
     def price(self, which: Indices, on: Vector) -> Vector:
@@ -245,7 +248,8 @@ class Descent:
             going = np.flatnonzero(self.state.error > SETTLED)
             if not len(going):
                 break
-            self.state.put(going, self._stepped(going))
+            with np.errstate(all="ignore"):  # a sequence that gets lost is left as it is
+                self.state.put(going, self._stepped(going))
 
     def close(self, steps: int = 5) -> None:
         """Take the last misses away by the least moves, measured by the room that is left."""
@@ -253,6 +257,7 @@ class Descent:
         for _ in range(steps):
             curvature = _weighted(self.rows, 1.0 / state.slack**2)
             move, _ = _newton(state.slopes, curvature, np.zeros_like(state.x), state.misses, state.prices * 0.0)
+            move[~np.isfinite(move).all(axis=1)] = 0.0
             closer = np.einsum("bri,bi->br", self.rows, move)
             step = _to_bound(state.slack, closer, np.full(len(move), 0.5))[:, None]
             x, slack = state.x + step * move * self.scale, state.slack + step * closer
@@ -269,6 +274,8 @@ class Descent:
         uphill = price - np.einsum("br,bri->bi", old.barrier[:, None] / old.slack, rows)
         curvature = old.curvature + _weighted(rows, weight)
         move, prices = _newton(old.slopes, curvature, uphill, old.misses, old.prices)
+        lost = ~np.isfinite(move).all(axis=1) | ~np.isfinite(prices).all(axis=1)
+        move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
         line = _Line(self, at, old, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
@@ -293,8 +300,7 @@ class Descent:
         near = np.maximum(wrong, np.abs(dual * slack - old.barrier[:, None]).max(axis=1)) < 10.0 * old.barrier
         barrier = np.where(near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier)
         flat = (np.abs(ahead) < FLAT) & (old.barrier < FLAT) & (np.abs(misses).max(axis=1) < FLAT)
-        error = np.where(flat, 0.0, np.maximum(wrong, (dual * slack).max(axis=1)))
-        error[~np.isfinite(error)] = 0.0  # lost: its misses say so
+        error = np.where(flat | lost, 0.0, np.maximum(wrong, (dual * slack).max(axis=1)))
         return State(x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error)
 
 
@@ -327,20 +333,19 @@ class _Line:
         enough = enough.reshape(count, len(k))
         self.stuck[k] = ~enough.any(axis=0)
         first, every = np.where(self.stuck[k], count - 1, np.argmax(enough, axis=0)), np.arange(len(k))
-        inside = np.all(slack[first, every] > 0.0, axis=1)
-        first, every = first[inside], every[inside]
-        self._take(k[inside], x[first, every], slack[first, every], misses[first, every])
+        self._take(k, x[first, every], slack[first, every], misses[first, every])
 
     def _trial(
         self, k: Indices, step: Vector, share: Vector | float
     ) -> tuple[Vector, Vector, Vector, NDArray[np.bool_]]:
         """Unknowns, slacks and misses after a step, and whether it falls enough for its ``share`` of the whole."""
         old = self.old
-        x = old.x[k] + step * self.scale[k]
         slack = old.slack[k] + np.einsum("bri,bi->br", self.rows[k], step)
-        misses = self.task.misses(self.which[k], x, self.kicks)
         inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)
-        merit = self._merit(x, np.where(inside[:, None], slack, old.slack[k]), misses, k)
+        x = np.where(inside[:, None], old.x[k] + step * self.scale[k], old.x[k])
+        slack = np.where(inside[:, None], slack, old.slack[k])
+        misses = self.task.misses(self.which[k], x, self.kicks)
+        merit = self._merit(x, slack, misses, k)
         least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
         return x, slack, misses, inside & (merit <= least)
 
@@ -366,7 +371,13 @@ def _newton(slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, p
     system[:, v:, :v] = slopes
     system[:, v:, v:] = -PROXIMAL * np.eye(m)
     right = np.concatenate([-uphill, -misses - PROXIMAL * prices], axis=1)
-    found = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+    try:
+        found = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:  # some are singular: those are lost, not all
+        found = np.full(right.shape, np.nan)
+        for row in range(count):
+            with suppress(np.linalg.LinAlgError):
+                found[row] = np.linalg.solve(system[row], right[row])
     return found[:, :v], found[:, v:]
 
 

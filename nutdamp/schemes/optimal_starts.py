@@ -55,6 +55,9 @@ NEAR = 1.03
 NEEDLESS = 1e-3
 """Share of all there is to do below which a pulse may be left out."""
 
+NOTHING = 1e-10
+"""The same share below which it is left out even where nothing makes good for it."""
+
 HALF = 0.5
 """Share of the least on-time from which a pulse is lengthened to it; shorter ones are left out."""
 
@@ -85,12 +88,16 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
     if not np.all(task.unit > 0.0):
         return []
     rng = np.random.default_rng(0)  # the same plan every time
-    best = _screened(task, random_starts(task, _pulses(task, 0), STARTS, rng))
-    for _ in range(ADDITIONS):
-        starts = _added(task, best, _pulses(task, SPARE), rng)
-        if starts is None:
+    for pulses in range(_pulses(task, 0), 0, -1):  # fewer where gap and windows leave no room for more
+        starts = random_starts(task, pulses, STARTS, rng)
+        if len(starts.x):
             break
-        more = _descended(task, starts, 1e-2, 50)
+    best = _screened(task, starts)
+    for _ in range(ADDITIONS):
+        added = _added(task, best, _pulses(task, SPARE), rng)
+        if added is None:
+            break
+        more = _descended(task, added, 1e-2, 50)
         if not len(more.left) or more.cost[0] > best.cost[0] * (1.0 - GAIN):
             break
         best = more
@@ -266,14 +273,20 @@ def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
     near = [one for one, cost in zip(ideal, best.cost, strict=True) if cost <= NEAR * best.cost[0]]
     found = _on_the_true_motion(task, [*near, *given]) or _on_the_true_motion(task, ideal)
-    if found and len(_needed(task, found[0]).which) < len(found[0].which):
-        found += _on_the_true_motion(task, found[:1])
-    order = sorted(found, key=lambda one: task.price(one.which, one.on))
-    return [_schedule(task, one) for one in order]
+    spare = [len(_needed(task, one).which) < len(one.which) for one in found]
+    lean = [one for one, more in zip(found, spare, strict=True) if not more]
+    lean += _on_the_true_motion(task, [one for one, more in zip(found, spare, strict=True) if more])
+    most = min((_price(task, one) for one in lean), default=math.inf) * (1.0 - GAIN)
+    kept = [*lean, *(one for one, more in zip(found, spare, strict=True) if more and _price(task, one) < most)]
+    return [_schedule(task, one) for one in sorted(kept, key=lambda one: _price(task, one))]
+
+
+def _price(task: Task, one: Moments) -> float:
+    return float(task.price(one.which, one.on))
 
 
 def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
-    """Sequences (n,) each, descended on the true motion without their needless pulses, the cheapest first."""
+    """Sequences (n,) each, descended on the true motion without their needless pulses."""
     found: list[Moments] = []
     fewer = [_needed(task, one) for one in every]
     for count in sorted({len(one.which) for one in fewer} - {0}):
@@ -292,7 +305,7 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
             descent.close()
             rows = np.flatnonzero(descent.left < EXACT)
             found += [_moments(descent.sequences.which[row], descent.state.x[row]) for row in rows]
-    return sorted(found, key=lambda one: task.price(one.which, one.on))
+    return found
 
 
 def _moments(which: NDArray[np.int_], x: Vector) -> Moments:
@@ -303,7 +316,8 @@ def _moments(which: NDArray[np.int_], x: Vector) -> Moments:
 
 def _schedule(task: Task, one: Moments) -> Schedule:
     """One sequence (n,) as a schedule."""
-    every = zip(one.which.tolist(), one.t.tolist(), one.on.tolist(), strict=True)
+    felt = one.on > NOTHING * task.unit[one.which]
+    every = zip(*(part[felt].tolist() for part in one), strict=True)
     return Schedule(tuple(channel_pulse(task.channels[number], t, on) for number, t, on in every))
 
 
