@@ -18,8 +18,11 @@ from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 
-MOST_GROWN = 30.0
-"""Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost."""
+MOST_GROWN = 14.0
+"""Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost.
+
+A millionth is left then, which takes pulses that a clock still resolves.
+"""
 
 KNOTS = 400
 """Even moments, besides the edges of pulses, at which ω3 is read from a flight with dissipation."""

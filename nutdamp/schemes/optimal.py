@@ -82,12 +82,20 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
-    search = _Search(spacecraft, options)
+    search = _Search(_before_it_fades(spacecraft), options)
     if options.least == "time":
         search = search.sooner()
     elif options.least == "pulses":
         return _fewest(search)
     return search.schedule()
+
+
+def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
+    """With the horizon no later than dissipation has left a millionth of the nutation: waiting on costs ever less."""
+    if spacecraft.growth >= 0.0:
+        return spacecraft
+    faded = spacecraft.limits.earliest - influence.MOST_GROWN / spacecraft.growth
+    return replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
 
 
 def _fewest(search: _Search) -> Schedule:

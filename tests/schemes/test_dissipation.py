@@ -170,6 +170,20 @@ def test_the_first_order_least_knows_dissipation() -> None:
         assert left_by_reference(one)[0] < 1e-9
 
 
+def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
+    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without end."""
+    names = {"+M1": (400.0, 0.0, 0.0), "-M1": (-400.0, 0.0, 0.0), "+M2": (0.0, 400.0, 0.0)}
+    jets = tuple(channel(name, *torque) for name, torque in names.items())
+    body = replace(spinner(A=80.0, C=120.0, channels=jets, limits=Limits(horizon=600.0)), dissipation=20.0)
+    one = plan(body, "optimal")
+    assert one.flown is not None, one.why
+    assert one.flown.nutation < NEARLY_NOTHING
+    assert all(pulse.resolved for pulse in one.pulses)
+    assert one.pulses.total_impulse < 1e-3 * body.least_impulse
+    assert one.pulses.bounds is not None
+    assert one.pulses.bounds.within < 300.0  # the least within as long as the search looks
+
+
 # --- files that went wrong -------------------------------------------------------------------------------------------
 
 
