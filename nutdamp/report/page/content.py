@@ -91,7 +91,7 @@ def _verdict(compared: Comparison, dispersed: Results | None) -> str:
     if dispersed is None or dispersed.met_fraction is None:
         return verdict
     cases = verdicts.cases_verdict(dispersed.met_fraction, dispersed.probability)
-    return f"{verdict} With dispersions ({dispersed.done:,} cases) {cases}."
+    return f"{verdict} Requirement with dispersions ({dispersed.done:,} cases) {cases}."
 
 
 def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
