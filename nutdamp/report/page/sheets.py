@@ -52,7 +52,12 @@ def comparison_sheet(compared: Comparison) -> Sheet:
         rows.append((plan.scheme, *(cells if plan.feasible else [verdicts.no_plan(plan), *cells[1:]])))
     mark = next((index for index, plan in enumerate(compared.plans) if plan is compared.recommended), None)
     names = (Column("scheme", number=False), *(column for column, _ in columns))
-    return Sheet("What each scheme costs and leaves with nominal values, flown through the real pulse widths", names, tuple(rows), mark)
+    return Sheet(
+        "What each scheme costs and leaves with nominal values, flown through the real pulse widths",
+        names,
+        tuple(rows),
+        mark,
+    )
 
 
 def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
