@@ -186,6 +186,7 @@ def scheme_options(command: Command) -> Command:
 
     wrapped: Any = gathered
     for option in (
+        debug_option,
         click.option(
             "--spin",
             type=FinalSpin("rate"),
@@ -237,7 +238,6 @@ def scheme_options(command: Command) -> Command:
         click.option(
             "--on-time", type=Quantity("time"), help="Pulse length of four-pulse and rhumb-line, such as 200ms."
         ),
-        debug_option,
     ):
         wrapped = option(wrapped)
     return cast(Command, wrapped)
@@ -329,9 +329,13 @@ def plan_or_read(
         if scheme:
             plan: Plan | None = planning.plan(body, scheme, options)
         else:
+            from nutdamp.report import verdicts
+
             compared = planning.compare(body, planning.usual(body), options)
             plan = compared.recommended
             show_failures(compared)
+            for warning in verdicts.warnings(compared):
+                remark(f"warning: {warning}")
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     if plan.why is not None:

@@ -169,6 +169,15 @@ def test_without_a_scheme_the_recommended_one_is_dispersed(run: Run, body: Path)
     assert json.loads(run("disperse", "body.yaml", "--samples", "9", "--json", "-").stdout)["scheme"] == planned
 
 
+def test_a_recommended_plan_that_does_not_damp_is_flown_with_a_warning(run: Run, body: Path) -> None:
+    changed(body, "requirement:", "# requirement:")
+    changed(body, "steerable: {torque: 60 N m,", "limits: {horizon: 4 s}\nsteerable: {torque: 1 N m,")
+    changed(body, "limits: {earliest: 1 s}\n", "")
+    done = run("disperse", "body.yaml", "--samples", "9")
+    assert "warning: no plan damps the nutation. " in done.stderr
+    assert "warning" not in run("disperse", "body.yaml", "--samples", "9", "--quiet").stderr
+
+
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
     pytest.importorskip("matplotlib")
