@@ -40,10 +40,14 @@ class Thruster:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Thrusters that fire together, as one body-fixed torque."""
+    """Thrusters that fire together, as one body-fixed torque.
+
+    ``spends`` N m s is the impulse that a second of it counts for, where the torque is not the true one.
+    """
 
     name: str
     thrusters: tuple[Thruster, ...]
+    spends: float | None = None
 
     @property
     def torque(self) -> Vector:
@@ -60,6 +64,11 @@ class Channel:
     def axial(self) -> float:
         """M3 in N m, which changes the spin."""
         return float(self.torque[2])
+
+    @property
+    def strength(self) -> float:
+        """Impulse that a second of it costs, N m s: the size of the torque."""
+        return float(np.linalg.norm(self.torque)) if self.spends is None else self.spends
 
     @property
     def damps(self) -> bool:
@@ -87,7 +96,7 @@ class Channel:
     def price(self) -> float:
         """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
         flow = self.mass_flow
-        return (float(np.linalg.norm(self.torque)) if flow is None else flow) / abs(self.transverse)
+        return (self.strength if flow is None else flow) / abs(self.transverse)
 
     @property
     def force(self) -> Vector | None:

@@ -154,7 +154,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
 def _price(channel: Channel, known: bool) -> float:
     """Propellant of ``channel`` per second, or where it is not ``known`` of all of them impulse."""
     flow = channel.mass_flow
-    return flow if known and flow is not None else float(np.linalg.norm(channel.torque))
+    return flow if known and flow is not None else channel.strength
 
 
 Indices = NDArray[np.intp]

@@ -107,7 +107,7 @@ def _stretched(channel: Channel, stretch: Vector) -> Channel:
     def thruster(one: Thruster) -> Thruster:
         return replace(one, torque=one.torque * np.array([*stretch, 1.0]))
 
-    return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters))
+    return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters), spends=channel.strength)
 
 
 def _stretched_torquer(torquer: Steerable | None, stretch: Vector) -> Steerable | None:

@@ -10,9 +10,6 @@ plan: the program's first least cost, of first order, and a rigorous one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import replace
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +17,7 @@ import numpy as np
 from nutdamp import flight
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options, influence, optimal_starts
+from nutdamp.schemes import Options, influence, optimal_starts, optimal_ways
 from nutdamp.schemes.burns import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal_descent import Task
 from nutdamp.schemes.optimal_problem import LEFT, Problem
@@ -56,6 +53,9 @@ STRONG = 0.3
 PROVED = 0.002
 """Share above the rigorous bound below which they are not: there is little to be saved."""
 
+EQUAL = 1e-6
+"""The same where what H-keeping schedules cost is not looked at any more."""
+
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
 
@@ -68,10 +68,8 @@ NEAR = 0.05
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
 
-NOT_FOUND = (
-    "not found: the program has solutions, but on the true motion the search did not settle on one that "
-    "keeps on-times, gap and max_pulses; another horizon may help"
-)
+AS_GOOD = math.radians(1e-3)
+"""rad left on ticks below which schedules are as good as one another."""
 
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """By how much more than the program's least time a schedule may need, tried in turn."""
@@ -153,14 +151,27 @@ class _Search(Problem):
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        solved = not UNMET < first.unmet < math.inf  # infinite where the solver gave up: then it may have solutions
         self.check_number(first)
-        best = self.programmed(first) if solved else None
+        best = self.cheapest(first)
+        if self.looser and not self.proved(best, EQUAL):
+            kept = _Search(self.spacecraft, self.options._replace(free_axis=False, shift=None))
+            best = self.cheaper(best, kept.cheapest(kept.program().solve()))
+        if best is None:
+            raise Infeasible(self.cure() if UNMET < first.unmet < math.inf else self.not_found())
+        return self.with_bounds(best, first)
+
+    @property
+    def looser(self) -> bool:
+        """Whether H may end elsewhere, so that a schedule that keeps it, or brings it to the target, will do too."""
+        return self.options.free_axis or self.options.shift is not None
+
+    def cheapest(self, first: Solution) -> Schedule | None:
+        """The cheapest schedule found, where the program's ``first`` solution is this."""
+        # Infinite where the solver gave up: then there may be solutions all the same.
+        best = None if UNMET < first.unmet < math.inf else self.programmed(first)
         if self.doubtful(best, first):
             best = self.cheaper(best, self.descended(best))
-        if best is None:
-            raise Infeasible(NOT_FOUND if solved else self.cure())
-        return self.with_bounds(best, first)
+        return best
 
     def programmed(self, first: Solution) -> Schedule | None:
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
@@ -193,8 +204,12 @@ class _Search(Problem):
             return True
         if not strong or not (short or self.dear(made, first.cost)):
             return False
-        proof = self.with_bounds(made, first).bounds
-        return proof is None or proof.rigorous is None or self.price(made) > proof.rigorous * (1.0 + PROVED)
+        return not self.proved(made, PROVED)
+
+    def proved(self, made: Schedule | None, share: float) -> bool:
+        """Whether the rigorous bound proves that nothing is cheaper than a schedule by more than that share of it."""
+        proof = None if made is None else self.rigorous(made)
+        return made is not None and proof is not None and self.price(made) <= proof * (1.0 + share)
 
     def task(self) -> Task:
         """What is to be done, for the descents."""
@@ -248,25 +263,13 @@ class _Search(Problem):
 
     def others(self, least: float) -> Schedule | None:
         """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
-        from nutdamp.schemes import half_cone, one_pulse, rhumb_line, two_pulse
-
         names = {channel.name: channel for channel in self.channels}
-        body = replace(self.spacecraft, steerable=None)
-        schemes: tuple[ModuleType, ...] = (two_pulse,) if self.equations.shift else (one_pulse,)
-        if body.goal.axis is not None:
-            schemes = (*schemes, rhumb_line, half_cone)
-        ways: list[Schedule] = []
-        for scheme in schemes:
-            plan: Callable[[Spacecraft, Options], Schedule | Iterable[Schedule]] = scheme.schedule
-            if scheme is two_pulse and body.goal.axis is None:
-                plan = two_pulse.alternatives
-            try:
-                made = plan(body, self.options)
-                ways += [made] if isinstance(made, Schedule) else made
-            except Infeasible:
-                continue
         found: list[_Found] = []
-        flights = [flight.flown(self.spacecraft, Schedule(one.pulses)) for one in ways]
+        flights: list[flight.Flight] = []
+        for made in optimal_ways.ways(self.spacecraft, self.options, shift=self.equations.shift):
+            flights.append(flight.flown(self.spacecraft, Schedule(made.pulses)))
+            if self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR):
+                break
         for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
             left = self.left(way)
             found.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
@@ -301,8 +304,7 @@ class _Search(Problem):
         return found
 
     def best(self, found: list[_Found]) -> Schedule | None:
-        """The cheapest that leaves nothing; on ticks the one that leaves least."""
-        best = min(found, key=lambda one: (one.left, one.price), default=None)
-        if best is None or (best.left > 0.0 and self.spacecraft.limits.tick is None):
-            return None
-        return best.made
+        """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding."""
+        there = [one for one in found if one.left <= self.rounded(one.made)]
+        best = min(there, key=lambda one: (max(one.left, AS_GOOD), one.price), default=None)
+        return None if best is None else best.made

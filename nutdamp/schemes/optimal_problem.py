@@ -46,7 +46,7 @@ class Problem:
         if options.least != "impulse" and len(known) == len(flows):
             self.costs, self.unit = np.array(known), "kg"
         else:
-            self.costs = np.array([float(np.linalg.norm(channel.torque)) for channel in self.channels])
+            self.costs = np.array([channel.strength for channel in self.channels])
             self.unit = "N m s"
 
     def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
@@ -86,20 +86,23 @@ class Problem:
 
     def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with what any other must cost."""
-        body = self.spacecraft
         program = self.program()
         first = first or program.solve()
         least = None if first.unmet > UNMET else bounds.first_order(program, first.prices)
+        return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end))
+
+    def rigorous(self, made: Schedule) -> float | None:
+        """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""
+        body = self.spacecraft
         left = self.leaves(flight.flown(body, made))
-        rigorous = bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
-        return Schedule(made.pulses, made.notes, Bounds(least, rigorous, self.unit, program.end))
+        return bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
 
     def prices(self) -> dict[str, float]:
         """Cost per second, in the unit of the bounds, of every channel of which it is known."""
         flows = {channel.name: channel.mass_flow for channel in self.spacecraft.channels}
         if self.unit == "kg":
             return {name: flow for name, flow in flows.items() if flow is not None}
-        return {channel.name: float(np.linalg.norm(channel.torque)) for channel in self.spacecraft.channels}
+        return {channel.name: channel.strength for channel in self.spacecraft.channels}
 
     def price(self, made: Schedule) -> float:
         """What a schedule costs by the program's own prices."""
@@ -116,6 +119,31 @@ class Problem:
         residual, goal = flown.residual, self.spacecraft.goal
         off = residual.axis_error if self.equations.shift else 0.0
         return Left(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
+
+    def rounded(self, made: Schedule) -> float:
+        """What starts and on-times on ticks can leave, rad: half a tick of each, added up as chance does; else zero."""
+        body, half = self.spacecraft, 0.5 * (self.spacecraft.limits.tick or 0.0)
+        rate = max(1.0, abs(body.inertia.a)) * abs(body.spin)
+        each = [pulse.magnitude * math.hypot(1.0 / pulse.on_time, rate) for pulse in made if pulse.on_time > 0.0]
+        return half * math.hypot(*each) / (body.inertia.C * abs(body.spin))
+
+    def not_found(self) -> str:
+        """Why no schedule was found although the program has solutions: the limits that it does not know of."""
+        limits = self.spacecraft.limits
+        shortest = max(channel.min_on_time for channel in self.channels)
+        longest = min(channel.max_on_time for channel in self.channels)
+        kept = {
+            f"a gap of {limits.gap:.4g} s": limits.gap > 0.0,
+            f"max_pulses {limits.max_pulses}": limits.max_pulses is not None,
+            f"on-times of {shortest:.4g} s or more": shortest > 0.0,
+            f"on-times of {longest:.4g} s or less": math.isfinite(longest),
+            f"ticks of {limits.tick or 0.0:.4g} s": limits.tick is not None,
+        }
+        named = [name for name, limited in kept.items() if limited] or ["one pulse after the other"]
+        return (
+            "not found: for small angles, without other limits than the horizon, there are schedules; on the true "
+            f"motion none was found with {', '.join(named)}; another horizon may help"
+        )
 
     def cure(self) -> str:
         """Why the program has no solution, and which limit to relax."""
