@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 
 
+NARROWEST = 20
+"""Characters of a line at least."""
+
+
 def visible(text: str) -> str:
     """`errors.printable` of each line of a text."""
     return text if text.isprintable() else "\n".join(printable(line) for line in text.split("\n"))
@@ -38,10 +42,20 @@ def show(renderable: RenderableType) -> None:
 
 
 def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS are heeded, names such as [red] or :rocket: left alone."""
+    """Standard output as rich sees it; NO_COLOR and COLUMNS count, names such as [red] or :rocket: stay as they are.
+
+    Fewer than `NARROWEST` characters, into which no number would fit, count as that many; COLUMNS = 0 as not set.
+    """
+    import os
+    import shutil
+
     from rich.console import Console
 
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False)
+    asked = os.environ.get("COLUMNS", "")
+    width = shutil.get_terminal_size().columns if asked.isdigit() and int(asked) < NARROWEST else None
+    if width is not None:
+        width = max(width, NARROWEST)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)
 
 
 class _Visible:

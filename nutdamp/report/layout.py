@@ -2,20 +2,80 @@
 
 from __future__ import annotations
 
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
+
+NARROW = 60
+"""Characters below which a table stands as one block a row."""
+
+GAP = 2
+"""Characters between two columns."""
 
 
 def facts() -> Table:
     """Names to the left, what they are to the right."""
     table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim")
+    table.add_column(style="dim", overflow="fold")
     table.add_column(overflow="fold")
     return table
 
 
-def columns(*names: str, text: tuple[str, ...] = ()) -> Table:
+class Columns(Table):
+    """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        widths = _widths(self._texts, options.max_width - GAP * (len(self.columns) - 1))
+        if options.max_width < NARROW or widths is None:
+            yield from self._blocks()
+            return
+        for column, width in zip(self.columns, widths, strict=True):
+            column.width = width
+        yield from super().__rich_console__(console, options)
+
+    @property
+    def _texts(self) -> list[list[str]]:
+        """Heading and cells of each column."""
+        return [[str(column.header), *(_text(cell).plain for cell in column.cells)] for column in self.columns]
+
+    def _blocks(self) -> RenderResult:
+        names = [str(column.header).replace("\n", ", ").strip(", ") for column in self.columns]
+        for row in zip(*(column.cells for column in self.columns), strict=True):
+            first, *others = map(_text, row)
+            if first.plain.strip():
+                named = f"{names[0]}:" if " " in names[0] else names[0]
+                yield Text(f"{named} {first.plain.strip()}".strip(), style="bold")
+            block = facts()
+            for name, cell in zip(names[1:], others, strict=True):
+                if cell.plain.strip():
+                    block.add_row(name, cell)
+            if block.row_count:
+                yield Padding(block, (0, 0, 0, 2))
+
+
+def _text(cell: RenderableType) -> Text:
+    return cell if isinstance(cell, Text) else Text(str(cell))
+
+
+def _widths(columns: list[list[str]], room: int) -> list[int] | None:
+    """Characters for each column such that no word is cut; None where there is no ``room`` for that."""
+    least = [max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns]
+    whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
+    spare = room - sum(least)
+    if spare < 0:
+        return None
+    widths = []
+    for most, fewest in zip(whole, least, strict=True):
+        widths.append(fewest + min(most - fewest, spare))
+        spare -= widths[-1] - fewest
+    return widths
+
+
+def columns(*names: str, text: tuple[str, ...] = ()) -> Columns:
     """A table of numbers, flush right under their headings, but for the first column and those named ``text``."""
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
+    table = Columns(box=None, pad_edge=False, header_style="bold", padding=(0, GAP, 0, 0))
     for index, name in enumerate(names):
         table.add_column(name, justify="left" if index == 0 or name in text else "right")
     return table
