@@ -10,6 +10,7 @@ plan: the program's first least cost, of first order, and a rigorous one.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
