@@ -64,7 +64,8 @@ plan --target 10deg,45deg --scheme half-cone
 plan missing.yaml; 1
 plan broken.yaml; 2
 plan --colour red; 2
-plan smoke.yaml --scheme half-cone; 3
+plan smoke.yaml --scheme half-cone; 2
+plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
 simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.png --show
 simulate smoke.yaml --schedule pulses.csv --flown --plot motion.svg --figure motion
 simulate smoke.yaml --scheme none --until 60s --plot history.pdf --figure history
