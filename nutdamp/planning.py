@@ -149,9 +149,8 @@ class Plan:
         told = [f"{scale * spent:.4g} {unit}"]
         if bounds.first_order is not None:
             gap = 100.0 * (spent / bounds.first_order - 1.0) if bounds.first_order > 0.0 else math.inf
-            holds = (
-                "that leaves no nutation" if self.flight.residual.nutation > TELLING else "that holds for small angles"
-            )
+            rest = self.flight.residual.nutation > TELLING
+            holds = "that leaves no nutation" if rest else "that holds for small angles"
             beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: {holds}"
             told.append(
                 f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
