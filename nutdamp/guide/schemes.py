@@ -216,6 +216,8 @@ SCHEMES = (
             "It needs a target axis (--target, or a goal in the file).",
             "Where C/(A K) is near a whole number, as near C = A with one pulse a turn, every pulse meets the nutation "
             "in the same phase and it piles up; another number of pulses a turn may help.",
+            "Pulses have the length of --on-time within 10 %: all are equal, but for the last few, which are trimmed. "
+            "Where no such train ends on the target, the nearest length that works is named.",
             "With --sun neither the spin axis nor the target may point to the Sun or away from it.",
         ),
         "explain half-cone, explain nutation",

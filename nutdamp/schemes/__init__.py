@@ -111,7 +111,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     from nutdamp.schemes.model import model_of
 
     model = model_of(spacecraft)
-    scheme = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
+    scheme = import_module(_module(name))
     return _finished(name, model, cast("Schedule", scheme.schedule(model.body, options)), options)
 
 
@@ -122,13 +122,17 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Options) -> list[Sc
     """
     if name not in NAMES:
         raise KeyError(name)
-    scheme = import_module(f"nutdamp.schemes.{name.replace('-', '_')}")
+    scheme = import_module(_module(name))
     if not hasattr(scheme, "alternatives"):
         return []
     from nutdamp.schemes.model import model_of
 
     model = model_of(spacecraft)
     return [_finished(name, model, made, options) for made in scheme.alternatives(model.body, options)]
+
+
+def _module(name: str) -> str:
+    return f"nutdamp.schemes.{name.replace('-', '_')}"
 
 
 def _finished(name: str, model: Model, made: Schedule, options: Options) -> Schedule:
@@ -148,4 +152,5 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
     spin = name == "optimal" and model.truth.goal.spin is not None
     if spin:  # and the pulse that gives most to the spin
         chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin)
+    bounds = getattr(import_module(_module(name)), "on_times", lambda _: trim.ANY)(options)
+    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin, on_times=bounds)

@@ -68,15 +68,18 @@ class Journey:
             self.pulses.append(timed)
             self.now = timed.end
 
-    def trim(self, last: int) -> None:
-        """Trim the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left."""
+    def trim(self, last: int, on_times: tuple[float, float] = trim.ANY) -> None:
+        """Trim the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
+
+        Their on-times stay within the bounds ``on_times`` s.
+        """
         last = min(last, len(self.pulses))
         if last == 0:
             return
         self.now, self.here = self._before[-last]
         made = Schedule(tuple(replace(pulse, t=pulse.t - self.now) for pulse in self.pulses[-last:]))
         del self.pulses[-last:], self._before[-last:]
-        self.fire(trim.refine(self.here, made, chosen=range(last), momentum=True))
+        self.fire(trim.refine(self.here, made, chosen=range(last), momentum=True, on_times=on_times))
 
     def schedule(self, *notes: str) -> Schedule:
         """What has been chosen."""

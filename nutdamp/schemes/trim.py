@@ -27,6 +27,9 @@ DIFFERENCE = 1e-6
 
 STEPS = 30
 
+ANY = (0.0, math.inf)
+"""Bounds on on-times that bound nothing."""
+
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
 
@@ -59,19 +62,25 @@ def _across(axis: Vector, vector: Vector) -> Vector:
 
 
 def refine(
-    spacecraft: Spacecraft, made: Schedule, *, chosen: Sequence[int], momentum: bool, spin: bool = False
+    spacecraft: Spacecraft,
+    made: Schedule,
+    *,
+    chosen: Sequence[int],
+    momentum: bool,
+    spin: bool = False,
+    on_times: tuple[float, float] = ANY,
 ) -> Schedule:
     """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
 
-    Starts, on-times within their bounds and directions of steerable pulses are free. ``momentum``: H too is to be
-    brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the spin to the
-    rate asked for. A schedule without pulses stays as it is.
+    Starts, on-times within their bounds and ``on_times`` s, and directions of steerable pulses are free. ``momentum``:
+    H too is to be brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the
+    spin to the rate asked for. A schedule without pulses stays as it is.
     """
     if not made.pulses:
         return made
     chosen = sorted({index % len(made) for index in chosen})
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
-    knobs = [_Knob(spacecraft, made.pulses[index]) for index in chosen]
+    knobs = [_Knob(spacecraft, made.pulses[index], on_times) for index in chosen]
     ends = np.cumsum([len(knob.start) for knob in knobs])
 
     def build(x: Vector) -> Schedule:
@@ -96,7 +105,7 @@ def refine(
 class _Knob:
     """What can be turned of a pulse: (start, on-time) of a channel, (start, impulse, angle) of a steerable torquer."""
 
-    def __init__(self, spacecraft: Spacecraft, pulse: Pulse) -> None:
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, on_times: tuple[float, float]) -> None:
         pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
         latest = max(spacecraft.horizon - pulse.on_time, pulse.start)
         self.channel = _channel(spacecraft, pulse)
@@ -104,13 +113,16 @@ class _Knob:
         if self.channel is not None:
             self.start = np.array([pulse.start, pulse.on_time])
             self.scale = np.array([pace, pulse.on_time])
-            self.lower = np.array([earliest, self.channel.min_on_time])
-            self.upper = np.array([latest, max(longest_on_time(spacecraft, self.channel), pulse.on_time)])
+            longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
+            self.lower = np.array([earliest, max(self.channel.min_on_time, on_times[0])])
+            self.upper = np.array([latest, min(longest, on_times[1])])
         else:
             self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
             self.scale = np.array([pace, pulse.magnitude, 1.0])
-            self.lower = np.array([earliest, 0.0, -np.inf])
-            self.upper = np.array([latest, np.inf, np.inf])
+            torque = None if self.torquer is None else self.torquer.torque
+            least, most = (0.0, math.inf) if torque is None else (torque * bound for bound in on_times)
+            self.lower = np.array([earliest, least, -np.inf])
+            self.upper = np.array([latest, most, np.inf])
 
     def turn(self, x: Vector) -> Pulse:
         """The pulse with these settings."""
