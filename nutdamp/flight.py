@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,7 +20,7 @@ from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.rigid import Forcing, Piece
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
-from nutdamp.track import Track, make_track, widest
+from nutdamp.track import PIECE, Track, even_times, make_track, widest
 
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
 """Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
@@ -130,6 +130,10 @@ class Leg:
     completed_at_end: int
 
 
+Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
+"""Times (n,) s, rates (n, 3) rad/s, quaternions (n, 4) and pulses completed (n,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Flight:
     """A schedule flown: its legs in order, and the motion as the last pulse ends.
@@ -185,23 +189,38 @@ class Flight:
 
         The flight must have been made to reach ``until``.
         """
-        even = np.linspace(0.0, until, samples)
-        rows: list[tuple[Vector, Vector, Vector, NDArray[np.int64]]] = []
+        return self._joined(self._motions(samples, until))
+
+    def pieces(self, samples: int, until: float) -> Iterator[Track]:
+        """The rows of `track` in order, about `track.PIECE` at a time, so that many of them take no more memory."""
+        motions: list[Motion] = []
+        count = 0
+        for motion in self._motions(samples, until):
+            motions.append(motion)
+            count += len(motion[0])
+            if count >= PIECE:
+                yield self._joined(motions)
+                motions, count = [], 0
+        if motions:
+            yield self._joined(motions)
+
+    def _joined(self, motions: Iterable[Motion]) -> Track:
+        t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
+        return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
+
+    def _motions(self, samples: int, until: float) -> Iterator[Motion]:
+        """The rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
         for leg in self.legs:
             if leg.start > until:
                 break
             end = min(leg.end, until)
-            times = even[(even > leg.start) & (even < end)]
-            if leg.jump:
-                times = np.concatenate([[leg.start], times])
-            if end > leg.start:
-                times = np.append(times, end)
-            body, quaternion = leg.path.motion(times)
-            completed = np.full(len(times), leg.completed)
-            completed[times == leg.end] = leg.completed_at_end
-            rows.append((times, body, quaternion, completed))
-        t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*rows, strict=True))
-        return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
+            for part in even_times(samples, until, leg.start, end):
+                times = np.concatenate([[leg.start], part.times]) if leg.jump and part.first else part.times
+                times = np.append(times, end) if part.last and end > leg.start else times
+                body, quaternion = leg.path.motion(times)
+                completed = np.full(len(times), leg.completed)
+                completed[times == leg.end] = leg.completed_at_end
+                yield times, body, quaternion, completed
 
     def around_pulses(self) -> tuple[Track, Track]:
         """The motion just before and just after each pulse, one row a pulse; cone angles as in `Residual`."""

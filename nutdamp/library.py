@@ -31,7 +31,7 @@ from nutdamp.flight import Residual
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Inertia
-from nutdamp.track import Track, in_file_axes
+from nutdamp.track import Track, in_file_axes, in_pieces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -155,10 +155,11 @@ class Flight:
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the track as ``simulate --csv`` does; raises CannotWrite."""
-        from nutdamp.files.output import write_whole
-        from nutdamp.files.track_csv import track_csv
+        from nutdamp.files.output import whole_file
+        from nutdamp.files.track_csv import write_track
 
-        write_whole(arguments.path("path", path), track_csv(self.sampled, self.core.spacecraft.inertia))
+        with whole_file(arguments.path("path", path)) as stream:
+            write_track(stream, in_pieces(self.sampled), self.core.spacecraft.inertia)
 
     def figure(self, name: str = "overview") -> Figure:
         """A matplotlib figure: ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``.

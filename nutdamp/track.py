@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,12 @@ from nutdamp.rounding import SAME_ANGLE
 from nutdamp.spacecraft import Inertia
 
 Array = NDArray[np.float64]
+
+PIECE = 20_000
+"""Rows of a track that are held at a time where many are written."""
+
+BINS = 7200
+"""Parts of a turn by which a range of right ascension is told apart from a whole turn: 0.05 deg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,15 +89,47 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
     return replace(track, rates=rates, quaternion=quaternion)
 
 
+def in_pieces(track: Track) -> Iterator[Track]:
+    """The rows of a track, `PIECE` at a time."""
+    for begin in range(0, len(track.t), PIECE):
+        yield Track(**{one.name: getattr(track, one.name)[begin : begin + PIECE] for one in fields(track)})
+
+
+class EvenTimes(NamedTuple):
+    """Some of the even times (n,) s within a stretch; ``first`` and ``last`` part of it."""
+
+    times: Array
+    first: bool
+    last: bool
+
+
+def even_times(samples: int, until: float, start: float, end: float) -> Iterator[EvenTimes]:
+    """Those of ``samples`` even times from 0 to ``until`` s that lie between ``start`` and ``end``, `PIECE` at a time.
+
+    There is one part at least, which may be empty. The times are those of np.linspace.
+    """
+    step = until / max(samples - 1, 1)
+    low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
+    for begin in range(low, max(high, low + 1), PIECE):
+        index = np.arange(begin, min(begin + PIECE, high))
+        times: Array = np.asarray(index * step, dtype=np.float64)
+        if samples > 1:
+            times[index == samples - 1] = until
+        inside = times[(times > start) & (times < end)]
+        yield EvenTimes(inside, begin == low, begin + PIECE >= high)
+
+
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """How far the spin axis strays, rad and s.
+    """How far the spin axis strays over ``rows`` rows from 0 to ``until`` s, rad and s.
 
     ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis
     direction in the inertial frame, as angles from its y-z and x-z planes; ``right_ascension`` (the
     shortest range, which may pass 2π) and ``declination`` the same on the sphere.
     """
 
+    rows: int
+    until: float
     farthest: tuple[float, float]
     nearest: tuple[float, float]
     x: tuple[float, float]
@@ -98,24 +138,82 @@ class Extremes:
     declination: tuple[float, float]
 
 
-def extremes(track: Track) -> Extremes:
-    """Extremes of the axis track over its rows."""
-    away = attitude.angle_between(track.axis, track.momentum[0])
-    # The first of all that are equal but for rounding: after the last pulse of a good plan nothing moves any more.
-    far = int(np.argmax(away >= away.max() - SAME_ANGLE))
-    near = int(np.argmax(away <= away.min() + SAME_ANGLE))
-    x, y = np.arcsin(np.clip(track.axis[:, :2].T, -1.0, 1.0))
-    ascension = np.sort(np.arctan2(track.axis[:, 1], track.axis[:, 0]) % (2 * math.pi))
-    # The widest gap between neighbouring values lies outside the range, across 0 or not.
-    gaps = np.diff(ascension, append=ascension[0] + 2 * math.pi)
-    widest = int(np.argmax(gaps))
-    west = float(ascension[(widest + 1) % len(ascension)])
-    declination = np.arctan2(track.axis[:, 2], np.hypot(track.axis[:, 0], track.axis[:, 1]))
-    return Extremes(
-        farthest=(float(away[far]), float(track.t[far])),
-        nearest=(float(away[near]), float(track.t[near])),
-        x=(float(x.min()), float(x.max())),
-        y=(float(y.min()), float(y.max())),
-        right_ascension=(west, west + 2 * math.pi - float(gaps[widest])),
-        declination=(float(declination.min()), float(declination.max())),
-    )
+def extremes(pieces: Iterable[Track]) -> Extremes:
+    """Extremes of the axis track over the rows of its pieces, of which there is one at least."""
+    rows, until, start = 0, 0.0, np.zeros(3)
+    far, near = _Record(), _Record()
+    ranges, ascension = _Range(3), _Circle()
+    for piece in pieces:
+        start = piece.momentum[0] if rows == 0 else start
+        rows, until = rows + len(piece.t), float(piece.t[-1])
+        away = attitude.angle_between(piece.axis, start)
+        far.add(away, piece.t)
+        near.add(-away, piece.t)
+        declination = np.arctan2(piece.axis[:, 2], np.hypot(piece.axis[:, 0], piece.axis[:, 1]))
+        ranges.add(np.column_stack([np.arcsin(np.clip(piece.axis[:, :2], -1.0, 1.0)), declination]))
+        ascension.add(np.arctan2(piece.axis[:, 1], piece.axis[:, 0]))
+    nearest, when = near.first
+    x, y, declinations = ranges.pairs
+    return Extremes(rows, until, far.first, (-nearest, when), x, y, ascension.shortest, declinations)
+
+
+class _Record:
+    """The largest of many values, and when it was first reached, all but for rounding.
+
+    After the last pulse of a good plan nothing moves any more: values that differ by rounding are one.
+    """
+
+    def __init__(self) -> None:
+        self.values, self.times = np.empty(0), np.empty(0)
+
+    def add(self, values: Array, times: Array) -> None:
+        """Keep each value that is larger than all before it, as long as it is the largest but for rounding."""
+        before = self.values[-1] if len(self.values) else -math.inf
+        so_far = np.maximum.accumulate(np.concatenate([[before], values]))
+        new = values > so_far[:-1]
+        self.values, self.times = np.append(self.values, values[new]), np.append(self.times, times[new])
+        kept = self.values >= so_far[-1] - SAME_ANGLE
+        self.values, self.times = self.values[kept], self.times[kept]
+
+    @property
+    def first(self) -> tuple[float, float]:
+        return float(self.values[0]), float(self.times[0])
+
+
+class _Range:
+    """Least and largest of some quantities."""
+
+    def __init__(self, count: int) -> None:
+        self.low, self.high = np.full(count, math.inf), np.full(count, -math.inf)
+
+    def add(self, values: Array) -> None:
+        self.low, self.high = np.minimum(self.low, values.min(axis=0)), np.maximum(self.high, values.max(axis=0))
+
+    @property
+    def pairs(self) -> list[tuple[float, float]]:
+        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
+
+
+class _Circle:
+    """The shortest arc that holds many angles: what is outside is the widest gap between neighbours.
+
+    Of the angles in each `BINS`-th of a turn the least and the largest are kept; gaps within one are not looked at.
+    """
+
+    def __init__(self) -> None:
+        self.low, self.high = np.full(BINS, math.inf), np.full(BINS, -math.inf)
+
+    def add(self, angles: Array) -> None:
+        turned = angles % (2.0 * math.pi)
+        bins = np.minimum((turned * (BINS / (2.0 * math.pi))).astype(int), BINS - 1)
+        np.minimum.at(self.low, bins, turned)
+        np.maximum.at(self.high, bins, turned)
+
+    @property
+    def shortest(self) -> tuple[float, float]:
+        used = self.high >= self.low
+        low, high = self.low[used], self.high[used]
+        gaps = np.append(low[1:], low[0] + 2.0 * math.pi) - high
+        widest = int(np.argmax(gaps))
+        west = float(low[(widest + 1) % len(low)])
+        return west, west + 2.0 * math.pi - float(gaps[widest])

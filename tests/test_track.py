@@ -45,31 +45,31 @@ def degrees(pair: tuple[float, float]) -> list[float]:
 
 
 def test_ranges_of_right_ascension_and_declination() -> None:
-    found = track.extremes(pointing([(10, 5), (50, -20), (30, 40)]))
+    found = track.extremes([pointing([(10, 5), (50, -20), (30, 40)])])
     assert degrees(found.right_ascension) == pytest.approx([10, 50], abs=1e-12)
     assert degrees(found.declination) == pytest.approx([-20, 40], abs=1e-12)
 
 
 def test_right_ascension_that_wraps_is_the_short_way_round() -> None:
     """From 350° over 0° to 20°: not from 0° to 355°."""
-    found = track.extremes(pointing([(350, 0), (355, 1), (5, 2), (20, 0)]))
+    found = track.extremes([pointing([(350, 0), (355, 1), (5, 2), (20, 0)])])
     assert degrees(found.right_ascension) == pytest.approx([350, 380], abs=1e-12)
 
 
 def test_right_ascension_of_a_standing_axis_is_a_point() -> None:
-    found = track.extremes(pointing([(200, 10), (200, 10)]))
+    found = track.extremes([pointing([(200, 10), (200, 10)])])
     assert degrees(found.right_ascension) == pytest.approx([200, 200], abs=1e-12)
 
 
 def test_angles_from_the_planes_of_the_frame() -> None:
     """x and y: how far the axis leans out of the y-z and the x-z plane."""
-    found = track.extremes(pointing([(0, 80), (90, 70), (180, 60), (270, 85)]))
+    found = track.extremes([pointing([(0, 80), (90, 70), (180, 60), (270, 85)])])
     assert degrees(found.x) == pytest.approx([-30, 10], abs=1e-12)
     assert degrees(found.y) == pytest.approx([-5, 20], abs=1e-12)
 
 
 def test_farthest_and_nearest_to_h_at_the_start_with_their_times() -> None:
-    found = track.extremes(pointing([(0, 80), (90, 70), (180, 60), (270, 85)]))
+    found = track.extremes([pointing([(0, 80), (90, 70), (180, 60), (270, 85)])])
     assert found.farthest == pytest.approx((math.radians(30), 2.0), rel=1e-14)
     assert found.nearest == pytest.approx((math.radians(5), 3.0), rel=1e-14)
 
@@ -78,7 +78,7 @@ def test_farthest_and_nearest_to_h_at_the_start_with_their_times() -> None:
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     spacecraft = spinner(spin=spin, degrees=12.0)
     until = spacecraft.inertial_period
-    found = track.extremes(flight.flown(spacecraft, Schedule(), until).track(4001, until))
+    found = track.extremes([flight.flown(spacecraft, Schedule(), until).track(4001, until)])
     assert degrees(found.x) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
     assert degrees(found.y) == pytest.approx([-12, 12], abs=1e-4)
     assert math.degrees(found.farthest[0]) == pytest.approx(12.0, abs=1e-12)
@@ -95,7 +95,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     place: Vector = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     there = spinner(degrees=12.0, attitude=Attitude(attitude.from_matrix(place @ in_n)))
     until = spacecraft.inertial_period
-    found = track.extremes(flight.flown(there, Schedule(), until).track(4001, until))
+    found = track.extremes([flight.flown(there, Schedule(), until).track(4001, until)])
     assert degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
     west, east = degrees(found.right_ascension)
     assert [west, east] == pytest.approx([(right_ascension - 12) % 360, (right_ascension - 12) % 360 + 24], abs=1e-4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
@@ -38,8 +38,8 @@ dispersions:
   timing: {uniform: 5 ms}"""
 """What is said of a file that should have dispersions."""
 
-Output = tuple[str, str | bytes]
-"""Path and content of a file to write."""
+Output = tuple[str, "str | bytes | Callable[[IO[bytes]], object]"]
+"""Path of a file to write, and its content or what writes it."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 
+PICTURED = 100_000
+"""Rows of the track of a picture at most."""
+
+
 @click.command("simulate")
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
@@ -78,6 +82,7 @@ def command(
     expect_places(csv, json, plot)
 
     from nutdamp import flight
+    from nutdamp.track import extremes
 
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     pulses = plan.pulses
@@ -85,18 +90,19 @@ def command(
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
     residual, flown = (one.residual for one in flights)
     chosen = flights[real]
-    track = chosen.track(samples, end)
+    found = extremes(chosen.pieces(samples, end))
+    track = chosen.track(min(samples, PICTURED), end) if plot is not None or drawn else None
     outputs: list[Output] = []
     if csv is not None:
-        from nutdamp.files.track_csv import track_csv
+        from nutdamp.files.track_csv import write_track
 
-        outputs.append((csv, track_csv(track, body.inertia)))
+        outputs.append((csv, lambda stream: write_track(stream, chosen.pieces(samples, end), body.inertia)))
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.simulation_json import simulation_json
 
-        outputs.append((json, json_text(simulation_json(chosen, track, residual, flown, scheme=plan.scheme))))
-    if plot is not None:
+        outputs.append((json, json_text(simulation_json(chosen, found, residual, flown, scheme=plan.scheme))))
+    if plot is not None and track is not None:
         from nutdamp.report import figures
 
         outputs.append((plot, figures.picture(figure, chosen, track, plot)))
@@ -105,8 +111,8 @@ def command(
         from nutdamp.report.simulate_tables import simulation_screen
 
         how = f"{plan.scheme}, propagated by the {'real pulse widths' if real else 'impulse sum (17)'}"
-        screens.append(simulation_screen(chosen, track, residual, flown, how=how))
-    if drawn:
+        screens.append(simulation_screen(chosen, found, residual, flown, how=how))
+    if track is not None and drawn:
         from nutdamp.report.terminal import motion_drawing
 
         screens.append(motion_drawing(chosen, track))

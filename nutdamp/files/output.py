@@ -10,7 +10,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -30,13 +30,17 @@ ATTEMPTS = 10
 """Temporary files that are made before giving up, where others remove them."""
 
 
-def write_whole(path: str, content: str | bytes) -> None:
+def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
     """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output. Raises CannotWrite.
 
-    Text becomes UTF-8; what has no place there, such as a byte of a file name that is not UTF-8, becomes \\udcff.
+    What is long writes itself: it is called with the stream. Text becomes UTF-8; what has no place there, such as a
+    byte of a file name that is not UTF-8, becomes \\udcff.
     """
     with whole_file(path) as stream:
-        stream.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
+        if callable(content):
+            content(stream)
+        else:
+            stream.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
 
 
 @contextmanager

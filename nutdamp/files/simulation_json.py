@@ -9,14 +9,13 @@ from nutdamp import __version__
 from nutdamp.files.plan_json import final_json, pulses_json, residual_json, spacecraft_json, target_json
 from nutdamp.flight import Flight, Residual
 from nutdamp.physics.attitude import full_turn
-from nutdamp.track import Track, extremes
+from nutdamp.track import Extremes
 
 
 def simulation_json(
-    flight: Flight, track: Track, residual: Residual, flown: Residual, *, scheme: str
+    flight: Flight, found: Extremes, residual: Residual, flown: Residual, *, scheme: str
 ) -> dict[str, Any]:
     """Pulses with the cone angles around them, both residuals, and the extremes of the axis track in degrees."""
-    found = extremes(track)
     attitude = flight.spacecraft.attitude
     return {
         "nutdamp": __version__,
@@ -27,7 +26,7 @@ def simulation_json(
         "flown": residual_json(flown),
         "final": final_json(flight),
         "target": target_json(flight.spacecraft),
-        "until_s": float(track.t[-1]),
+        "until_s": found.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
             "farthest_from_momentum_deg": math.degrees(found.farthest[0]),

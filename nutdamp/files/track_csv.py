@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import IO
+
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.output import csv_text, number
 from nutdamp.rounding import cleaned
 from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track, in_file_axes
@@ -49,7 +51,13 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     return rows
 
 
-def track_csv(track: Track, inertia: Inertia) -> str:
-    """The rows of `track_array` as CSV."""
-    rows = track_array(track, inertia).tolist()
-    return csv_text(HEADER, ([*map(number, row[:-1]), str(row[-1])] for row in rows))
+def write_track(stream: IO[bytes], pieces: Iterable[Track], inertia: Inertia) -> None:
+    """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
+    stream.write(f"{','.join(HEADER)}\r\n".encode())
+    for piece in pieces:
+        stream.write(_lines(track_array(piece, inertia).tolist()).encode())
+
+
+def _lines(rows: list[tuple[float, ...]]) -> str:
+    """Rows of finite numbers as CSV, each by its repr: the shortest text that reads back the same."""
+    return repr(rows)[2:-2].replace("), (", "\r\n").replace(", ", ",") + "\r\n"

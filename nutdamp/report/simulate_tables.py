@@ -11,16 +11,18 @@ from nutdamp.report.end_tables import end_table
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.plan_tables import channel_text, header
 from nutdamp.report.text import degrees, longitude, moment, pointing
-from nutdamp.track import Extremes, Track, extremes
+from nutdamp.track import Extremes
 
 
-def simulation_screen(flight: Flight, track: Track, residual: Residual, flown: Residual, *, how: str) -> RenderableType:
+def simulation_screen(
+    flight: Flight, found: Extremes, residual: Residual, flown: Residual, *, how: str
+) -> RenderableType:
     """Everything that ``simulate`` shows; ``how`` names what was propagated."""
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule):
         parts += [Text(), _pulses(flight)]
     parts += [Text(), _residuals(residual, flown), Text(), end_table(flight)]
-    parts += [Text(), _extremes(extremes(track), flight, track)]
+    parts += [Text(), _extremes(found, flight)]
     return Group(*parts)
 
 
@@ -53,7 +55,7 @@ def _residuals(residual: Residual, flown: Residual) -> Table:
     return table
 
 
-def _extremes(found: Extremes, flight: Flight, track: Track) -> Table:
+def _extremes(found: Extremes, flight: Flight) -> Table:
     table = facts()
     far, near = found.farthest, found.nearest
     table.add_row(
@@ -66,7 +68,7 @@ def _extremes(found: Extremes, flight: Flight, track: Track) -> Table:
         west, east = map(longitude, found.right_ascension)
         table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, eastward")
         table.add_row("declination", _range(found.declination))
-    table.add_row("track", f"{len(track.t)} rows, 0 to {moment(float(track.t[-1]))}")
+    table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
     return table
 
 
