@@ -49,6 +49,10 @@ QUARTERINGS = 9
 PARTS = 4
 """Parts of a slot in which the gain of a channel that is on for long is summed."""
 
+LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
+"""Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
+too high in the middle of a slot of w rad, which adds up over very many alignments; each factor gives a bound."""
+
 ENOUGH = 1e-10
 """Relative height of a price that is not worth a closer look."""
 
@@ -200,7 +204,9 @@ def first_order(program: Program, prices: Vector) -> float:
     if lowered <= 0.0:
         return 0.0
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
-    return max(goal / lowered - gains.lasting(~program.strong, lowered), 0.0) * (1.0 - ROUNDING)
+    factors = lowered * np.array([1.0] if program.strong.all() else LOWERINGS)
+    best = max(goal / factor - gains.lasting(~program.strong, factor) for factor in map(float, factors))
+    return float(max(best, 0.0) * (1.0 - ROUNDING))
 
 
 class _Gains:
