@@ -67,7 +67,7 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         (Column("ends at", "s"), lambda plan: f"{plan.pulses.end:.3f}"),
         (Column("impulse", "N m s"), lambda plan: _number(plan.pulses.total_impulse)),
         (
-            Column("× least impulse"),
+            Column("× least"),
             lambda plan: f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING,
         ),
     ]
@@ -76,8 +76,6 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
     columns += [
         (Column("nutation left", "deg"), lambda plan: _angle(plan.flown, "nutation")),
         (Column("shift of H", "deg"), lambda plan: _angle(plan.flown, "momentum_shift")),
-        (Column("nutation by (17)", "deg"), lambda plan: _angle(plan.residual, "nutation")),
-        (Column("shift by (17)", "deg"), lambda plan: _angle(plan.residual, "momentum_shift")),
     ]
     body = compared.spacecraft
     columns += [
