@@ -77,6 +77,8 @@ def rigorous(spacecraft: Spacecraft, prices: dict[str, float], cost: float, left
     channels = usable(spacecraft, axial=True)
     if spacecraft.disturbances or spacecraft.growth != 0.0 or any(one.name not in prices for one in channels):
         return None
+    if left.nutation >= 0.5 * math.pi:  # the spin axis points away from H
+        return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
     axial = bool(torques[:, 2].any())

@@ -358,3 +358,9 @@ def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
     solution = program.solve()
     found = bounds.first_order(program, solution.prices)
     assert solution.cost * (1.0 - 2e-3) <= found <= solution.cost * (1.0 + TIGHT)
+
+
+def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over() -> None:
+    body = spinner(channels=cross(8.0), limits=Limits(horizon=60.0))
+    assert bounds.rigorous(body, prices(body), 100.0, Left(nutation=math.radians(80.0)), shift=True) is not None
+    assert bounds.rigorous(body, prices(body), 100.0, Left(nutation=math.radians(100.0)), shift=True) is None
