@@ -75,8 +75,8 @@ def command(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
             f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
+    made = flight.flown(body, pulses, end)
     with progress("filming", timed.frames, quiet=quiet) as step:
-        content = animation.film(flight.flown(body, pulses, end), timed, output, width, step)
-    deliver([(output, content)])
+        deliver([(output, lambda stream: animation.film(stream, made, timed, output, width, step))])
     if output != "-":
         remark(f"wrote {output}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")

@@ -99,10 +99,11 @@ def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
     assert left(tmp_path) == ["ideal.yaml"]
 
 
-def without(package: str, tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run with an installation that lacks ``package``."""
+def without(package: str, tmp_path: Path, *arguments: str, more: str = "") -> subprocess.CompletedProcess[str]:
+    """Run with an installation that lacks ``package``; ``more`` is run before."""
     blocked = (
-        f"import sys; sys.modules[{package!r}] = None; from nutdamp.cli import main; sys.argv[0] = 'nutdamp'; main()"
+        f"import sys; sys.modules[{package!r}] = None; from nutdamp.cli import main; sys.argv[0] = 'nutdamp'; {more}"
+        "\nmain()"
     )
     command = [sys.executable, "-c", blocked, *arguments]
     return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -118,6 +119,19 @@ def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, a
     assert "pip install 'nutdamp[plot]'" in done.stderr
     assert done.stdout == ""
     assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize("output", ["report.html", "-"])
+def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str) -> None:
+    """No file is read, and no plan is made: what would make it is not there."""
+    no_plans = "import nutdamp.planning; nutdamp.planning.compare = None"
+    done = without("matplotlib", tmp_path, "report", "missing.yaml", "-o", output, more=no_plans)
+    assert done.returncode == 1
+    assert "pip install 'nutdamp[plot]'" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert left(tmp_path) == []
+    # A page without pictures needs none.
+    assert without("matplotlib", tmp_path, "report", "--scheme", "two-pulse", "-o", "a.md").returncode == 0
 
 
 def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import itertools
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,8 @@ from nutdamp import flight, planning
 from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
 from nutdamp.flight import Flight
 from nutdamp.physics.attitude import angle_between
-from nutdamp.report.figures import animation
-from nutdamp.report.figures.animation import Scene, Timing, film, film_format, timing
+from nutdamp.report.figures import animation, style
+from nutdamp.report.figures.animation import Scene, Timing, film_format, timing
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft
 
@@ -27,6 +29,15 @@ def flown(body: Spacecraft, pulses: Schedule | None = None) -> tuple[Flight, flo
     made = planning.plan(body, "two-pulse").pulses if pulses is None else pulses
     end = made.end + body.inertial_period
     return flight.flown(body, made, end), end
+
+
+def film(
+    made: Flight, timed: Timing, path: str, width: int, progress: Callable[[int], object] = lambda _: None
+) -> bytes:
+    """The content of the file."""
+    stream = io.BytesIO()
+    animation.film(stream, made, timed, path, width, progress)
+    return stream.getvalue()
 
 
 def test_a_gif_has_its_frames_its_size_and_its_pace() -> None:
@@ -49,14 +60,40 @@ def test_a_gif_has_its_frames_its_size_and_its_pace() -> None:
         assert np.count_nonzero(np.abs(frames[one] - frames[other]).max(axis=2) > 50) > 40
 
 
+def test_each_frame_is_written_before_the_next_is_drawn() -> None:
+    """So that a film of any length takes the memory of a frame; and the frames are the scene to the pixel."""
+    made, end = flown(spinner(channels=cross(20.0)))
+    timed = timing(made.spacecraft, end, 10, 1.0)
+    stream, sizes = io.BytesIO(), []
+    animation.film(stream, made, timed, "a.gif", 320, lambda _: sizes.append(stream.tell()))
+    assert len(sizes) == timed.frames == 10
+    assert all(one < other for one, other in itertools.pairwise(sizes))
+    assert sizes[-1] == len(stream.getvalue()) - 1
+    picture = Image.open(stream)
+    scene = style.styled(Scene)(made, timed, 320)
+    for number in range(timed.frames):
+        picture.seek(number)
+        style.styled(scene.show)(number)
+        drawn = animation.LEVELS[style.styled(scene.pixels)()].astype(int)
+        off = np.abs(np.asarray(picture.convert("RGB")).astype(int) - drawn).max(axis=2)
+        assert np.count_nonzero(off > 40) < 0.002 * off.size  # colours that the palette has not
+    assert picture.info["loop"] == 0
+
+
+def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
+    body = spinner(degrees=0.0)
+    content = film(flight.flown(body, Schedule(), 5.0), Timing(5.0, 4, 10, 1.0), "a.gif", 320)
+    assert getattr(Image.open(io.BytesIO(content)), "n_frames", 1) == 4
+
+
 def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> None:
     body = spinner(degrees=20.0)
     kick = Schedule((Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),))
     made, end = flown(body, kick)
     with matplotlib_style.context("default"):
         scene = Scene(made, Timing(end, 8, 10, 1.0), 400)
-    assert np.degrees(angle_between(scene.cones[0].axis, scene.cones[0].momentum)) == pytest.approx(20.0)
-    assert np.degrees(angle_between(scene.cones[1].axis, scene.cones[1].momentum)) == pytest.approx(0.0, abs=1e-9)
+    assert np.degrees(angle_between(scene.cones(0).axis, scene.cones(0).momentum)) == pytest.approx(20.0)
+    assert np.degrees(angle_between(scene.cones(1).axis, scene.cones(1).momentum)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_frame_shows_the_cones_of_its_moment() -> None:

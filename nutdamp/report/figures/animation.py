@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
 import shutil
+import struct
 import subprocess
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,12 @@ SHORTEST, LONGEST = 6.0, 30.0
 
 MARKED = math.radians(60.0)
 """Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
+
+TRANSPARENT = 255
+"""Entry of the palette of a GIF that leaves what stood there."""
+
+FRAMED = 300
+"""Frames by whose cones the scales are laid out, evenly over the film."""
 
 HELD = 0.4
 """Seconds of film that a firing stays announced, however short it is."""
@@ -96,46 +102,78 @@ def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None
 
 @style.styled
 def film(
-    flight: Flight, timed: Timing, path: str, width: int = 800, progress: Callable[[int], object] = lambda _: None
-) -> bytes:
-    """The film as the content of a file of ``width`` pixels; ``progress`` is told how many frames are done.
+    stream: IO[bytes],
+    flight: Flight,
+    timed: Timing,
+    path: str,
+    width: int = 800,
+    progress: Callable[[int], object] = lambda _: None,
+) -> None:
+    """Write the film of ``width`` pixels to ``stream``, frame by frame; ``progress`` is told how many are done.
 
-    Raises as `film_format`.
+    The ending of ``path`` says the format. Raises as `film_format`.
     """
     kind = film_format(path)
     scene = Scene(flight, timed, width)
-    return (_gif if kind == "gif" else _mp4)(scene, timed, progress)
+    (_gif if kind == "gif" else _mp4)(stream, scene, timed, progress)
 
 
-def _gif(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> bytes:
-    """One palette for all frames: the colours are few, and what stands still stays the same to the pixel."""
-    from PIL import Image
+def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
+    """One palette for all frames: the colours are few, and what stands still stays the same to the pixel.
 
-    pictures: list[Image.Image] = []
+    A frame is only what changed since the one before, by GIF89a: what did not is transparent in it.
+    """
+    from PIL import GifImagePlugin, Image
+
     palette = Image.new("P", (1, 1))
+    shown: NDArray[np.uint8] | None = None
     for number in range(timed.frames):
         scene.show(number)
         pixels = LEVELS[scene.pixels()]
-        if number == 0:
-            palette.putpalette(_commonest(pixels).tobytes())
-        pictures.append(Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE))
+        if shown is None:
+            colours = _commonest(pixels).tobytes()
+            palette.putpalette(colours)
+            stream.write(_gif_head(pixels.shape[1], pixels.shape[0], colours))
+        image = Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+        indices = np.array(image)
+        indices[indices == TRANSPARENT] = 0  # the colour there is the first one again
+        changed, corner = _changed(shown, indices)
+        frame = Image.fromarray(changed, "P")
+        # Time in milliseconds; GIF counts in hundredths of a second.
+        options = {"duration": 10 * round(100 / timed.fps), "transparency": TRANSPARENT, "disposal": 1}
+        for part in GifImagePlugin.getdata(frame, corner, **options):
+            stream.write(part)
+        shown = indices
         progress(number + 1)
-    stream = io.BytesIO()
-    # GIF counts in hundredths of a second.
-    pictures[0].save(
-        stream, "GIF", save_all=True, append_images=pictures[1:], duration=10 * round(100 / timed.fps), loop=0
-    )
-    return stream.getvalue()
+    stream.write(b";")
+
+
+def _gif_head(width: int, height: int, colours: bytes) -> bytes:
+    """Head of a GIF with one palette of 256 colours, which is shown for ever."""
+    screen = struct.pack("<HHBBB", width, height, 0xF7, 0, 0)
+    return b"GIF89a" + screen + colours + b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
+
+
+def _changed(before: NDArray[np.uint8] | None, now: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+    """The part of a frame that differs from the one before, transparent where it does not; its corner (x, y)."""
+    if before is None:
+        return now, (0, 0)
+    differs = before != now
+    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        rows = columns = np.array([0])
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return np.where(differs[window], now[window], np.uint8(TRANSPARENT)), (int(columns[0]), int(rows[0]))
 
 
 def _commonest(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The colours (256, 3) that cover most of a picture."""
+    """The colours (256, 3) that cover most of a picture; the last is the first again, so that none needs it."""
     colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
-    most = colours[np.argsort(-counts, kind="stable")[:256]]
-    return np.vstack([most, np.repeat(most[:1], 256 - len(most), axis=0)])
+    most = colours[np.argsort(-counts, kind="stable")[:TRANSPARENT]]
+    return np.vstack([most, np.repeat(most[:1], TRANSPARENT + 1 - len(most), axis=0)])
 
 
-def _mp4(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> bytes:
+def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
     """H.264 as browsers play it."""
     from matplotlib.animation import FFMpegWriter
 
@@ -150,7 +188,8 @@ def _mp4(scene: Scene, timed: Timing, progress: Callable[[int], object]) -> byte
                     progress(number + 1)
         except subprocess.CalledProcessError as reason:
             raise CannotWrite("mp4", f"ffmpeg failed with status {reason.returncode}") from reason
-        return target.read_bytes()
+        with target.open("rb") as made:
+            shutil.copyfileobj(made, stream)
 
 
 class Scene:
@@ -163,8 +202,7 @@ class Scene:
         track = flight.track(timed.frames, timed.until)
         rows = np.searchsorted(track.t, timed.times, side="right") - 1
         rows[0] = 0  # before what is fired at once
-        self.quaternions = track.quaternion[rows]
-        self.cones = [geometry.cones(flight, track.rates[row], track.quaternion[row]) for row in rows]
+        self.rates, self.quaternions = track.rates[rows], track.quaternion[rows]
         # Even numbers of pixels: video is coded in blocks.
         self.figure = style.sheet(INCHES, 0.6 * INCHES)
         self.figure.set_dpi(width // 2 * 2 / INCHES)
@@ -181,9 +219,9 @@ class Scene:
         grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         self.strip = figure.add_subplot(grid[1, :])
-        rims = np.vstack(
-            [rim for one in self.cones for rim in (one.body, one.space, one.axis[None], one.rotation[None])]
-        )
+        some = np.unique(np.linspace(0, self.timed.frames - 1, min(self.timed.frames, FRAMED)).round().astype(int))
+        cones = (self.cones(number) for number in some.tolist())
+        rims = np.vstack([rim for one in cones for rim in (one.body, one.space, one.axis[None], one.rotation[None])])
         sphere.draw_ground(self.space, self.looked, self.path)
         sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
         much = self.looked.magnified
@@ -203,11 +241,15 @@ class Scene:
         self.canvas.draw()  # type: ignore[no-untyped-call]
         self.still = self.canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
+    def cones(self, number: int) -> geometry.Cones:
+        """The cones of frame ``number``, from 0."""
+        return geometry.cones(self.flight, self.rates[number], self.quaternions[number])
+
     def show(self, number: int) -> None:
         """Frame ``number``, from 0."""
         for artist in self._changing:
             artist.remove()
-        now, found = float(self.timed.times[number]), self.cones[number]
+        now, found = float(self.timed.times[number]), self.cones(number)
         kept = [set(axes.get_children()) for axes in self.figure.axes]
         done = self.path.t <= now
         sphere.draw_cones(self.space, self.looked, found)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nutdamp.errors import BadRequest
+from nutdamp.report.figures.style import require
 from nutdamp.report.page.document import Page
 from nutdamp.report.page.html import page_html
 from nutdamp.report.page.markdown import page_markdown
@@ -30,11 +31,15 @@ FORMS = {
 def form_of(path: str) -> Form:
     """The form for the file ``path``; HTML for standard output.
 
-    Raises BadRequest for an unknown ending, CannotWrite where a PDF lacks the browser to print it.
+    Raises BadRequest for an unknown ending, MissingExtra for pictures without matplotlib, CannotWrite where a PDF lacks
+    the browser to print it.
     """
     ending = ".html" if path == "-" else Path(path).suffix.lower()
     if ending not in FORMS:
         raise BadRequest(f"--output {path}: the ending says the format; use one of {', '.join(FORMS)}")
+    form = FORMS[ending]
+    if form.pictured:
+        require()
     if ending == ".pdf":
         needed_browser(path)
-    return FORMS[ending]
+    return form
