@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import click
 
 from nutdamp.cli.failures import debug_option, show_failures
-from nutdamp.cli.parameters import FILE, Direction, FinalSpin, Quantity
+from nutdamp.cli.parameters import FILE, Angles, Direction, FinalSpin, Quantity
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 from nutdamp.schemes import AIMED, LEAST, SUNLIT, Options
@@ -107,12 +107,12 @@ class Aim(NamedTuple):
     and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
     """
 
-    target: tuple[float, float] | None = None
+    target: Angles | None = None
     spin: float | str | None = None
-    sun: tuple[float, float] | None = None
+    sun: Angles | None = None
 
-    def applied(self, spacecraft: Spacecraft) -> Spacecraft:
-        """The spacecraft with this goal; a usage error where it cannot be one."""
+    def applied(self, spacecraft: Spacecraft, remark: Callable[[str], None]) -> Spacecraft:
+        """The spacecraft with this goal; a usage error where it cannot be one, a remark where it is hardly meant."""
         from dataclasses import replace
 
         goal = spacecraft.goal
@@ -127,20 +127,27 @@ class Aim(NamedTuple):
                     f"a rate of the sign of the spin ({spacecraft.spin:.4g} rad/s) is wanted", param_hint="--spin"
                 )
             goal = replace(goal, spin=spin)
+        for option, angles in (("--target", self.target), ("--sun", self.sun)):
+            for reading in () if angles is None else angles.readings:
+                remark(f"{option}: warning: {reading}")
         return replace(spacecraft, goal=goal)
 
 
-def _direction(spacecraft: Spacecraft, angles: tuple[float, float], option: str) -> Vector:
+def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
     from nutdamp.physics.attitude import on_sphere
 
     if spacecraft.attitude is not None:
-        if abs(angles[1]) > 0.5 * math.pi:
-            raise click.BadParameter("a declination of -90 deg to 90 deg is wanted", param_hint=option)
-        return on_sphere(*angles)
-    if not 0.0 <= angles[0] < math.pi:
-        raise click.BadParameter("a tilt of at least 0 and below 180 deg is wanted", param_hint=option)
-    return spacecraft.direction_in_n(*angles)
+        if abs(angles.second) > 0.5 * math.pi:
+            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
+        return on_sphere(angles.first, angles.second)
+    if not 0.0 <= angles.first < math.pi:
+        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
+    return spacecraft.direction_in_n(angles.first, angles.second)
+
+
+def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
+    return click.BadParameter("; ".join((f"{expected} is wanted", *angles.readings)), param_hint=option)
 
 
 READ_BY = {
@@ -281,7 +288,7 @@ def load(
             doubts.append(doubt)
 
     body = read_spacecraft(*source(given.path, remark), given.settings, warn)
-    return body if aim is None else aim.applied(body)
+    return body if aim is None else aim.applied(body, remark)
 
 
 def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 from click.shell_completion import CompletionItem
@@ -75,20 +76,38 @@ class FinalSpin(Quantity):
         return value if value == "keep" else super().convert(value, param, ctx)
 
 
-class Direction(ParamType[tuple[float, float]]):
+class Angles(NamedTuple):
+    """Two angles in rad that name a direction, and those numbers among them that were written without a unit."""
+
+    first: float
+    second: float
+    bare: tuple[str, ...] = ()
+
+    @property
+    def readings(self) -> tuple[str, ...]:
+        """How the numbers without unit are read that are more likely degrees: whole ones, and more than a turn."""
+        from nutdamp.files.plausibility import reading
+        from nutdamp.units import parse
+
+        numbers = [parse(text, "angle", bare=True) for text in self.bare]
+        doubtful = [one for one in numbers if one and (one.is_integer() or abs(one) > 2.0 * math.pi)]
+        return tuple(reading(int(one) if one.is_integer() else one, "angle", "deg") for one in doubtful)
+
+
+class Direction(ParamType[Angles]):
     """Two angles with a comma between them."""
 
     name = "angle,angle"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Angles:
         """Both in rad; a usage error for anything else."""
-        if isinstance(value, tuple):
+        if isinstance(value, Angles):
             return value
-        parts = str(value).split(",")
+        parts = [part.strip() for part in str(value).split(",")]
         if len(parts) != 2:
             self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
-        first, second = (Quantity("angle").convert(part.strip(), param, ctx) for part in parts)
-        return first, second
+        first, second = (Quantity("angle").convert(part, param, ctx) for part in parts)
+        return Angles(first, second, tuple(part for part in parts if not part[-1:].isalpha() and part[-1:] != "°"))
 
 
 class Count(ParamType[int]):

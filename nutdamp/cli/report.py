@@ -81,7 +81,7 @@ def command(
 
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
-    body = aim.applied(read_spacecraft(text, name, spacecraft.settings, lambda doubt: remark(doubt.as_warning)))
+    body = aim.applied(read_spacecraft(text, name, spacecraft.settings, lambda doubt: remark(doubt.as_warning)), remark)
     expect_places(output)
     if disperse is not None:
         require_dispersions(body)

@@ -6,8 +6,10 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.files.facts import Facts, Finding
-from nutdamp.files.rules import spin_of
+from nutdamp.files.rules import spin_of, symmetric, tensor_of
 from nutdamp.files.yaml_tree import KeyPath, Node
+from nutdamp.physics.cones import momentary, nutation_angle
+from nutdamp.physics.inertia import principal_axes
 from nutdamp.units import KINDS
 
 FAR = 50.0
@@ -18,6 +20,12 @@ FAST = 100.0
 
 FAST_AND_WHOLE = 20.0
 """rad/s; from here on (191 rpm) a whole number is more likely one of rpm."""
+
+LOOSE = 0.1
+"""rad; few requirements on an angle are looser than this 5.7 deg, and many a file counts in deg."""
+
+LASTING = 50.0
+"""Spin turns; no pulse against a nutation lasts longer."""
 
 ANGLES: tuple[KeyPath, ...] = (("state", "phase"), ("goal", "azimuth"), ("goal", "right_ascension"))
 """Angles that may be of any size; the others are refused where they are too large, with a hint."""
@@ -30,12 +38,20 @@ def doubts(root: Node) -> Iterator[Finding]:
         value = _bare(facts, path)
         if value is not None and abs(value) > 2.0 * math.pi:
             yield _doubt(path, value, "angle", "deg")
+    yield from _requirements(facts)
     for path in _lengths(facts):
         value = _bare(facts, path)
         if value is not None and abs(value) > FAR:
             yield _doubt(path, value, "length", "mm")
     yield from _rates(facts)
-    yield from _shortest_firings(facts)
+    yield from _firings(facts)
+
+
+def reading(value: float, kind: str, meant: str) -> str:
+    """How a bare number is read, and what to write where the unit ``meant`` is more likely."""
+    unit = KINDS[kind].si
+    in_degrees = f" ({math.degrees(value):.4g} deg)" if kind == "angle" else ""
+    return f"{value} is read as {value} {unit}{in_degrees}; write {value} {meant} if that is meant, else {value} {unit}"
 
 
 def _bare(facts: Facts, path: KeyPath) -> float | None:
@@ -48,9 +64,29 @@ def _bare(facts: Facts, path: KeyPath) -> float | None:
 
 
 def _doubt(path: KeyPath, value: float, kind: str, meant: str) -> Finding:
-    unit = KINDS[kind].si
-    problem = f"{value} is read as {value} {unit}; write {value} {meant} if that is meant, else {value} {unit}"
-    return Finding(path, problem)
+    return Finding(path, reading(value, kind, meant))
+
+
+def _requirements(facts: Facts) -> Iterator[Finding]:
+    """Angles so large that nothing is required with them: looser than is usual, or than the motion at t = 0."""
+    for key, least in (("nutation", min(LOOSE, _nutation(facts))), ("momentum_shift", LOOSE)):
+        path = ("requirement", key)
+        value = _bare(facts, path)
+        if value is not None and least < value < 0.5 * math.pi:  # from there on it is refused, with the same hint
+            yield _doubt(path, value, "angle", "deg")
+
+
+def _nutation(facts: Facts) -> float:
+    """Nutation angle at t = 0, rad; infinite where it cannot be read."""
+    stated, tensor = facts.number("angle", "state", "nutation"), tensor_of(facts)
+    omega0, spin = facts.vector("rate", 3, "omega0"), spin_of(facts)
+    A, C = (facts.number("inertia", "inertia", key) for key in "AC")
+    if stated is not None or omega0 is None or spin is None:
+        return math.inf if stated is None else stated
+    if tensor is None:
+        return math.inf if A is None or C is None else nutation_angle(A, C, math.hypot(*omega0[:2]), spin)
+    moments, axes = principal_axes(symmetric(tensor))
+    return momentary(moments, axes.T @ omega0, math.copysign(1.0, spin)).nutation
 
 
 def _lengths(facts: Facts) -> Iterator[KeyPath]:
@@ -70,11 +106,12 @@ def _rates(facts: Facts) -> Iterator[Finding]:
             yield _doubt(path, value, "rate", meant)
 
 
-def _shortest_firings(facts: Facts) -> Iterator[Finding]:
-    """Shortest on-times of more than a spin turn, within which the torque would cancel itself."""
+def _firings(facts: Facts) -> Iterator[Finding]:
+    """Shortest on-times of more than a spin turn, within which the torque would cancel itself; endless longest ones."""
     spin = spin_of(facts)
     for index, _ in facts.children("thrusters"):
-        path = ("thrusters", index, "min_on_time")
-        value = _bare(facts, path)
-        if value is not None and spin is not None and value * abs(spin) > 2.0 * math.pi:
-            yield _doubt(path, value, "time", "ms")
+        for key, turns in (("min_on_time", 1.0), ("max_on_time", LASTING)):
+            path = ("thrusters", index, key)
+            value = _bare(facts, path)
+            if value is not None and spin is not None and value * abs(spin) > 2.0 * math.pi * turns:
+                yield _doubt(path, value, "time", "ms")

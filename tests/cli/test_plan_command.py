@@ -315,6 +315,17 @@ def test_the_nutation_of_a_sphere_has_no_period_in_the_body(run: Run, tmp_path: 
     assert "none in the body, where ω stands still, 1.992 s inertially" in run("plan", "sphere.yaml").stdout
 
 
+def test_a_target_without_unit_is_read_as_rad_and_says_so(run: Run) -> None:
+    done = run("plan", "--quiet", "--target", "10,45")
+    assert done.returncode == 2
+    assert "10 is read as 10 rad (573 deg); write 10 deg if that is meant, else 10 rad" in " ".join(done.stderr.split())
+    taken = run("plan", "--target", "1,45.5", "--scheme", "two-pulse")
+    assert "--target: warning: 1 is read as 1 rad (57.3 deg); write 1 deg" in taken.stderr
+    assert "--target: warning: 45.5 is read as 45.5 rad (2607 deg)" in taken.stderr
+    for angles in ("0,0", "0.2,1.5", "10deg,45 °", "2 rad,0"):
+        assert "is read as" not in run("plan", "--target", angles, "--scheme", "two-pulse").stderr
+
+
 def test_a_target_along_h_is_compared_with_no_rounding(run: Run) -> None:
     done = run("plan", "--target", "0deg,0deg", columns=80)
     (row,) = [line for line in done.stdout.splitlines() if "× C|ω3|β" in line]

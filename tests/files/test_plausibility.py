@@ -10,6 +10,7 @@ from broken import BASE, BODY
 
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.settings import parse_setting
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
@@ -35,7 +36,7 @@ def doubts_of(text: str) -> list[str]:
         ),
         (
             BODY + "state: {spin: 3, nutation: 0.1, phase: 40}\n",
-            "f.yaml:3:40: state.phase: warning: 40 is read as 40 rad; write 40 deg if that is meant, else 40 rad",
+            "f.yaml:3:40: state.phase: warning: 40 is read as 40 rad (2292 deg); write 40 deg if that is meant",
         ),
         (
             BODY + "omega0: [0.1, 0, 180]\n",
@@ -54,6 +55,31 @@ def doubts_of(text: str) -> list[str]:
             BASE + "steerable: {torque: 3, lever_arm: 800}\n",
             "f.yaml:4:35: steerable.lever_arm: warning: 800 is read as 800 m; write 800 mm",
         ),
+        (
+            BASE + "requirement: {nutation: 0.5}\n",
+            "f.yaml:4:25: requirement.nutation: warning: 0.5 is read as 0.5 rad (28.65 deg); write 0.5 deg if that",
+        ),
+        (
+            BASE + "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}\n",
+            "f.yaml:4:50: requirement.momentum_shift: warning: 0.2 is read as 0.2 rad (11.46 deg); write 0.2 deg",
+        ),
+        (
+            BODY + "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}\n",  # 2.9 deg, more than there is
+            "f.yaml:4:25: requirement.nutation: warning: 0.05 is read as 0.05 rad (2.865 deg); write 0.05 deg",
+        ),
+        (
+            BODY + "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}\n",
+            "f.yaml:4:25: requirement.nutation: warning: 0.05 is read",
+        ),
+        (
+            "name: X\ninertia: {tensor: [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}\nomega0: [0.02, 0, 3]\n"
+            "requirement: {nutation: 0.05}\n",
+            "f.yaml:4:25: requirement.nutation: warning: 0.05 is read",
+        ),
+        (
+            BASE + THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
+            "thrusters[0].max_on_time: warning: 2000 is read as 2000 s; write 2000 ms if that is meant, else 2000 s",
+        ),
     ],
 )
 def test_a_number_beyond_what_can_be_meant_is_taken_with_a_warning(text: str, expected: str) -> None:
@@ -71,6 +97,10 @@ def test_a_number_beyond_what_can_be_meant_is_taken_with_a_warning(text: str, ex
         BASE + THRUSTER.format("300 m", "20 s"),
         BASE + THRUSTER.format(49, 2.0),
         BASE + "goal: {tilt: 2.0, azimuth: 5, spin: 12}\n",
+        BASE + "requirement: {nutation: 0.01, momentum_shift: 0.09}\n",
+        BASE + "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}\n",
+        BASE + THRUSTER.format(0.3, "20 ms, max_on_time: 2000 s"),
+        BASE + THRUSTER.format(0.3, "20 ms, max_on_time: 100"),  # 48 spin turns
     ],
 )
 def test_units_and_common_numbers_give_no_warning(text: str) -> None:
@@ -80,6 +110,13 @@ def test_units_and_common_numbers_give_no_warning(text: str) -> None:
 def test_a_shortest_firing_is_judged_by_the_spin() -> None:
     slow = BASE.replace("3]", "0.3]") + THRUSTER.format(0.3, 20)
     assert doubts_of(slow) == []  # a turn takes 20.9 s
+
+
+def test_what_is_set_on_the_command_line_is_doubted_too() -> None:
+    found: list[Fault] = []
+    read_spacecraft(BASE, "f.yaml", [parse_setting("requirement.nutation=0.5")], found.append)
+    (doubt,) = found
+    assert doubt.as_warning.startswith("--set requirement.nutation=0.5: requirement.nutation: warning: 0.5 is read as")
 
 
 def test_warnings_come_in_the_order_of_the_file() -> None:
