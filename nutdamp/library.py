@@ -28,6 +28,7 @@ from nutdamp import flight as flights
 from nutdamp import spacecraft as craft
 from nutdamp.errors import BadRequest, Fault, Infeasible, printable
 from nutdamp.flight import Residual
+from nutdamp.outcome import seen_at
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Inertia
@@ -123,9 +124,10 @@ class Spacecraft:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight:
-    """A schedule flown: ``track`` over time, ``residual`` after the last pulse.
+    """A schedule flown: ``track`` over time, ``residual`` at its end.
 
-    ``core`` and ``sampled`` hold flight and track in principal axes; ``by_impulses``: not through the real widths.
+    ``core`` and ``sampled`` hold the flight, as it is at the end, and its track in principal axes; ``by_impulses``:
+    not through the real widths.
     """
 
     core: flights.Flight
@@ -144,7 +146,7 @@ class Flight:
 
     @property
     def residual(self) -> Residual:
-        """Cone angles and shift of H after the last pulse, rad."""
+        """Cone angles and shift of H at the end of the track, rad."""
         return self.core.residual
 
     def to_numpy(self) -> Table:
@@ -267,7 +269,7 @@ class Plan:
         body, pulses = self.core.spacecraft, self.core.pulses
         end = arguments.end_of_flight(pulses.end + body.inertial_period if until is None else until)
         count = arguments.rows(samples)
-        made = (flights.by_impulses if by_impulses else flights.flown)(body, pulses, end)
+        made = seen_at((flights.by_impulses if by_impulses else flights.flown)(body, pulses, end), end)
         return Flight(made, made.track(count, end), by_impulses)
 
     def to_numpy(self) -> Table:

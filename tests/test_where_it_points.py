@@ -104,16 +104,23 @@ def test_every_json_says_where_it_ends(run: Run, command: str) -> None:
     assert set(found["final"]) == {"axis", "momentum", "spin_rad_s", "nutation_deg"}
 
 
-@pytest.mark.parametrize("command", ["plan", "simulate"])
-def test_every_screen_says_where_it_ends(run: Run, command: str) -> None:
+def test_every_screen_says_where_it_ends(run: Run) -> None:
+    """The command that shows both models gives the angles of each, one a row."""
     name = str(case("tensor-microsat.yaml"))
-    screen = run(command, name, "--scheme", "half-cone", "--target", "350deg,20deg", "--quiet").stdout
+    options = (name, "--scheme", "half-cone", "--target", "350deg,20deg", "--quiet")
+    screens = {command: run(command, *options).stdout for command in ("plan", "simulate")}
     for text in ("spin axis ends at", "H ends at"):
-        line = next(line for line in screen.splitlines() if line.startswith(text))
+        line = next(line for line in screens["plan"].splitlines() if line.startswith(text))
         ascension, declination = map(float, re.findall(r"-?[0-9]+\.[0-9]{4}", line))
         assert ascension == pytest.approx(350.0, abs=1.0)
         assert declination == pytest.approx(20.0, abs=1.0)
-    assert re.search(r"^target +right ascension 350\.0000 deg, declination 20\.0000 deg$", screen, re.MULTILINE)
+    for what in ("spin axis", "H"):
+        for angle, aim in (("right ascension", 350.0), ("declination", 20.0)):
+            found = re.search(rf"^{what}: {angle} +([0-9.]+) deg +([0-9.]+) deg$", screens["simulate"], re.MULTILINE)
+            assert found is not None
+            assert float(found[2]) == pytest.approx(aim, abs=1.0)
+    for screen in screens.values():
+        assert re.search(r"^target +right ascension 350\.0000 deg, declination 20\.0000 deg$", screen, re.MULTILINE)
 
 
 def test_the_range_of_right_ascension_goes_through_zero(run: Run) -> None:

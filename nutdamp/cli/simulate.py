@@ -39,12 +39,12 @@ PICTURED = 100_000
 @click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file: start_s, on_time_s, channel.")
 @scheme_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
-@click.option("--until", type=Quantity("time"), help="End; default last pulse + one inertial period.")
+@click.option("--until", type=Quantity("time"), help="End, of which the outcome is shown; default last pulse + one inertial period.")
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
 )
 @click.option("--csv", type=FILE, help="Write the track.")
-@click.option("--json", type=FILE, help="Write pulses, residuals and extremes.")
+@click.option("--json", type=FILE, help="Write pulses, how both models end, and extremes.")
 @plot_options
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option
@@ -64,7 +64,7 @@ def command(
     drawn: bool,
     quiet: bool,
 ) -> None:
-    """Propagate a schedule; show cone angles around each pulse, the residuals and the axis track.
+    """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
     example. A FILE of - is standard output, for --schedule standard input.
@@ -82,36 +82,44 @@ def command(
     expect_places(csv, json, plot)
 
     from nutdamp import flight
+    from nutdamp.outcome import seen_at
     from nutdamp.track import extremes
 
     plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
     pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
-    residual, flown = (one.residual for one in flights)
-    chosen = flights[real]
-    found = extremes(chosen.pieces(samples, end))
-    track = chosen.track(min(samples, PICTURED), end) if plot is not None or drawn else None
+    impulses, flown = ends = tuple(seen_at(one, end) for one in flights)
+    moving, chosen = flights[real], ends[real]
+    found = extremes(moving.pieces(samples, end))
+    track = moving.track(min(samples, PICTURED), end) if plot is not None or drawn else None
     outputs: list[Output] = []
     if csv is not None:
         from nutdamp.files.track_csv import write_track
 
-        outputs.append((csv, lambda stream: write_track(stream, chosen.pieces(samples, end), body.inertia)))
+        outputs.append((csv, lambda stream: write_track(stream, moving.pieces(samples, end), body.inertia)))
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.simulation_json import simulation_json
 
-        outputs.append((json, json_text(simulation_json(chosen, found, residual, flown, scheme=plan.scheme))))
+        outputs.append(
+            (json, json_text(simulation_json(chosen, found, impulses, flown, scheme=plan.scheme, real=real)))
+        )
     if plot is not None and track is not None:
         from nutdamp.report import figures
 
         outputs.append((plot, figures.picture(figure, chosen, track, plot)))
     screens: list[RenderableType] = []
-    if not silent:
+    if silent:
+        from nutdamp.report.verdicts import model_warnings
+
+        for warning in model_warnings(impulses, flown):
+            remark(f"warning: {warning}")
+    else:
         from nutdamp.report.simulate_tables import simulation_screen
 
         how = f"{plan.scheme}, propagated by the {'real pulse widths' if real else 'impulse sum (17)'}"
-        screens.append(simulation_screen(chosen, found, residual, flown, how=how))
+        screens.append(simulation_screen(chosen, found, impulses, flown, how=how, pulses=len(pulses)))
     if track is not None and drawn:
         from nutdamp.report.terminal import motion_drawing
 

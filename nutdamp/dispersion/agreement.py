@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,37 +13,10 @@ from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.outputs import OUTPUTS, aim_output
 from nutdamp.dispersion.study import STRIDE, Results, Study, run
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.outcome import Deviation, tolerated
 
 CASES = STRIDE
 """Cases that are flown both ways."""
-
-SHARE = 0.1
-"""Of a bound of the requirement, by which the impulse sum may err."""
-
-ANGLE = math.radians(0.01)
-"""rad by which it may err where nothing is required."""
-
-
-class Deviation(NamedTuple):
-    """By how much the impulse sum errs in a part (rad, rad/s); ``probability`` of the cases do not exceed it.
-
-    ``most``: by how much it may; infinite for a part that nothing bounds where something else is required.
-    """
-
-    part: Part
-    error: float
-    most: float
-    probability: float
-
-    def __str__(self) -> str:
-        name, unit = {
-            Part.NUTATION: ("nutation", "deg"),
-            Part.SHIFT: ("shift of H", "deg"),
-            Part.DISTANCE: ("axis error", "deg"),
-            Part.SPIN: ("spin", "rad/s"),
-        }[self.part]
-        error = self.error if self.part is Part.SPIN else math.degrees(self.error)
-        return f"{error:.2g} {unit} of {name}"
 
 
 def deviations(study: Study) -> tuple[Deviation, ...]:
@@ -57,19 +29,17 @@ def deviations(study: Study) -> tuple[Deviation, ...]:
     summed, flown = (run(Results(one, CASES)) for one in (study, real))
     assert summed.values is not None
     assert flown.values is not None
-    aim = Part.SHIFT if body.goal.axis is None else Part.DISTANCE
-    rows = {Part.NUTATION: 0, aim: OUTPUTS.index(aim_output(body)[0])}
-    if body.goal.spin is not None:
-        rows[Part.SPIN] = OUTPUTS.index("spin_change")
-    required = {bound.part: SHARE * bound.most for bound in compliance.required(body)}
+    aim = aim_output(body)[0]
+    names = {Part.NUTATION: "nutation", Part.SHIFT: aim, Part.DISTANCE: aim, Part.SPIN: "spin_change"}
+    errors = np.abs(summed.values - flown.values)
     return tuple(
         Deviation(
             part,
-            float(np.quantile(np.abs(summed.values[row] - flown.values[row]), flown.probability)),
-            required.get(part, math.inf) if required else ANGLE,
+            float(np.quantile(errors[OUTPUTS.index(names[part])], flown.probability)),
+            most,
             flown.probability,
         )
-        for part, row in rows.items()
+        for part, most in tolerated(body, otherwise=math.inf).items()
     )
 
 

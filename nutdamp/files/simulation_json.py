@@ -5,26 +5,32 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp import __version__
+from nutdamp import __version__, outcome
 from nutdamp.files.plan_json import final_json, pulses_json, residual_json, spacecraft_json, target_json
-from nutdamp.flight import Flight, Residual
+from nutdamp.flight import Flight
 from nutdamp.physics.attitude import full_turn
 from nutdamp.track import Extremes
 
 
 def simulation_json(
-    flight: Flight, found: Extremes, residual: Residual, flown: Residual, *, scheme: str
+    flight: Flight, found: Extremes, impulses: Flight, flown: Flight, *, scheme: str, real: bool
 ) -> dict[str, Any]:
-    """Pulses with the cone angles around them, both residuals, and the extremes of the axis track in degrees."""
+    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees.
+
+    All three flights as `outcome.seen_at` the end of the track; ``flight`` is the one by real widths if ``real``.
+    """
     attitude = flight.spacecraft.attitude
     return {
         "nutdamp": __version__,
         "spacecraft": spacecraft_json(flight.spacecraft),
         "scheme": scheme,
+        "propagated": "flown" if real else "residual",
         "pulses": pulses_json(flight),
-        "residual": residual_json(residual),
-        "flown": residual_json(flown),
-        "final": final_json(flight),
+        "residual": residual_json(impulses.residual),
+        "flown": residual_json(flown.residual),
+        "final": final_json(flown),
+        "final_by_impulses": final_json(impulses),
+        "differ": [one.part.value for one in outcome.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
         "until_s": found.until,
         "axis_track": {

@@ -11,6 +11,9 @@ from nutdamp.report.layout import facts
 from nutdamp.report.text import degrees, longitude, pointing, quantity
 from nutdamp.spacecraft import Spacecraft, Vector
 
+FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
+"""What the two angles of a direction are without an attitude in the file."""
+
 
 def angle_names(body: Spacecraft) -> tuple[str, str]:
     """What the two angles of a direction are called: along and above the equator, or from H(0) and about it."""
@@ -44,7 +47,7 @@ def end_table(flown: Flight) -> Table:
         table.add_row("target", direction_text(body, body.goal.axis))
     table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
     if body.attitude is None:
-        table.add_row("", "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0")
+        table.add_row("", FRAME_N)
     elif body.attitude.frame is not None:
         table.add_row("frame", body.attitude.frame)
     return table

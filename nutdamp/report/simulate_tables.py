@@ -6,22 +6,32 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.flight import Flight, Residual
-from nutdamp.report.end_tables import end_table
+from nutdamp.flight import Flight
+from nutdamp.report.end_tables import FRAME_N, angle_names, angle_texts
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.plan_tables import channel_text, header
-from nutdamp.report.text import degrees, longitude, moment, pointing
+from nutdamp.report.text import degrees, longitude, moment, pointing, quantity
+from nutdamp.report.verdicts import model_warnings
 from nutdamp.track import Extremes
 
 
 def simulation_screen(
-    flight: Flight, found: Extremes, residual: Residual, flown: Residual, *, how: str
+    flight: Flight, found: Extremes, impulses: Flight, flown: Flight, *, how: str, pulses: int
 ) -> RenderableType:
-    """Everything that ``simulate`` shows; ``how`` names what was propagated."""
+    """Everything that ``simulate`` shows; ``how`` names what was propagated: a schedule of so many ``pulses``.
+
+    All three flights as `outcome.seen_at` the end of the track; ``flight`` is one of the others.
+    """
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
+    if len(flight.schedule) < pulses:
+        begun = f"{len(flight.schedule)} of its {pulses} pulses begin before {moment(found.until)}"
+        parts.append(Text(f"{begun}, where the track ends"))
     if len(flight.schedule):
         parts += [Text(), _pulses(flight)]
-    parts += [Text(), _residuals(residual, flown), Text(), end_table(flight)]
+    parts += [Text(), _ends(impulses, flown, found.until)]
+    if flight.spacecraft.attitude is None:
+        parts.append(Text(f"{FRAME_N}.", style="dim"))
+    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
     parts += [Text(), _extremes(found, flight)]
     return Group(*parts)
 
@@ -40,18 +50,26 @@ def _pulses(flight: Flight) -> Table:
     return table
 
 
-def _residuals(residual: Residual, flown: Residual) -> Table:
-    table = columns("after the last pulse", "by impulses (17)", "flown, real widths")
+def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
+    """What both models leave, and where they point, at ``until`` s."""
+    body = flown.spacecraft
+    table = columns(f"at {moment(until)}", "by impulses (17)", "flown, real widths")
     rows = [
         ("nutation", "nutation"),
         ("body cone", "body_cone"),
         ("space cone", "space_cone"),
         ("shift of H", "momentum_shift"),
     ]
-    if residual.axis_error != residual.momentum_shift:
+    if body.goal.axis is not None:
         rows.append(("off the target", "axis_error"))
+    both = (impulses, flown)
     for name, key in rows:
-        table.add_row(Text(name, style="dim"), degrees(getattr(residual, key)), degrees(getattr(flown, key)))
+        table.add_row(Text(name, style="dim"), *(degrees(getattr(one.residual, key)) for one in both))
+    for what, key in (("spin axis", "axis"), ("H", "momentum")):
+        angles = (angle_texts(body, getattr(one.final, key)) for one in both)
+        for name, *texts in zip(angle_names(body), *angles, strict=True):
+            table.add_row(Text(f"{what}: {name}", style="dim"), *texts)
+    table.add_row(Text("spin", style="dim"), *(quantity(one.final.spin, "rad/s", 6) for one in both))
     return table
 
 

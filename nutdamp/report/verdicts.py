@@ -9,8 +9,9 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from nutdamp import compliance, schemes
+from nutdamp import compliance, outcome, schemes
 from nutdamp.compliance import Bound, Part
+from nutdamp.flight import Flight
 from nutdamp.planning import Comparison, Obstacle, Plan
 from nutdamp.recommendation import Ground, Recommendation, Standing
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
@@ -80,6 +81,19 @@ def warnings(compared: Comparison) -> tuple[str, ...]:
     chosen = found.plan
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
     return (" ".join((f"{head}. {chosen.scheme} leaves {missed}.", *_obstacles(chosen, compared))),)
+
+
+def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
+    """How far the impulse sum (17) ends from real widths, where that is more than may be."""
+    apart = outcome.deviations(impulses, flown)
+    if not apart:
+        return ()
+    required = {bound.part for bound in compliance.required(flown.spacecraft)}
+    parts = []
+    for one in apart:
+        most = "a tenth of the requirement" if one.part in required else degrees(one.most)
+        parts.append(f"{one} (more than {most})")
+    return (f"the impulse sum (17) and real widths differ by {' and '.join(parts)}. What is flown counts.",)
 
 
 def shortfall(plan: Plan, bound: Bound) -> str:

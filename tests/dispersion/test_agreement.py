@@ -12,10 +12,11 @@ import pytest
 from nutdamp import flight
 from nutdamp.compliance import Part
 from nutdamp.dispersion import agreement, study_of
-from nutdamp.dispersion.agreement import ANGLE, CASES, check_impulses, deviations
+from nutdamp.dispersion.agreement import CASES, check_impulses, deviations
 from nutdamp.dispersion.single import realised
 from nutdamp.dispersion.study import Study
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.outcome import ANGLE
 from nutdamp.spacecraft import Disturbance, Goal, Requirement
 
 

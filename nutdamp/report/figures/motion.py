@@ -42,13 +42,16 @@ def motion_figure(flight: Flight, track: Track) -> Figure:
 def title(flight: Flight) -> str:
     """What every sheet is headed with."""
     count = len(flight.schedule)
-    start, left = math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
+    start, left = (f"{angle:.3g}°" if angle > 1e-6 else "0°" for angle in _nutations(flight))
     swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
-    if not count:
-        return f"{short_name(flight)}: nutation {swings}{start:.3g}°, no pulse"
-    kept = f"{left:.3g}°" if left > 1e-6 else "0°"
-    pulses = "1 pulse" if count == 1 else f"{count} pulses"
-    return f"{short_name(flight)}: nutation {swings}{start:.3g}° → {kept} by {pulses}"
+    change = f"{start} → {left}" if count or left != start else start
+    pulses = ", no pulse" if not count else " by 1 pulse" if count == 1 else f" by {count} pulses"
+    return f"{short_name(flight)}: nutation {swings}{change}{pulses}"
+
+
+def _nutations(flight: Flight) -> tuple[float, float]:
+    """Nutation angle at t = 0 and at the end, degrees."""
+    return math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
 
 
 def short_name(flight: Flight) -> str:

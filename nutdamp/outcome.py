@@ -1,0 +1,84 @@
+"""What has become of a body by a given time, and how far two models of the same flight are apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp import compliance
+from nutdamp.compliance import Left, Part
+from nutdamp.flight import Flight
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft, SpinState
+
+SHARE = 0.1
+"""Of a bound of the requirement, by which the impulse sum may err."""
+
+ANGLE = math.radians(0.01)
+"""rad by which it may err where nothing is required."""
+
+
+class Deviation(NamedTuple):
+    """By how much the impulse sum errs in a part (rad, rad/s); ``probability`` of the cases do not exceed it.
+
+    ``most``: by how much it may; infinite for a part that nothing bounds where something else is required.
+    """
+
+    part: Part
+    error: float
+    most: float
+    probability: float = 1.0
+
+    def __str__(self) -> str:
+        name, unit = {
+            Part.NUTATION: ("nutation", "deg"),
+            Part.SHIFT: ("shift of H", "deg"),
+            Part.DISTANCE: ("axis error", "deg"),
+            Part.SPIN: ("spin", "rad/s"),
+        }[self.part]
+        error = self.error if self.part is Part.SPIN else math.degrees(self.error)
+        return f"{error:.2g} {unit} of {name}"
+
+
+def seen_at(flight: Flight, time: float) -> Flight:
+    """The flight as it has come by ``time`` s, which it must reach: `Flight.residual` and `Flight.final` are of then.
+
+    Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
+    """
+    rates, quaternion = flight.motion(np.array([time]))
+    first, second, third = rates[0].tolist()
+    begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
+    kept = [index for index, one in enumerate(begun) if one]
+    return replace(
+        flight,
+        schedule=Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
+        settled=SpinState(complex(first, second), third, quaternion[0]),
+        spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
+    )
+
+
+def tolerated(spacecraft: Spacecraft, otherwise: float = ANGLE) -> dict[Part, float]:
+    """By how much models may differ in nutation, in the direction of H, and in the spin where the goal names one.
+
+    A tenth of what is required; `ANGLE` where nothing is, and ``otherwise`` for a part that nothing bounds where
+    something else is.
+    """
+    required = {bound.part: SHARE * bound.most for bound in compliance.required(spacecraft)}
+    aim = Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
+    unbounded = otherwise if required else ANGLE
+    return {Part.NUTATION: unbounded, aim: unbounded, **required}
+
+
+def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:
+    """In what two flights of one spacecraft end farther apart than is `tolerated`."""
+    body = one.spacecraft
+    ends = [Left(flight.residual.nutation, flight.residual.axis_error, flight.settled.spin) for flight in (one, other)]
+    found = []
+    for part, most in tolerated(body).items():
+        first, second = (end.spin if part is Part.SPIN else compliance.left_of(part, end, body) for end in ends)
+        if abs(first - second) > most:
+            found.append(Deviation(part, abs(first - second), most))
+    return tuple(found)
