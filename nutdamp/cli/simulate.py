@@ -39,7 +39,11 @@ PICTURED = 100_000
 @click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file: start_s, on_time_s, channel.")
 @scheme_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
-@click.option("--until", type=Quantity("time"), help="End, of which the outcome is shown; default last pulse + one inertial period.")
+@click.option(
+    "--until",
+    type=Quantity("time"),
+    help="End, of which the outcome is shown; default last pulse + one inertial period.",
+)
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
 )

@@ -111,7 +111,7 @@ def pulse_sheet(plan: Plan) -> Sheet:
 
 
 def residual_sheet(title: str, left: Residual) -> Sheet:
-    """What remains after the last pulse."""
+    """What a flight leaves."""
     names = {
         "nutation": "nutation",
         "body cone": "body_cone",
@@ -119,4 +119,4 @@ def residual_sheet(title: str, left: Residual) -> Sheet:
         "shift of H": "momentum_shift",
     }
     rows = tuple((name, _angle(left, key)) for name, key in names.items())
-    return Sheet(title, (Column("after the last pulse", number=False), Column("angle", "deg")), rows)
+    return Sheet(title, (Column("at the end", number=False), Column("angle", "deg")), rows)
