@@ -22,6 +22,9 @@ from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import PIECE, Track, even_times, make_track, widest
 
+PLANNED_STEPS = 30_000
+"""Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
+
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
 """Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
 
@@ -59,6 +62,11 @@ class Final:
 class Path(Protocol):
     """Motion without jumps."""
 
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        ...
+
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
         ...
@@ -73,6 +81,11 @@ class Arc:
     start: float
     state: SpinState
     growth: float = 0.0
+
+    @property
+    def steps(self) -> int:
+        """A closed form takes none."""
+        return 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
@@ -102,6 +115,11 @@ class Integrated:
     """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
 
     pieces: tuple[Piece, ...]
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        return len(self.pieces)
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
@@ -148,6 +166,11 @@ class Flight:
     settled: SpinState
     moments: tuple[float, float, float]
     spans: tuple[tuple[float, float], ...]
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        return sum(leg.path.steps for leg in self.legs)
 
     @property
     def residual(self) -> Residual:
@@ -260,14 +283,19 @@ class Setting:
         return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
 
     def path(
-        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = ()
+        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = (), *, most: int
     ) -> tuple[Path, SpinState]:
-        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in."""
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
+
+        Raises Infeasible where it takes more than ``most`` steps of integration.
+        """
         if end == start or (self.free and not torques):
             arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
-        pieces = rigid.integrate(self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing)
+        pieces = rigid.integrate(
+            self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing, most=most
+        )
         rates_, quaternion_ = pieces[-1].final
         return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
 
@@ -297,19 +325,20 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
 
     Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
     the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
-    between the pulses as in `flown`. The last leg reaches at least to ``until`` s.
+    between the pulses as in `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
     """
-    setting, state = make_setting(spacecraft), spacecraft.initial
+    setting, state, allowed = make_setting(spacecraft), spacecraft.initial, _allowed(schedule, until)
     legs: list[Leg] = []
     now = 0.0
     for index, pulse in enumerate(schedule):
-        path, state = setting.path(state, now, pulse.t)
+        path, state = setting.path(state, now, pulse.t, most=allowed)
+        allowed -= path.steps
         legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
         kick = _effective_impulse(spacecraft, pulse, state.spin)
         state = setting.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
         now = pulse.t
     last = max(until, schedule.end)
-    path, _ = setting.path(state, now, last)
+    path, _ = setting.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
     return Flight(spacecraft, schedule, tuple(legs), state, setting.moments, tuple((one.t, one.t) for one in schedule))
 
@@ -343,9 +372,10 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     """Euler's equations through the real pulse widths, with the true principal moments.
 
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
-    series at rounding accuracy. The last leg reaches at least to ``until`` s.
+    series at rounding accuracy. The last leg reaches at least to ``until`` s. Raises Infeasible where that takes more
+    than `PLANNED_STEPS`, or `rigid.MOST_STEPS` where a later end is asked for.
     """
-    setting, state = make_setting(spacecraft), spacecraft.initial
+    setting, state, allowed = make_setting(spacecraft), spacecraft.initial, _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T
@@ -357,14 +387,15 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(Leg(now, now, setting.path(state, now, now)[0], 0, jump=True, completed_at_end=0))
+            legs.append(Leg(now, now, setting.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0))
         for kick in kicks:
             state = setting.kicked(state, kick)
         if now == over:
             settled = state
         on = [pulses[index].torque for index in np.flatnonzero((starts <= now) & (end <= ends))]
         torques = [torque for torque in on if torque is not None]
-        path, following = setting.path(state, now, end, torques)
+        path, following = setting.path(state, now, end, torques, most=allowed)
+        allowed -= path.steps
         completed, at_end = (
             int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
             for time in (now, end)
@@ -374,9 +405,15 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
 
 
+def _allowed(schedule: Schedule, until: float) -> int:
+    """Steps of integration that a flight may take: a plan is flown again and again, a track once."""
+    return rigid.MOST_STEPS if until > schedule.end else PLANNED_STEPS
+
+
 def momentum_gained(flown: Flight) -> Vector:
     """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
     gained = np.zeros(3)
+    nodes, weights = np.array([(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]).T
     for leg in flown.legs:
         firing = [p.force for p in flown.schedule if p.force is not None and p.start <= leg.start and leg.end <= p.end]
         force = np.asarray(sum(firing, np.zeros(3)))
@@ -386,7 +423,7 @@ def momentum_gained(flown: Flight) -> Vector:
         turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
         edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
         middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
-        for node, weight in (*LEGENDRE, *((-node, weight) for node, weight in LEGENDRE)):
-            _, quaternions = leg.path.motion(middles + node * half)
-            gained += weight * half * attitude.rotate(quaternions, force).sum(axis=0)
+        times = (middles[:, None] + half * nodes).ravel()
+        pushes = attitude.rotate(leg.path.motion(times)[1], force).reshape(-1, len(nodes), 3)
+        gained += half * np.einsum("snc,n->c", pushes, weights)
     return gained

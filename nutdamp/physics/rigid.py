@@ -82,11 +82,12 @@ def integrate(
     start: float,
     end: float,
     forcing: Forcing = NOTHING,
+    most: int = MOST_STEPS,
 ) -> list[Piece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    Raises Infeasible for motions over more than `LONGEST` rad, and where a step would be too short to be one.
+    Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
@@ -96,7 +97,7 @@ def integrate(
     size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
     gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step
-    for _ in range(MOST_STEPS):
+    for _ in range(most + 1):
         now, left = start + gone, duration - gone
         if left <= 0.0:
             return pieces
@@ -117,7 +118,10 @@ def integrate(
         pieces.append(piece)
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
-    raise Infeasible(f"the motion from {start:.4g} s to {end:.4g} s changes too fast to be integrated")
+    raise Infeasible(
+        f"the motion from {start:.4g} s to {end:.4g} s takes too many steps to be integrated; shorten the time, or "
+        "look for a torque or rate that is too large"
+    )
 
 
 def _series(

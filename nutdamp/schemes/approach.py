@@ -13,6 +13,9 @@ from nutdamp.spacecraft import Spacecraft
 MOMENTS = 16
 """Earliest starts that are tried."""
 
+INTEGRATED = 20_000
+"""Steps of integration after which no more of them are tried."""
+
 IN_REACH = 0.5
 """Share of the horizon within which the damping begins: the rest is for the turn."""
 
@@ -28,6 +31,7 @@ def damping(here: Spacecraft) -> Schedule:
     span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
     best: tuple[float, Schedule] | None = None
     reason: Infeasible | None = None
+    steps = 0
     for number in range(MOMENTS):
         earliest = here.limits.earliest + number * span / MOMENTS
         if number > 0 and earliest > IN_REACH * here.horizon:
@@ -42,6 +46,9 @@ def damping(here: Spacecraft) -> Schedule:
         cost = made.total_impulse + h * (journey.here.to_turn + 2.0 * journey.here.nutation)
         if best is None or cost < best[0]:
             best = cost, made
+        steps += journey.steps
+        if steps > INTEGRATED:
+            break
     if best is None:
         raise Infeasible(f"the nutation is to be taken out first, and {reason}")
     return best[1]

@@ -28,7 +28,8 @@ class Journey:
     """The pulses chosen so far, and the spacecraft as it is after them.
 
     ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there: attitude, rates,
-    limits and disturbances are those of that moment, its goal is where the journey is to end.
+    limits and disturbances are those of that moment, its goal is where the journey is to end. ``steps``: of integration
+    that the flight took so far.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
@@ -38,6 +39,7 @@ class Journey:
             limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
         )
         self.now = 0.0
+        self.steps = 0
         self.pulses: list[Pulse] = []
         self._before: list[tuple[float, Spacecraft]] = []
 
@@ -64,7 +66,8 @@ class Journey:
         for pulse in pulses:
             self._before.append((self.now, self.here))
             timed = replace(pulse, t=base + pulse.t)
-            self.here = _after(self.here, replace(pulse, t=timed.t - self.now))
+            self.here, steps = _after(self.here, replace(pulse, t=timed.t - self.now))
+            self.steps += steps
             self.pulses.append(timed)
             self.now = timed.end
 
@@ -92,12 +95,13 @@ def tolerable(spacecraft: Spacecraft) -> float:
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
-def _after(spacecraft: Spacecraft, pulse: Pulse) -> Spacecraft:
-    """The spacecraft as it is when ``pulse`` ends, with its time counted from there."""
-    settled, since, limits = flight.flown(spacecraft, Schedule((pulse,))).settled, pulse.end, spacecraft.limits
+def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
+    """The spacecraft as it is when ``pulse`` ends, with its time counted from there; and the steps that it took."""
+    flown = flight.flown(spacecraft, Schedule((pulse,)))
+    settled, since, limits = flown.settled, pulse.end, spacecraft.limits
     to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)
     given = spacecraft.attitude or Attitude(settled.quaternion)
-    return replace(
+    after = replace(
         spacecraft,
         omega0=settled.rates,
         attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
@@ -113,3 +117,4 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> Spacecraft:
             blackout=tuple((begins - since, ends - since) for begins, ends in limits.blackout if ends > since),
         ),
     )
+    return after, flown.steps

@@ -27,6 +27,9 @@ DIFFERENCE = 1e-6
 
 STEPS = 30
 
+INTEGRATED = 100_000
+"""Steps of integration after which a trim is left as it is: some ten seconds."""
+
 ANY = (0.0, math.inf)
 """Bounds on on-times that bound nothing."""
 
@@ -42,7 +45,11 @@ def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) ->
     The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
-    flight_ = flight.flown(spacecraft, schedule)
+    return _missed(flight.flown(spacecraft, schedule), spin=spin)
+
+
+def _missed(flight_: flight.Flight, *, spin: bool) -> Vector:
+    spacecraft, schedule = flight_.spacecraft, flight_.schedule
     moments = np.asarray(flight_.moments)
     body = flight_.settled.rates * moments
     after = attitude.rotate(flight_.settled.quaternion, body)
@@ -89,14 +96,19 @@ def refine(
             (*kept, *(knob.turn(part) for knob, part in zip(knobs, parts, strict=True))), made.notes, made.bounds
         )
 
+    steps = 0
+
     def left(made: Schedule) -> Vector:
-        missed = misses(spacecraft, made, spin=spin)
+        nonlocal steps
+        flown = flight.flown(spacecraft, made)
+        steps += flown.steps
+        missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
     start, scale, lower, upper = (
         np.concatenate([getattr(knob, name) for knob in knobs]) for name in ("start", "scale", "lower", "upper")
     )
-    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper)
+    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED)
     trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
     better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
     return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made
@@ -166,17 +178,23 @@ def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
 
 
 def solve(
-    residual: Callable[[Vector], Vector], start: Vector, scale: Vector, lower: Vector, upper: Vector
+    residual: Callable[[Vector], Vector],
+    start: Vector,
+    scale: Vector,
+    lower: Vector,
+    upper: Vector,
+    enough: Callable[[], bool] = lambda: False,
 ) -> tuple[Vector, float]:
     """Unknowns (n,) within bounds that make ``residual`` (m,) least in norm, and that norm.
 
-    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution.
+    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution. It is
+    left as it is once there was ``enough`` work.
     """
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
     for _ in range(STEPS):
-        if norm <= CONVERGED:
+        if norm <= CONVERGED or enough():
             break
         jacobian = _slopes(residual, x, value, scale)
         step = bounded_step(jacobian, value, x, scale, lower, upper)

@@ -8,18 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import channel, cross, fan, spinner, within
+from builders import aimed, channel, cross, fan, spinner, within
 from cases_dir import case
 from checker import violations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp import planning
+from nutdamp import flight, planning
+from nutdamp.errors import Infeasible
 from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC, Options, steering
 from nutdamp.schemes.walk import MOST_PULSES, Walk
 from nutdamp.schemes.windows import SLACK, Windows
-from nutdamp.spacecraft import Disturbance, Limits, Spacecraft
+from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Steerable
 
 PLENTY = 3_000_000
 """Calls of functions; a plan takes a tenth of that."""
@@ -147,3 +149,35 @@ def test_a_channel_that_can_do_nothing_ends_the_walk() -> None:
     with within(PLENTY):
         plan = planning.plan(spinner(channels=(weak,)), "four-pulse")
     assert not plan.feasible or math.isfinite(plan.pulses.end)
+
+
+@pytest.mark.parametrize("scheme", CLASSIC)
+def test_near_a_right_angle_of_nutation_there_is_an_answer(scheme: str) -> None:
+    """Thrusters whose torque about axis 3 spins a needle up to hundreds of turns a minute: minutes, before."""
+    body = read("slow-89-deg.yaml")
+    with within(10 * PLENTY):
+        plan = planning.plan(body, scheme)
+        figures = plan.flown, plan.residual, plan.delta_v
+    assert plan.feasible == (None not in figures)
+
+
+@pytest.mark.parametrize("degrees", [89.9, 89.999])
+def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
+    for body in (spinner(degrees=degrees, channels=cross(5e3)), spinner(degrees=degrees, steerable=Steerable(1e4))):
+        for scheme in (*CLASSIC, "half-cone", "rhumb-line"):
+            with within(10 * PLENTY):
+                plan = planning.plan(aimed(body, 30.0, 10.0) if scheme not in CLASSIC else body, scheme)
+                left = plan.flown
+            assert (left is None) == (plan.why is not None)
+
+
+def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> None:
+    """One pulse that spins a needle up to turn after turn."""
+    body = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0)
+    spin_up = Schedule((channel_pulse(channel("screw", 1e-5, 0.0, 1e-4), 500.0, 1000.0),))
+    with pytest.raises(Infeasible, match="too many steps"):
+        flight.flown(body, spin_up)
+    short = Schedule((channel_pulse(channel("screw", 1e-5, 0.0, 1e-4), 50.0, 100.0),))
+    assert 0 < flight.flown(body, short).steps <= flight.PLANNED_STEPS
+    tumbling = spinner(moments=(100.0, 120.0, 80.0), degrees=5.0)
+    assert flight.flown(tumbling, Schedule(), 30_000.0).steps > flight.PLANNED_STEPS
