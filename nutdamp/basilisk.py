@@ -29,6 +29,9 @@ TURN = 0.1
 TURN_TURNING = 0.05
 """rad; the same where a torque turns in the body: held constant for half of each pair of steps, to fourth order."""
 
+MOST_STEPS = 200_000
+"""Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
+
 ACCEPT_ALL = 1e30
 """Tolerance that no step fails, so that the integrator keeps the step it is given."""
 
@@ -59,7 +62,7 @@ def fly(
     is the longest step in s; by default the body turns by `TURN` at most. Constant and axial disturbances act all the
     time; a turning one is held constant for a step at a time such that the error falls with the fourth power of
     the step. Raises MissingExtra without Basilisk, Infeasible where there is energy dissipation (a rigid hub has
-    none), BadRequest for times that cannot be.
+    none) or the flight takes more than `MOST_STEPS`, BadRequest for times that cannot be.
     """
     if not 0.0 <= until < math.inf:
         raise BadRequest(f"a flight ends at a time from 0 on, not at {until} s")
@@ -68,6 +71,8 @@ def fly(
     if spacecraft.growth != 0.0:
         raise Infeasible("Basilisk is flown without energy dissipation, because its hub is rigid, and this body has it")
     longest = default_step(spacecraft, schedule, until) if step is None else step
+    if until > MOST_STEPS * longest:
+        raise Infeasible(f"the motion takes more than {MOST_STEPS} steps of Basilisk")
     hub = _Hub(spacecraft, longest)
     edges = {edge for pulse in schedule for edge in (pulse.start, pulse.end) if 0.0 < edge < until}
     knots = sorted({0.0, until, *np.linspace(0.0, until, samples).tolist(), *edges})

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import spinner
 
 from nutdamp import flight, schemes
 from nutdamp.basilisk import BasiliskFlight, fly
@@ -246,3 +247,9 @@ def test_dissipation_is_refused_before_basilisk_is_asked_for(monkeypatch: pytest
 def test_times_that_cannot_be(until: float, step: float | None) -> None:
     with pytest.raises(BadRequest):
         fly(spinner("prolate"), Schedule(), until, step=step)
+
+
+def test_a_flight_too_long_for_basilisk_is_refused_at_once() -> None:
+    """It has a fixed step, so the count of steps is known before."""
+    with pytest.raises(Infeasible, match="more than 200000 steps"):
+        fly(spinner(degrees=5.0), Schedule(), 1e6)

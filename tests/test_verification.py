@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from process import Run
 from nutdamp import basilisk, flight, planning
 from nutdamp.basilisk import BasiliskFlight
 from nutdamp.cli.verify import command as verify_command
+from nutdamp.errors import MissingExtra
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.report.verify_tables import verdict
@@ -190,3 +192,36 @@ def test_verify_json_and_schedule_file(run: Run) -> None:
 def test_verify_refuses_what_it_cannot_do(run: Run) -> None:
     assert run("verify", "--scheme", "two-pulse", "--schedule", "x.csv").returncode == 2
     assert run("verify", "--schedule", "missing.csv").returncode == 1
+
+
+def test_a_motion_too_long_to_be_confirmed_is_not_called_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """DOP853 had no end: it ran for as long as the motion did."""
+    spacecraft = spinner(degrees=5.0)
+    schedule = planning.plan(spacecraft, "one-pulse").pulses
+    monkeypatch.setattr("nutdamp.verification.EVALUATIONS", 50)
+    monkeypatch.setattr("nutdamp.verification.basilisk.fly", _missing)
+    found = verify(spacecraft, schedule)
+    assert found.checks == ()
+    assert not found.agree
+    assert found.disagreeing == ()
+    assert "more than 50 evaluations" in next(one.missing for one in found.methods if one.name.startswith("DOP853"))
+    assert verdict(found).startswith("NOT CONFIRMED")
+    (row,) = [one for one in found.methods if one.name.startswith("flown")]
+    assert not row.missing
+
+
+def _missing(*_: object) -> BasiliskFlight:
+    raise MissingExtra("verify", "a flight by Basilisk")
+
+
+def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Path) -> None:
+    """Two thousand hours of coasting are more than DOP853 and Basilisk fly."""
+    text = "name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"
+    (tmp_path / "late.yaml").write_text(text + "limits: {horizon: 1e7, earliest: 8e6}\n")
+    done = run("verify", "late.yaml", "--scheme", "one-pulse", "--json", "v.json")
+    found = json.loads((tmp_path / "v.json").read_text())
+    assert found["agree"] is None
+    assert all(one["missing"] for one in found["methods"] if one["name"].startswith(("DOP853", "Basilisk")))
+    assert done.returncode == 3
+    assert "not confirmed" in done.stderr
+    assert "NOT CONFIRMED" in done.stdout

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import UNREADABLE
+from nutdamp.cli.boundary import INFEASIBLE, UNREADABLE
 from nutdamp.cli.common import (
     Aim,
     Input,
@@ -48,7 +48,8 @@ def command(
 ) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
-    Shows the largest differences, what is conserved, and what each imperfection alone costs.
+    Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
+    DOP853 and Basilisk are not confirmed: exit status 3.
     """
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to verify: either --scheme or --schedule")
@@ -75,7 +76,10 @@ def command(
 
         screens.append(verification_screen(body, plan.scheme, found))
     deliver(outputs, *screens)
-    if not found.agree:
+    if found.disagreeing:
         others = " and ".join(found.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
         sys.exit(UNREADABLE)
+    if not found.checks:
+        say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
+        sys.exit(INFEASIBLE)

@@ -18,7 +18,7 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
         "nutdamp": __version__,
         "spacecraft": spacecraft_json(spacecraft),
         "scheme": name,
-        "agree": found.agree,
+        "agree": found.agree if found.checks else None,
         "disagreeing": list(found.disagreeing),
         "final": final_json(flown),
         "target": target_json(spacecraft),

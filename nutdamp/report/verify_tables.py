@@ -35,6 +35,8 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
 
 def verdict(found: Verification) -> str:
     """Whether the integrations from outside confirm the flown motion, in a sentence."""
+    if not found.checks:
+        return "NOT CONFIRMED: no independent integration was flown to the end."
     names = found.checks if found.agree else found.disagreeing
     how = f"agree (within {AGREE:g} rad)" if found.agree else f"DO NOT AGREE (within {AGREE:g} rad)"
     return f"The flown motion and {' and '.join(names)} {how}."

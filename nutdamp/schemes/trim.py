@@ -27,8 +27,8 @@ DIFFERENCE = 1e-6
 
 STEPS = 30
 
-INTEGRATED = 100_000
-"""Steps of integration after which a trim is left as it is: some ten seconds."""
+INTEGRATED = 50_000
+"""Steps of integration after which a trim is left as it is: some seconds."""
 
 ANY = (0.0, math.inf)
 """Bounds on on-times that bound nothing."""
