@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import spinner
 
 from nutdamp import flight, schemes
 from nutdamp.basilisk import BasiliskFlight, fly
@@ -252,4 +251,4 @@ def test_times_that_cannot_be(until: float, step: float | None) -> None:
 def test_a_flight_too_long_for_basilisk_is_refused_at_once() -> None:
     """It has a fixed step, so the count of steps is known before."""
     with pytest.raises(Infeasible, match="more than 200000 steps"):
-        fly(spinner(degrees=5.0), Schedule(), 1e6)
+        fly(spinner("prolate"), Schedule(), 1e7)
