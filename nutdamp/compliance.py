@@ -19,6 +19,9 @@ DAMPED_SHARE = 0.01
 DAMPED_ANGLE = math.radians(1e-3)
 """rad that may be left in any case."""
 
+NEGLIGIBLE = math.radians(1e-9)
+"""rad below which angles are rounding, and shown as nothing."""
+
 SPIN_TOLERANCE = 1e-3
 """By how much, relatively, the spin at the end may miss the one of the goal."""
 
@@ -38,6 +41,18 @@ class Bound(NamedTuple):
     part: Part
     most: float
     required: bool
+
+
+class Held(NamedTuple):
+    """A bound, and what is left of its part in the same unit."""
+
+    bound: Bound
+    left: float
+
+    @property
+    def met(self) -> bool:
+        """Whether no more is left than may be."""
+        return self.left <= self.bound.most
 
 
 class Left(NamedTuple):
@@ -83,6 +98,24 @@ def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
         assert spacecraft.goal.spin is not None
         return abs(left.spin - spacecraft.goal.spin)
     return left.aim
+
+
+def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
+    """What is left of one motion beside each of the `bounds`."""
+    return tuple(Held(bound, float(left_of(bound.part, left, spacecraft))) for bound in bounds(spacecraft))
+
+
+def unaided(spacecraft: Spacecraft) -> bool:
+    """Whether the body keeps all `bounds` up to the horizon when no pulse is fired; unknown with disturbances: False.
+
+    Dissipation leaves H where it is and lets tan θ grow or decay.
+    """
+    if spacecraft.disturbances:
+        return False
+    grown = min(max(spacecraft.growth, 0.0) * spacecraft.horizon, 700.0)
+    nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(grown))
+    aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
+    return all(one.met for one in held(spacecraft, Left(nutation, aim, spacecraft.spin)))
 
 
 def severity(spacecraft: Spacecraft, left: Left) -> Any:

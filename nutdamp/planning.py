@@ -9,7 +9,7 @@ from enum import Enum
 from functools import cached_property
 
 from nutdamp import compliance, flight, schemes
-from nutdamp.compliance import Bound, Left
+from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
 from nutdamp.recommendation import Recommendation, Standing, recommend
@@ -35,7 +35,8 @@ class Obstacle(Enum):
     STEADY_TILT = "disturbances, under which a tilt stays"
     MAX_PULSES = "limits.max_pulses"
     RESOLUTION = "limits.tick, or the shortest pulse"
-    LIMITS = "on-times, horizon or blackout windows"
+    LIMITS = "limits of the file that bind"
+    SCHEME = "the scheme"
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +95,14 @@ class Plan:
         return not any(bound.required for bound in self.shortfalls)
 
     @property
+    def held(self) -> tuple[Held, ...]:
+        """The flown residual beside each of the `compliance.bounds`; nothing for an infeasible plan."""
+        return () if self.left is None else compliance.held(self.spacecraft, self.left)
+
+    @property
     def shortfalls(self) -> tuple[Bound, ...]:
         """The `compliance.bounds` that the flown residual does not keep."""
-        left, body = self.left, self.spacecraft
-        if left is None:
-            return ()
-        bounds = compliance.bounds(body)
-        return tuple(bound for bound in bounds if not compliance.left_of(bound.part, left, body) <= bound.most)
+        return tuple(one.bound for one in self.held if not one.met)
 
     @property
     def standing(self) -> Standing:
@@ -164,13 +166,37 @@ class Plan:
     def obstacle(self) -> Obstacle:
         """What keeps the plan from leaving less nutation."""
         body, limits = self.spacecraft, self.spacecraft.limits
+        if self.full and self.to_the_end:
+            return Obstacle.LIMITS
         if body.disturbances:
             return Obstacle.STEADY_TILT if self.options.with_disturbances else Obstacle.UNPLANNED_DISTURBANCES
         if len(self.pulses) == limits.max_pulses:
             return Obstacle.MAX_PULSES
         if limits.tick is not None and self.flight.residual.nutation < 0.1 * body.nutation:
             return Obstacle.RESOLUTION
-        return Obstacle.LIMITS
+        return Obstacle.LIMITS if self.binding else Obstacle.SCHEME
+
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Keys of the file that name the limits which end what the schedule does, as far as that can be seen."""
+        found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
+        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(self.spacecraft.limits.blackout)
+
+    @property
+    def full(self) -> bool:
+        """Whether every pulse is as long as its channel may be on; never where nothing says how long that is."""
+        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
+        most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
+        return bool(most) and all(
+            one.on_time >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
+        )
+
+    @property
+    def to_the_end(self) -> bool:
+        """Whether less than one nutation period is left of the horizon after the last pulse."""
+        body = self.spacecraft
+        period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
+        return body.horizon - self.pulses.end < period
 
     @property
     def steady_tilt(self) -> float:
@@ -188,7 +214,8 @@ class Plan:
             Obstacle.STEADY_TILT: f"{math.degrees(self.steady_tilt):.3g}° is the steady tilt under the disturbances",
             Obstacle.MAX_PULSES: f"limits.max_pulses = {self.spacecraft.limits.max_pulses} ends it",
             Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
-            Obstacle.LIMITS: "on-times, horizon or blackout windows allow no more",
+            Obstacle.LIMITS: f"{self.scheme} is held by {' and '.join(self.binding)}",
+            Obstacle.SCHEME: f"{self.scheme} takes out no more",
         }[self.obstacle]
         return (f"{_degrees(left)} of nutation remain: {reason}",)
 
@@ -356,6 +383,21 @@ class Comparison:
     def recommended(self) -> Plan | None:
         """The plan to fly; None where no scheme is feasible."""
         return self.recommendation.plan
+
+    @cached_property
+    def with_disturbances(self) -> Plan | None:
+        """What would be recommended of the same schemes if they planned with the disturbances, where they did not.
+
+        None where that is the case already, and where it is not looked at: of optimal, which takes long.
+        """
+        names = [one.scheme for one in self.plans if one.scheme not in schemes.SPINNING]
+        chosen, body = self.recommended, self.spacecraft
+        if chosen is None or not names or not body.disturbances or chosen.options.with_disturbances:
+            return None
+        try:
+            return compare(body, names, chosen.options._replace(with_disturbances=True)).recommended
+        except NutdampError:
+            return None
 
     @property
     def failed(self) -> tuple[Plan, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
-from nutdamp.compliance import DAMPED_ANGLE
+from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, Part, required
 from nutdamp.flight import Residual
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft
@@ -44,6 +44,7 @@ class Ground(Enum):
 
     ONLY = "only"
     LEFT = "left"
+    NEAREST = "nearest"
     COST = "cost"
     SHIFT = "shift"
     END = "end"
@@ -111,8 +112,7 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
         return Recommendation(best, standing, ground, len(those), by_propellant(those), _steadier(best, those))
-    best = _nearest(those)
-    ground = Ground.ONLY if len(those) == 1 else Ground.LEFT
+    best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
 
@@ -138,15 +138,22 @@ def missed(spacecraft: Spacecraft, nutation: float, aim: float) -> float:
     return nutation if spacecraft.goal.axis is None else max(nutation, aim)
 
 
-def _nearest(plans: Sequence[Plan]) -> Plan:
-    """The plan that leaves least; of those that leave as little, that which is nearest to the requirement, then cost.
+def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
+    """The plan that leaves least, and what decided; of those that leave as little the nearest to the requirement.
 
-    Angles within `DAMPED_ANGLE` are as little.
+    Angles within `DAMPED_ANGLE` are as little; those as near, but for 0.1 % or rounding, are told apart by `cheapest`.
     """
+    if len(plans) == 1:
+        return plans[0], Ground.ONLY
     least = min(map(_missed, plans))
-    near = [one for one in plans if _missed(one) <= least + DAMPED_ANGLE]
-    least = min(one.severity for one in near)
-    return cheapest([one for one in near if one.severity <= least * (1.0 + SAME_COST)])[0]
+    as_little = [one for one in plans if _missed(one) <= least + DAMPED_ANGLE]
+    if len(as_little) == 1:
+        return as_little[0], Ground.LEFT
+    body = as_little[0].spacecraft
+    least = min(one.severity for one in as_little)
+    rounding = NEGLIGIBLE / min((bound.most for bound in required(body) if bound.part is not Part.SPIN), default=1.0)
+    near = [one for one in as_little if one.severity <= least * (1.0 + SAME_COST) + rounding]
+    return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
 def _steadier(best: Plan, plans: Sequence[Plan]) -> Plan | None:

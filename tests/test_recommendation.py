@@ -124,14 +124,16 @@ def test_what_a_requirement_does_not_bound_must_be_damped() -> None:
     worse = judged("worse", 3.0, shift=0.1, propellant=0.5, asked=keep)
     assert chosen(idle, worse) == "worse"
     assert recommend([idle, worse]).standing is Standing.MEETS
-    assert "no plan damps the nutation" in warned(idle, worse)
+    assert "none of the 2 schemes compared damps the nutation" in warned(idle, worse)
 
 
 def test_if_none_meets_it_the_least_flown_nutation_whatever_the_cost() -> None:
     one = judged("one", 0.7, propellant=0.1, asked=HALF_A_DEGREE)
     two = judged("two", 0.6, propellant=9.0, asked=HALF_A_DEGREE)
     assert chosen(one, two) == "two"
-    assert warned(one, two).startswith("no plan meets the requirement. two leaves 0.6 deg of nutation (0.5 deg req")
+    assert warned(one, two).startswith(
+        "none of the 2 schemes compared meets the requirement. two leaves 0.6 deg of nutation (0.5 deg req"
+    )
 
 
 def test_if_none_meets_it_and_all_damp_the_nearest_to_the_requirement() -> None:
@@ -171,10 +173,11 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     assert verdicts.reason(compared) == "leaves least nutation of the 3 feasible plans"
     (warning,) = verdicts.warnings(compared)
     assert warning.startswith(
-        f"no plan damps the nutation. four-pulse leaves {math.degrees(left['four-pulse']):.4g} deg"
+        f"none of the 3 schemes compared damps the nutation. four-pulse leaves "
+        f"{math.degrees(left['four-pulse']):.4g} deg"
     )
     assert "each as long as max_on_time allows" in warning
-    assert "--scheme optimal" not in warning  # the pulses fill the horizon
+    assert "--scheme optimal was not compared; it may reach more." in warning  # several pulses within each half turn
 
 
 # --- the spin of the goal --------------------------------------------------------------------------------------------
@@ -245,7 +248,8 @@ def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:
 
 def test_reasons_say_what_decided() -> None:
     damped, other = judged("a", 0.0, propellant=0.1), judged("b", 0.0, propellant=0.2)
-    assert said(damped) == "the only plan that damps"
+    assert said(damped) == "the scheme named; it damps"
+    assert said(damped, INFEASIBLE) == "the only plan that damps"
     assert said(judged("a", 0.1, asked=HALF_A_DEGREE), INFEASIBLE) == "the only plan that meets the requirement"
     assert said(damped, other) == "least propellant of the 2 plans that damp"
     near, nearer = judged("a", 0.0, goal=POINTING), judged("b", 0.0, impulse=2.0, goal=POINTING)
@@ -254,6 +258,7 @@ def test_reasons_say_what_decided() -> None:
     assert said(judged("a", 0.0), judged("b", 0.0, end=2.0)).endswith("within 0.1 %; of these it ends first")
     assert said(judged("a", 3.0), judged("b", 4.0)) == "leaves least nutation of the 2 feasible plans"
     assert said(judged("a", 3.0), INFEASIBLE) == "the only feasible plan"
+    assert said(judged("a", 3.0)) == "the scheme named"
 
 
 def test_a_plan_that_complies_needs_no_warning() -> None:
@@ -267,12 +272,24 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     (text,) = verdicts.warnings(compared)
     made = compared.plans[0]
     assert made.obstacle is Obstacle.LIMITS
-    assert text.startswith("no plan damps the nutation. four-pulse leaves ")
+    assert text.startswith("four-pulse does not damp the nutation. It leaves ")
     assert "(0.05 deg would count as damped)" in text
     given = made.pulses.total_impulse
     assert f"Its {len(made.pulses)} pulses give {given:.4g} N m s, each as long as max_on_time allows; " in text
     assert "damping takes 21 N m s" in text
-    assert text.endswith(f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s.")
+    assert f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s." in text
+    assert made.binding == ("max_on_time", "limits.horizon")
+    assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in made.remarks)
+
+
+def test_what_binds_is_named_and_nothing_else() -> None:
+    """A file without on-times and blackout windows: neither can be what stands in the way."""
+    single = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0))
+    made = planning.plan(single, "one-pulse")
+    assert made.obstacle is Obstacle.SCHEME or made.binding == ("limits.horizon",)
+    assert not any("max_on_time" in remark or "blackout" in remark for remark in made.remarks)
+    dark = replace(single, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),)))
+    assert "limits.blackout" in planning.plan(dark, "one-pulse").binding
 
 
 @pytest.mark.parametrize(
@@ -341,6 +358,87 @@ def test_the_severity_of_many_is_that_of_each() -> None:
 )
 def test_a_share_is_never_rounded_to_what_it_is_not(share: float, required: float, text: str) -> None:
     assert verdicts.cases_verdict(share, required) == text
+
+
+# --- nothing to do ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("degrees", "asked", "goal", "said"),
+    [
+        (0.3, HALF_A_DEGREE, None, "0.3 deg at t = 0 already meets the requirement (nutation within 0.5 deg)"),
+        (0.6, HALF_A_DEGREE, None, None),
+        (0.3, Requirement(momentum_shift=0.01), None, None),  # the nutation is not bounded: it is to be damped
+        (0.9e-3, None, None, "the nutation of 0.0009 deg at t = 0 already counts as damped"),
+        (1.1e-3, None, None, None),
+        (0.3, HALF_A_DEGREE, POINTING, None),
+        (0.3, replace(HALF_A_DEGREE, momentum_shift=0.21), POINTING, "already meet the requirement"),
+        (0.3, HALF_A_DEGREE, Goal(spin=3.1), None),
+        (0.3, HALF_A_DEGREE, Goal(spin=3.0), "spin within 0.1 % of 28.648 rpm"),
+    ],
+)
+def test_where_no_pulse_is_needed_it_says_so(
+    degrees: float, asked: Requirement | None, goal: Goal | None, said: str | None
+) -> None:
+    body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=asked), goal=goal or Goal())
+    compared = compare(body, ("four-pulse",))
+    text = verdicts.needless(compared)
+    assert (text is None) == (said is None)
+    assert said is None or (text is not None and said in text)
+    assert verdicts.spoken(compared)["no_pulse_needed"] is (said is not None)
+    assert (planning.plan(body, "none").standing is Standing.COMPLIES) == (said is not None)
+
+
+def test_what_dissipation_makes_of_it_counts() -> None:
+    """0.3 deg grow e-fold in 40 s: past 0.5 deg after 20.4 s."""
+    calm = spinner(degrees=0.3, channels=cross(8.0), requirement=HALF_A_DEGREE, limits=Limits(horizon=20.0))
+    growing = replace(calm, dissipation=40.0)
+    assert growing.growth > 0.0
+    assert compliance.unaided(growing)
+    assert not compliance.unaided(replace(growing, limits=Limits(horizon=21.0)))
+    assert "up to the horizon of 20 s too" in (verdicts.needless(compare(growing, ("four-pulse",))) or "")
+    assert not compliance.unaided(replace(calm, disturbances=(Disturbance(0.5 + 0j),)))
+
+
+# --- rounding does not decide ----------------------------------------------------------------------------------------
+
+
+def test_of_plans_that_leave_nothing_but_rounding_the_cheapest() -> None:
+    """Where nothing meets a requirement below what a flight resolves, and where another part of it is missed."""
+    tiny = Requirement(nutation=math.radians(1e-13))
+    noisy = judged("noisy", 2e-12, propellant=0.1, asked=tiny)
+    quiet = judged("quiet", 3e-13, propellant=0.2, asked=tiny)
+    assert chosen(quiet, noisy) == "noisy"
+    assert recommend([quiet, noisy]).ground is Ground.COST
+    assert said(quiet, noisy).endswith("as others do; of these least propellant")
+    shifting = Requirement(nutation=math.radians(1e-13), momentum_shift=math.radians(0.1))
+    dear = judged("dear", 1e-13, shift=0.3, propellant=0.2, asked=shifting)
+    assert chosen(dear, judged("cheap", 0.0, shift=0.3, propellant=0.1, asked=shifting)) == "cheap"
+
+
+def test_what_was_nearest_to_the_requirement_does_not_claim_least_nutation() -> None:
+    far = judged("far", 1e-12, shift=3.5, propellant=0.1, asked=BOTH)
+    near = judged("near", 5e-12, shift=0.25, propellant=0.2, asked=BOTH)
+    assert said(far, near) == "comes nearest to the requirement of the 2 feasible plans"
+
+
+# --- disturbances ----------------------------------------------------------------------------------------------------
+
+
+def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> None:
+    asked = Requirement(nutation=math.radians(0.1), momentum_shift=math.radians(0.01))
+    body = spinner(channels=cross(8.0), requirement=asked)
+    body = replace(body, disturbances=(Disturbance(0.02 + 0j, rate=-body.spin),))
+    compared = compare(body, schemes.CLASSIC)
+    (text,) = verdicts.warnings(compared)
+    aware = compare(body, schemes.CLASSIC, schemes.Options(with_disturbances=True))
+    assert aware.recommended is not None
+    assert aware.recommended.meets_requirement
+    cure = f"--with-disturbances is the cure: {aware.recommended.scheme} then meets the requirement."
+    assert text.index(cure) < text.index("--scheme optimal")
+    hopeless = replace(body, requirement=Requirement(nutation=math.radians(1e-6)))
+    (text,) = verdicts.warnings(compare(hopeless, schemes.CLASSIC))
+    assert "plans with them, but then too no scheme compared meets the requirement." in text
 
 
 # --- a scheme with a bug ---------------------------------------------------------------------------------------------

@@ -139,7 +139,7 @@ def test_nothing_beats_what_is_recommended() -> None:
             those = [one for one in feasible if one.standing is chosen.standing]
             assert left(chosen) <= min(map(left, those)) + math.radians(1e-3), number
             (text,) = warnings
-            assert text.startswith("no plan ")
+            assert text.startswith("none of the ")
             assert (
                 f"{math.degrees(chosen.flown.nutation):.4g} deg of nutation" in text
                 or "between H and" in text

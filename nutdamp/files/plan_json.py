@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from nutdamp import __version__
+from nutdamp.compliance import Part
 from nutdamp.flight import Flight, Residual
 from nutdamp.planning import Comparison, Plan
 from nutdamp.rounding import cleaned
@@ -58,6 +59,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "feasible": plan.feasible,
         "why": plan.why,
         "meets_requirement": plan.meets_requirement,
+        "requirement": requirement_json(plan),
         "pulses": [pulse_json(pulse, body) for pulse in plan.pulses],
         "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
         "least_impulse_Nms": None if schedule is None else body.least_impulse,
@@ -72,6 +74,17 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": list(plan.remarks),
     }
+
+
+def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
+    """What is required, part by part, and what is left of it; None where nothing is, or without a schedule."""
+    found = []
+    for one in plan.held:
+        if one.bound.required:
+            unit, scale = ("rad_s", 1.0) if one.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            left, most = scale * one.left, scale * one.bound.most
+            found.append({"part": one.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": one.met})
+    return found or None
 
 
 def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:

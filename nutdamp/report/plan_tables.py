@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp import compliance
+from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.report import verdicts
@@ -22,7 +23,11 @@ from nutdamp.spacecraft import Spacecraft
 
 def comparison_screen(compared: Comparison) -> RenderableType:
     """Everything that ``plan`` shows."""
-    parts: list[RenderableType] = [header(compared.spacecraft), Text(), _comparison(compared)]
+    parts: list[RenderableType] = [header(compared.spacecraft), Text()]
+    needless = verdicts.needless(compared)
+    if needless is not None:
+        parts += [Text.assemble(("No pulse needed: ", "bold"), f"{needless}."), Text()]
+    parts.append(_comparison(compared))
     parts.extend(_reasons(compared))
     chosen, reason = compared.recommended, verdicts.reason(compared)
     if chosen is None:
@@ -61,8 +66,9 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if spacecraft.dissipation is not None:
         table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
     beyond = _beyond_floors(spacecraft)
-    floor = f"no bound with {beyond}" if beyond else "no schedule needs less"
-    table.add_row("least impulse", f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
+    floor = f"no least impulse with {beyond}" if beyond else "no schedule needs less"
+    name = "impulse" if beyond else "least impulse"
+    table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:
         turning = quantity(_turning(spacecraft), "N m s")
         least = "" if beyond else ", the least to turn H"
@@ -71,9 +77,20 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if spacecraft.goal.spin is not None:
         table.add_row("final spin", spin_text(spacecraft.goal.spin))
     table.add_row("actuators", _actuators(spacecraft))
+    for line, text in enumerate(_requirement(spacecraft)):
+        table.add_row("" if line else "requirement", text)
     for name, value in more:
         table.add_row(name, value)
     return table
+
+
+def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
+    """What is required, and where it is not what the key of the file says."""
+    bounds = compliance.required(spacecraft)
+    if bounds:
+        yield verdicts.required(spacecraft)
+    if any(bound.part is Part.DISTANCE for bound in bounds):
+        yield "momentum_shift bounds the axis error: H from the target"
 
 
 def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
@@ -115,6 +132,9 @@ def _actuators(spacecraft: Spacecraft) -> str:
 
 Cell = Callable[[Plan], str]
 
+NOT = "✗"
+"""Stands before what is more than required."""
+
 SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
 
@@ -130,7 +150,7 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         ("pulses", lambda plan: str(len(plan.pulses))),
         ("ends at", lambda plan: moment(plan.pulses.end)),
         ("impulse", lambda plan: quantity(plan.pulses.total_impulse, "N m s")),
-        ("  × least impulse", ratio),
+        ("  × A|ω0|" if _beyond_floors(compared.spacecraft) else "  × least impulse", ratio),
         ("propellant", lambda plan: mass(plan.pulses.propellant)),
         ("by impulses (17):", lambda _: ""),
         ("  nutation left", lambda plan: _angle(plan.residual, "nutation")),
@@ -159,8 +179,21 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
     if any(plan.delta_v is not None for plan in compared.plans):
         rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
     if compliance.required(compared.spacecraft):
-        rows.append(("requirement", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
+        rows.append(("requirement:", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
+        rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
     return rows
+
+
+def _part(bound: Bound) -> tuple[str, Cell]:
+    """The row of one thing that is required: its bound, and what the plans leave of it."""
+
+    def cell(plan: Plan) -> str:
+        (found,) = (one for one in plan.held if one.bound == bound)
+        text = quantity(found.left, "rad/s") if bound.part is Part.SPIN else degrees(found.left)
+        return text if found.met else f"{NOT} {text}"
+
+    most = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else degrees(bound.most)
+    return f"  {verdicts.PARTS[bound.part]} ≤ {most}", cell
 
 
 def _angle(left: Residual | None, name: str) -> str:

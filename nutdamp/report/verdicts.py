@@ -13,7 +13,7 @@ from nutdamp import compliance, outcome, schemes
 from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
 from nutdamp.planning import Comparison, Obstacle, Plan
-from nutdamp.recommendation import Ground, Recommendation, Standing
+from nutdamp.recommendation import Ground, Standing
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
 from nutdamp.spacecraft import Spacecraft
 
@@ -23,6 +23,9 @@ if TYPE_CHECKING:  # few runs look for a robust plan
 VERDICT = {True: "met", False: "not met", None: MISSING}
 """What `Plan.meets_requirement` says of the requirement."""
 
+PARTS = {Part.NUTATION: "nutation", Part.SHIFT: "shift of H", Part.DISTANCE: "axis error", Part.SPIN: "spin off"}
+"""What the parts of a requirement are called."""
+
 
 def no_plan(plan: Plan) -> str:
     """What stands in the column of a scheme that has no plan."""
@@ -31,41 +34,71 @@ def no_plan(plan: Plan) -> str:
     return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 
+def needless(compared: Comparison) -> str | None:
+    """That nothing has to be done, where that is so."""
+    body = compared.spacecraft
+    if not compliance.unaided(body):
+        return None
+    there = [f"the nutation of {degrees(body.nutation)} at t = 0"]
+    if body.goal.axis is not None:
+        there.append(f"the {degrees(body.to_turn)} between H and the target")
+    count = "" if len(there) > 1 else "s"
+    if compliance.required(body):
+        verdict = f"already meet{count} the requirement ({required(body)})"
+    else:
+        verdict = f"already count{count} as damped"
+    lasting = f", up to the horizon of {duration(body.horizon)} too" if body.growth > 0.0 else ""
+    plans = "; the plans below reduce it further" if any(len(one.pulses) for one in compared.plans) else ""
+    return f"{' and '.join(there)} {verdict}{lasting}{plans}"
+
+
 def reason(compared: Comparison) -> str:
     """Why the recommended plan, or none."""
-    found = compared.recommendation
+    found, body = compared.recommendation, compared.spacecraft
     if found.plan is None:
         return "no scheme is feasible"
-    body = compared.spacecraft
-    if found.standing is Standing.COMPLIES:
-        return _cheapest(found, _those(found, body))
-    least = "leaves least nutation" if body.goal.axis is None else "comes nearest to the target"
-    if found.standing is Standing.MEETS:
-        return f"{least} of the plans that meet the requirement" if found.count > 1 else "the only one to meet it"
     if found.ground is Ground.ONLY:
-        return "the only feasible plan"
-    return f"{least} of the {found.count} feasible plans"
-
-
-def _those(found: Recommendation[Plan], body: Spacecraft) -> str:
-    """What the plans have in common among which the recommended one was chosen: the verb in the plural."""
-    if compliance.required(body):
-        return "meet the requirement" if found.count > 1 else "meets the requirement"
-    what = "damp" if body.goal.axis is None else "reach the target"
-    return what if found.count > 1 else {"damp": "damps", "reach the target": "reaches the target"}[what]
-
-
-def _cheapest(found: Recommendation[Plan], those: str) -> str:
-    """What decided among the plans that comply."""
+        return _only(compared)
     cost = "propellant" if found.by_propellant else "impulse"
-    if found.ground is Ground.ONLY:
-        return f"the only plan that {those}"
-    among = f"of the {found.count} plans that {those}"
-    if found.ground is Ground.COST:
-        return f"least {cost} {among}"
-    if found.ground is Ground.SHIFT:
-        return f"least {cost} {among}, within 0.1 %; of these least shift of H"
-    return f"least {cost} {among}, within 0.1 %; of these it ends first"
+    if found.standing is Standing.COMPLIES:
+        among = f"of the {found.count} plans that {_those(body)}"
+        return {
+            Ground.SHIFT: f"least {cost} {among}, within 0.1 %; of these least shift of H",
+            Ground.END: f"least {cost} {among}, within 0.1 %; of these it ends first",
+        }.get(found.ground or Ground.COST, f"least {cost} {among}")
+    meeting = found.standing is Standing.MEETS
+    among = f"of the {found.count} {'plans that meet the requirement' if meeting else 'feasible plans'}"
+    least = "leaves least nutation" if body.goal.axis is None else "comes nearest to the target"
+    if found.ground is Ground.NEAREST:
+        return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
+    then = {
+        Ground.COST: f", as others do; of these least {cost}",
+        Ground.SHIFT: f", as others do for the same {cost}; of these least shift of H",
+        Ground.END: f", as others do for the same {cost}; of these it ends first",
+    }
+    return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
+
+
+def _only(compared: Comparison) -> str:
+    """Why a plan that had no rival of its standing."""
+    found, body = compared.recommendation, compared.spacecraft
+    verdict = {
+        Standing.COMPLIES: _those(body, plural=False),
+        Standing.MEETS: "meets the requirement",
+        Standing.MISSES: "",
+    }[found.standing or Standing.MISSES]
+    if len(compared.plans) == 1:
+        return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
+    return f"the only plan that {verdict}" if verdict else "the only feasible plan"
+
+
+def _those(body: Spacecraft, *, plural: bool = True) -> str:
+    """What the plans do that comply."""
+    if compliance.required(body):
+        return f"meet{'s' * (not plural)} the requirement"
+    if body.goal.axis is None:
+        return f"damp{'s' * (not plural)}"
+    return f"reach{'es' * (not plural)} the target"
 
 
 def warnings(compared: Comparison) -> tuple[str, ...]:
@@ -73,14 +106,26 @@ def warnings(compared: Comparison) -> tuple[str, ...]:
     found = compared.recommendation
     if found.plan is None or found.standing is Standing.COMPLIES:
         return ()
-    body = compared.spacecraft
-    if found.standing is Standing.MISSES and compliance.required(body):
-        head = "no plan meets the requirement"
+    body, chosen = compared.spacecraft, found.plan
+    required = found.standing is Standing.MISSES and bool(compliance.required(body))
+    what = "nutation" if body.goal.axis is None else "target"
+    if len(compared.plans) > 1:
+        verb = (
+            "meets the requirement"
+            if required
+            else {"nutation": "damps the nutation", "target": "reaches the target"}[what]
+        )
+        head = f"none of the {len(compared.plans)} schemes compared {verb}"
     else:
-        head = "no plan damps the nutation" if body.goal.axis is None else "no plan reaches the target"
-    chosen = found.plan
+        verb = (
+            "meet the requirement"
+            if required
+            else {"nutation": "damp the nutation", "target": "reach the target"}[what]
+        )
+        head = f"{chosen.scheme} does not {verb}"
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
-    return (" ".join((f"{head}. {chosen.scheme} leaves {missed}.", *_obstacles(chosen, compared))),)
+    it = chosen.scheme if len(compared.plans) > 1 else "It"
+    return (" ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared))),)
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
@@ -114,49 +159,47 @@ def shortfall(plan: Plan, bound: Bound) -> str:
 
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
-    """What stands in the way of less, in sentences."""
+    """What stands in the way of less, in sentences; what cures it first."""
     body, limits = plan.spacecraft, plan.spacecraft.limits
     parts = {bound.part for bound in plan.shortfalls}
-    if Part.NUTATION in parts:
+    if body.disturbances and not plan.options.with_disturbances:
+        yield _unplanned(compared)
+    if Part.NUTATION in parts and plan.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
         yield {
-            Obstacle.UNPLANNED_DISTURBANCES: "The plan was made without the disturbances; --with-disturbances plans "
-            "with them.",
             Obstacle.STEADY_TILT: f"Under the disturbances a tilt of {degrees(plan.steady_tilt)} stays.",
             Obstacle.MAX_PULSES: f"limits.max_pulses = {limits.max_pulses} allows no more pulses.",
             Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less.",
-            Obstacle.LIMITS: _spent(plan),
-        }[plan.obstacle]
+        }.get(plan.obstacle, _spent(plan))
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
-    tried = {one.scheme for one in compared.plans}
-    if "optimal" not in tried and body.channels and parts != {Part.SPIN} and not (_full(plan) and _to_the_end(plan)):
+    if "optimal" not in {one.scheme for one in compared.plans} and body.channels and parts != {Part.SPIN}:
         yield "--scheme optimal was not compared; it may reach more."
+
+
+def _unplanned(compared: Comparison) -> str:
+    """What planning with the disturbances would change."""
+    one, body = len(compared.plans) == 1, compared.spacecraft
+    made = f"The plan{' was' if one else 's were'} made without the disturbances of the file"
+    aware = compared.with_disturbances
+    if aware is not None and aware.standing is Standing.COMPLIES:
+        return f"--with-disturbances is the cure: {aware.scheme} then {_those(body, plural=False)}. {made}."
+    plans = f"{made}; --with-disturbances plans with them"
+    if aware is None:
+        return f"{plans}."
+    return f"{plans}, but then too {'it does not ' if one else 'no scheme compared '}{_those(body, plural=one)}."
 
 
 def _spent(plan: Plan) -> str:
     """How much of what damping takes the pulses give, and what ends them."""
     body, pulses = plan.spacecraft, plan.pulses
     count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
-    width = ", each as long as max_on_time allows" if _full(plan) else ""
+    width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.full else ""
     blackout = ", with blackout windows" if body.limits.blackout else ""
     return (
         f"Its {count} {quantity(pulses.total_impulse, 'N m s')}{width}; damping takes "
         f"{quantity(body.least_impulse, 'N m s')}. The last one ends at {moment(pulses.end)} of a horizon of "
         f"{duration(body.horizon)}{blackout}."
     )
-
-
-def _full(plan: Plan) -> bool:
-    """Whether every pulse is as long as its channel may be on."""
-    longest = {channel.name: channel.max_on_time for channel in plan.spacecraft.channels}
-    return all(pulse.on_time >= longest.get(pulse.channel, math.inf) * (1.0 - 1e-9) for pulse in plan.pulses)
-
-
-def _to_the_end(plan: Plan) -> bool:
-    """Whether less than one nutation period is left of the horizon after the last pulse."""
-    body = plan.spacecraft
-    period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
-    return body.horizon - plan.pulses.end < period
 
 
 def hints(compared: Comparison) -> tuple[str, ...]:
@@ -180,6 +223,7 @@ def hints(compared: Comparison) -> tuple[str, ...]:
 def spoken(compared: Comparison) -> dict[str, Any]:
     """The words of a comparison for JSON files."""
     return {
+        "no_pulse_needed": compliance.unaided(compared.spacecraft),
         "reason": reason(compared),
         "warnings": list(warnings(compared)),
         "hints": list(hints(compared)),
@@ -199,7 +243,7 @@ def robust_reason(found: RobustComparison) -> str:
         best = f"most cases comply, of {count} plans"
         as_good = f"{found.equals} comply as often but for the sampling error"
     if count == 1:
-        return "the only plan"
+        return "the scheme named" if len(found.comparison.plans) == 1 else "the only plan"
     cost = "propellant" if found.by_propellant else "impulse"
     then = {
         Ground.COST: f"least {cost}",
@@ -249,8 +293,7 @@ def required(spacecraft: Spacecraft) -> str:
             tolerance = 100.0 * compliance.SPIN_TOLERANCE
             texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
         else:
-            name = {Part.NUTATION: "nutation", Part.SHIFT: "shift of H", Part.DISTANCE: "axis error"}[bound.part]
-            texts.append(f"{name} within {degrees(bound.most)}")
+            texts.append(f"{PARTS[bound.part]} within {degrees(bound.most)}")
     return " and ".join(texts)
 
 

@@ -326,6 +326,32 @@ def test_a_target_without_unit_is_read_as_rad_and_says_so(run: Run) -> None:
         assert "is read as" not in run("plan", "--target", angles, "--scheme", "two-pulse").stderr
 
 
+def test_each_part_of_the_requirement_is_shown_beside_what_is_left(run: Run) -> None:
+    done = run("plan", "--quiet", "--json", "plans.json", columns=80)
+    assert "requirement      nutation within 0.5 deg and shift of H within 0.2 deg\n" in done.stdout
+    rows = {line[:22].strip(): line[22:].split("  ") for line in done.stdout.splitlines()}
+    cells = [cell.strip() for cell in rows["shift of H ≤ 0.2 deg"] if cell.strip()]
+    assert cells == ["✗ 3.462 deg", "< 1e-9 deg", "0.1684 deg"]
+    aimed = run("plan", "--quiet", "--target", "2deg,0deg", "--scheme", "optimal").stdout
+    assert "  axis error ≤ 0.2 deg" in aimed
+    said = "momentum_shift bounds the axis error: H from the target"
+    assert said in aimed
+    assert said not in done.stdout
+
+
+def test_json_holds_each_part_of_the_requirement(run: Run) -> None:
+    compared = json.loads(run("plan", "--quiet", "--json", "-").stdout)
+    assert compared["no_pulse_needed"] is False
+    one, two = compared["plans"][0]["requirement"]
+    assert (one["part"], one["met"], one["most_deg"]) == ("nutation", True, pytest.approx(0.5))
+    assert (two["part"], two["met"], two["most_deg"]) == ("momentum_shift", False, pytest.approx(0.2))
+    assert two["left_deg"] == pytest.approx(compared["plans"][0]["flown"]["momentum_shift_deg"])
+    spun = json.loads(run("plan", "--quiet", "--spin", "keep", "--scheme", "four-pulse", "--json", "-").stdout)
+    assert spun["plans"][0]["requirement"][2]["part"] == "spin"
+    easy = run("plan", "--set", "state.nutation=0.3deg", "--set", "requirement.nutation=1deg", columns=80)
+    assert easy.stdout.split("\n\n")[1].startswith("No pulse needed: the nutation of 0.3 deg at t = 0 already meets")
+
+
 def test_a_target_along_h_is_compared_with_no_rounding(run: Run) -> None:
     done = run("plan", "--target", "0deg,0deg", columns=80)
     (row,) = [line for line in done.stdout.splitlines() if "× C|ω3|β" in line]

@@ -63,7 +63,7 @@ def test_markdown_needs_no_pictures(run: Run, tmp_path: Path) -> None:
             IDEAL + "requirement: {momentum_shift: 0.01 deg}\n",
             ("--scheme", "one-pulse"),
             4,
-            "no plan meets the requirement.",
+            "one-pulse does not meet the requirement.",
         ),
     ],
     ids=["infeasible", "missed"],
