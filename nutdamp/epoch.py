@@ -71,20 +71,25 @@ class Epoch:
 
     @property
     def text(self) -> str:
-        """``2026-03-01T12:00:00.000000000``, rounded to `DIGITS`; within a leap second the seconds are 60.
+        """``2026-03-01T12:00:00.000000000``: `rounded` to `DIGITS`."""
+        return self.rounded(DIGITS)
 
-        Raises ValueError after the year 9999, where no such text can be written.
+    def rounded(self, digits: int) -> str:
+        """``2026-03-01T12:00:00.000`` for 3 ``digits`` of a second; within a leap second the seconds are 60.
+
+        What rounds up to a whole minute or day is the next one. Raises ValueError after the year 9999, where no such
+        text can be written.
         """
-        day, second, part = self._calendar()
+        day, second, part = self._calendar(digits)
         if day > datetime.date.max.toordinal():
             raise ValueError("the date lies after the year 9999")
         date = datetime.date.fromordinal(day).isoformat()
         clock = min(second // 60, 1439)
-        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{DIGITS}d}"
+        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
 
-    def _calendar(self) -> tuple[int, int, int]:
-        """Day (ordinal), whole second of the day, and the rest in units of the last digit written."""
-        whole, part = divmod(round(self.elapsed * 10**DIGITS), 10**DIGITS)
+    def _calendar(self, digits: int) -> tuple[int, int, int]:
+        """Day (ordinal), whole second of the day, and the rest in units of the last of so many ``digits``."""
+        whole, part = divmod(round(self.elapsed * 10**digits), 10**digits)
         day = FIRST_DAY + whole // 86400
         while 86400 * (day - FIRST_DAY) + _leaps_before(day) > whole:  # the days before were longer
             day -= 1

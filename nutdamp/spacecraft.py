@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
-from nutdamp.epoch import Epoch
+from nutdamp.epoch import DIGITS, Epoch
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
@@ -294,12 +294,15 @@ class Spacecraft:
         x, y, z = direction.tolist()
         return attitude.sphere_angles(direction)[0], math.atan2(math.hypot(x, y), z)
 
-    def utc(self, time: float) -> str | None:
-        """Date and time in UTC ``time`` s after the epoch; None without one, before 1972 and after the year 9999."""
+    def utc(self, time: float, digits: int = DIGITS) -> str | None:
+        """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.
+
+        None without an epoch, before 1972 and after the year 9999.
+        """
         if self.attitude is None or self.attitude.epoch is None:
             return None
         try:
-            return f"{Epoch.parse(self.attitude.epoch).plus(time).text}Z"
+            return f"{Epoch.parse(self.attitude.epoch).plus(time).rounded(digits)}Z"
         except ValueError:
             return None
 

@@ -92,3 +92,26 @@ def test_nothing_is_lost_but_the_last_digit(moment: datetime.datetime, seconds: 
 def test_without_leap_seconds_it_is_the_calendar(moment: datetime.datetime) -> None:
     since = Epoch.parse(moment.isoformat()).elapsed - Epoch.parse("2017-01-01T00:00:00").elapsed
     assert since == Fraction((moment - datetime.datetime(2017, 1, 1)) // datetime.timedelta(microseconds=1), 10**6)
+
+
+@pytest.mark.parametrize(
+    ("exact", "shown"),
+    [
+        ("2026-03-01T12:00:00.1239", "2026-03-01T12:00:00.124"),
+        ("2026-03-01T12:00:00.1234", "2026-03-01T12:00:00.123"),
+        ("2026-03-01T12:00:59.99951", "2026-03-01T12:01:00.000"),
+        ("2026-12-31T23:59:59.9996", "2027-01-01T00:00:00.000"),
+        ("2016-12-31T23:59:59.9996", "2016-12-31T23:59:60.000"),
+        ("2016-12-31T23:59:60.9996", "2017-01-01T00:00:00.000"),
+    ],
+)
+def test_fewer_digits_are_rounded_not_cut(exact: str, shown: str) -> None:
+    assert Epoch.parse(exact).rounded(3) == shown
+
+
+@given(st.floats(min_value=0.0, max_value=1e6), st.integers(1, 9))
+def test_a_rounded_moment_is_at_most_half_its_last_digit_off(seconds: float, digits: int) -> None:
+    moment = Epoch.parse("2016-12-25T00:00:00").plus(seconds)
+    text = moment.rounded(digits)
+    assert abs(Epoch.parse(text).elapsed - moment.elapsed) <= Fraction(1, 2 * 10**digits)
+    assert len(text) == len("2016-12-25T00:00:00.") + digits

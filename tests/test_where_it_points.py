@@ -23,7 +23,7 @@ from nutdamp import planning, rounding
 from nutdamp.files.plan_json import final_json, plan_json, target_json
 from nutdamp.physics import attitude
 from nutdamp.report.figures import timeline_figure
-from nutdamp.report.plan_tables import channel_text
+from nutdamp.report.plan_tables import channel_text, pulse_table
 from nutdamp.report.text import longitude, steering, vector
 from nutdamp.schedule import Schedule, steerable_pulse
 from nutdamp.spacecraft import Attitude, Steerable
@@ -157,6 +157,25 @@ def test_pulses_say_when_they_start_in_utc(run: Run, tmp_path: Path) -> None:
     assert run("simulate", "leap.yaml", "--schedule", "pulses.csv").stderr == ""
     plain = run("plan", "--csv", "-").stdout.splitlines()[0]
     assert "utc" not in plain
+
+
+def test_a_screen_rounds_a_date_to_the_millisecond() -> None:
+    """The start of each pulse is at most half a millisecond from the date shown, and the day is that of what is shown.
+
+    The first pulse starts 0.3 ms before midnight: it is shown at midnight, on the next day.
+    """
+    body = replace(
+        spinner(steerable=Steerable(5.0)),
+        attitude=Attitude(np.array([1.0, 0.0, 0.0, 0.0]), "2026-03-01T23:59:58.9997Z", "GCRF"),
+    )
+    torquer = body.steerable
+    assert torquer is not None
+    starts = (1.0, 2.0009, 3.0004)
+    pulses = tuple(steerable_pulse(torquer, start + 0.25, 0.0, on_time=0.5) for start in starts)
+    table = pulse_table(planning.Plan(body, "x", Schedule(pulses)))
+    column = next(column for column in table.columns if str(column.header).startswith("UTC"))
+    assert column.header == "UTC\n2026-03-02"
+    assert list(column.cells) == ["00:00:00.000", "00:00:01.001", "00:00:02.000"]
 
 
 def test_dates_that_no_calendar_has_are_left_out() -> None:

@@ -135,7 +135,7 @@ def command(
     if not silent:
         from nutdamp.report.dispersion_tables import dispersion_screen
 
-        screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst))
+        screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal))
     deliver(outputs, *screens, unsaved=unsaved)
     if stopped_by is not None and results.done < results.asked:
         say(f"interrupted: {results.done} of {results.asked} cases are done")
@@ -229,10 +229,18 @@ def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bo
         from nutdamp.files.dispersion_json import case_json
         from nutdamp.files.output import json_text
 
-        outputs.append((json, json_text({"scheme": scheme, "seed": study.seed, **case_json(study, case, draws)})))
+        outputs.append(
+            (
+                json,
+                json_text(
+                    {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
+                ),
+            )
+        )
     screens: list[RenderableType] = []
     if not silent:
         from nutdamp.report.dispersion_tables import case_screen
 
-        screens.append(case_screen(study, case, draws, flown_outputs(study.model, draws), scheme=scheme))
+        flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
+        screens.append(case_screen(study, case, draws, flown, scheme=scheme))
     deliver(outputs, *screens)

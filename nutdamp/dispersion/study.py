@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import compliance
+from nutdamp import compliance, flight
 from nutdamp.compliance import Left
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
@@ -30,6 +30,7 @@ from nutdamp.dispersion.statistics import (
 )
 from nutdamp.dispersion.truth import Cases, Model, Truth
 from nutdamp.errors import BadRequest
+from nutdamp.flight import Flight
 from nutdamp.physics import many
 
 Array = NDArray[np.float64]
@@ -109,6 +110,12 @@ class Study:
         truth = self.model.truth({name: np.atleast_1d(draw) for name, draw in draws.items()})
         measure(self.model, self.flies(truth), out)
         return out[:, 0]
+
+    @property
+    def nominal(self) -> Flight:
+        """The estimate itself, flown alone as the cases are."""
+        fly = flight.flown if self.flown else flight.by_impulses
+        return fly(self.model.spacecraft, self.model.schedule)
 
     def severity(self, values: Array, spin: Cases) -> Array:
         """How bad cases are, (n,), by `compliance.severity`: outputs (5, n), and ω3 at their end in rad/s."""

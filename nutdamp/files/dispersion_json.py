@@ -10,7 +10,7 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
-from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
@@ -20,7 +20,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
     """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
 
     ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is what one
-    sigma of an input alone (or all of a bias) does to the nutation.
+    sigma of an input alone (or all of a bias) does to the nutation. ``final`` is the end of the nominal case.
     """
     study = results.study
     return {
@@ -33,6 +33,8 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "seed": study.seed,
         "flown": study.flown,
         "redrawn": results.redrawn,
+        "final": final_json(study.nominal),
+        "target": target_json(study.model.spacecraft),
         "exact_percentiles": results.exact,
         "percentiles": {
             column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)

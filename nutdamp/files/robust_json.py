@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from nutdamp.dispersion.outputs import aim_output
-from nutdamp.files.plan_json import plan_json
+from nutdamp.files.plan_json import final_json, plan_json, target_json
 from nutdamp.robust import Candidate, RobustComparison
 
 
@@ -21,6 +21,7 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
         "samples": found.samples,
         "seed": found.seed,
         "flown": found.flown,
+        "target": target_json(found.comparison.spacecraft),
         "candidates": [_candidate(one) for one in found.candidates],
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
         "reason": reason,
@@ -50,4 +51,5 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "nutation_deg": math.degrees(one.nutation),
         aim_output(plan.spacecraft)[0] + "_deg": math.degrees(one.off),
         "met_fraction": one.met,
+        "final": final_json(plan.flight),
     }

@@ -14,12 +14,14 @@ from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS, aim_output
 from nutdamp.dispersion.statistics import Array, cases_to_show
 from nutdamp.dispersion.study import EARLY, Results, Study
+from nutdamp.flight import Flight
 from nutdamp.report import verdicts
+from nutdamp.report.end_tables import end_table
 from nutdamp.report.layout import columns, facts
 from nutdamp.report.text import MISSING, quantity
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin gain, mrad/s", "propellant, g")
+NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
 SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "m": ("mm", 1e3), "s": ("ms", 1e3)}
 """Units that people read for those of inputs, and the factor."""
@@ -33,11 +35,13 @@ ROUNDING = 1e-12
 """rad; what varies by less does not vary."""
 
 
-def dispersion_screen(results: Results, *, scheme: str, worst: int) -> Group:
-    """Everything that ``disperse`` shows."""
+def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
+    """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
+    if nominal is not None:
+        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal)]
     parts += [Text(), *_requirement(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
@@ -139,8 +143,9 @@ def _budget(results: Results) -> list[RenderableType]:
     table.add_row(Text("together", style="dim"), "", *texts)
     count = min(results.done, EARLY)
     note = (
-        "Effect of each input alone on the nutation and on the shift of H, and its share of their variance: linear by "
-        f"analytic derivatives, cases as the first {count:,} cases show it (first-order Sobol index)."
+        f"Effect of each input alone on the nutation and on the {_budgeted(study)[1][1]}, and its share of their "
+        f"variance: linear by analytic derivatives, cases as the first {count:,} cases show it (first-order Sobol "
+        "index)."
     )
     return [Text("Tolerance budget", style="bold"), table, Text(note, style="dim"), *_dominating(results)]
 
@@ -213,8 +218,13 @@ def unused_table(unused: Iterable[Unused]) -> Table:
     return table
 
 
-def case_screen(study: Study, case: int, draws: dict[str, float], flown: Array, *, scheme: str) -> RenderableType:
-    """One case (from 0): every input, and how it ends by the impulse sum and flown through real widths."""
+def case_screen(
+    study: Study, case: int, draws: dict[str, float], flown: tuple[Array, Array], *, scheme: str
+) -> RenderableType:
+    """One case (from 0): every input, and how it and the nominal one end by the impulse sum and through real widths.
+
+    ``flown``: the outputs (5,) through real widths, of the nominal case and of this one.
+    """
     inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
     for entry in study.model.inputs.drawn:
         unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
@@ -223,14 +233,17 @@ def case_screen(study: Study, case: int, draws: dict[str, float], flown: Array, 
         off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
         estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
         inputs.add_row(Text(entry.name, style="dim"), estimate, truth, off, sigmas)
-    outcome = columns("", "nominal", "by impulses (17)", "flown, real widths")
+    ways = "impulses", "flown"
+    outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
     closed = Study(study.model, study.seed)
-    for name, scale, *values in zip(NAMES, SCALES, closed.outputs_of({}), closed.outputs_of(draws), flown, strict=True):
+    ends = (closed.outputs_of({}), closed.outputs_of(draws), *flown)
+    for name, scale, *values in zip(NAMES, SCALES, *ends, strict=True):
         largest = scale * float(np.max(np.abs(values)))
         cells = (MISSING if math.isnan(value) else _beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
-    return Group(title, Text(), inputs, Text(), outcome)
+    note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
+    return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"))
 
 
 def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:

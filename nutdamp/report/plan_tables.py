@@ -130,6 +130,9 @@ def _actuators(spacecraft: Spacecraft) -> str:
     return "; ".join(texts)
 
 
+MILLISECONDS = 3
+"""Digits of a second that a table of pulses shows of a date."""
+
 Cell = Callable[[Plan], str]
 
 NOT = "✗"
@@ -237,7 +240,7 @@ def pulse_table(plan: Plan) -> Table:
     """
     before, after = plan.flight.around_pulses()
     pulses, body = plan.pulses, plan.spacecraft
-    day, clocks = _clocks([body.utc(pulse.start) for pulse in pulses])
+    day, clocks = _clocks([body.utc(pulse.start, MILLISECONDS) for pulse in pulses])
     second = (f"UTC\n{day}", clocks) if clocks else ("centre\ns", [f"{pulse.t:.4f}" for pulse in pulses])
     cells: list[tuple[str, list[str]]] = [
         ("pulse\n", [str(index + 1) for index in range(len(pulses))]),
@@ -256,11 +259,11 @@ def pulse_table(plan: Plan) -> Table:
 
 
 def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
-    """The day that all dates share, and of each the rest to the millisecond; nothing where one is not known."""
+    """The day that all dates share, and of each the rest; nothing where one is not known."""
     known = [date.removesuffix("Z").split("T") for date in dates if date is not None]
     if not known or len(known) < len(dates):
         return "", []
-    clocks = [time[: -len("000000")] for _, time in known]  # nanoseconds cut to milliseconds
+    clocks = [time for _, time in known]
     if len({day for day, _ in known}) == 1:
         return known[0][0], clocks
     return "", [f"{day} {clock}" for (day, _), clock in zip(known, clocks, strict=True)]

@@ -8,6 +8,7 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.planning import Plan
 from nutdamp.report import verdicts
+from nutdamp.report.end_tables import end_table
 from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header, pulse_table
 from nutdamp.report.text import MISSING, degrees
@@ -35,7 +36,7 @@ def robust_screen(found: RobustComparison) -> RenderableType:
         parts.append(Text.assemble(("Requirement ", "bold"), f"({asked}) {verdict}."))
     parts.append(Text(verdicts.robust_cost(found)))
     if len(chosen.plan.pulses):
-        parts += [Text(), pulse_table(chosen.plan)]
+        parts += [Text(), pulse_table(chosen.plan), Text(), end_table(chosen.plan.flight)]
     return Group(*parts)
 
 

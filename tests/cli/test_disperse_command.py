@@ -108,7 +108,7 @@ def test_a_worst_case_can_be_run_again(run: Run, body: Path) -> None:
     shown = run(*arguments, "--case", str(worst["case"]))
     assert shown.returncode == 0
     assert f"case {worst['case']}" in shown.stdout
-    for text in ("thrust pulse 2", "attitude y", "by impulses (17)", "flown, real widths", "in sigmas"):
+    for text in ("thrust pulse 2", "attitude y", "by the impulse sum (17)", "through real widths", "in sigmas"):
         assert text in shown.stdout
 
 
@@ -379,3 +379,39 @@ def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path
     assert verdict(done.stdout) == verdict(dispersed_.stdout) == verdict(report)
     assert set(re.findall(sentence, report)) == {verdict(report)}
     assert verdict(report).startswith(f"NOT met: {100 * planned['met_fraction']:.1f} % of cases comply")
+
+
+def test_one_case_and_all_cases_show_the_same_nominal_one(run: Run) -> None:
+    """By both models beside each other: for four-pulse they are 0.15 deg apart in the shift of H."""
+    many = run("disperse", "--scheme", "four-pulse", "--samples", "100").stdout
+    one = run("disperse", "--scheme", "four-pulse", "--case", "7").stdout
+    rows = {"many": many, "one": one}
+    found = {name: re.search(r"^shift of H, deg +(.*)$", text, re.MULTILINE) for name, text in rows.items()}
+    assert found["many"] is not None
+    assert found["one"] is not None
+    nominal = found["many"][1].split()[0]
+    impulses, _, flown, _ = found["one"][1].split()
+    assert (nominal, impulses, flown) == ("0.1684", "0.3141", "0.1684")
+    assert re.search(r"nominal +this case +nominal +this case\n +impulses +impulses +flown +flown\n", one)
+    fast = run("disperse", "--scheme", "four-pulse", "--samples", "100", "--impulses", "--force").stdout
+    assert re.search(r"^shift of H, deg +0\.3141 ", fast, re.MULTILINE)
+    assert json.loads(run("disperse", "--case", "7", "--json", "-").stdout)["flown"] is True
+
+
+@pytest.mark.parametrize("model", [(), ("--impulses", "--force")])
+def test_it_says_where_the_nominal_case_ends_and_where_it_should(
+    run: Run, tmp_path: Path, model: tuple[str, ...]
+) -> None:
+    goal = ("--scheme", "half-cone", "--target", "10deg,45deg")
+    done = run("disperse", *goal, "--samples", "200", "--json", "d.json", *model)
+    data = json.loads((tmp_path / "d.json").read_text())
+    simulated = json.loads(run("simulate", *goal, "--json", "-").stdout)
+    which = "final_by_impulses" if model else "final"
+    for name in ("axis", "momentum"):
+        assert data["final"][name] == pytest.approx(simulated[which][name], abs=1e-6)
+    assert data["target"]["axis"] == pytest.approx({"tilt_deg": 10.0, "azimuth_deg": 45.0})
+    assert re.search(r"^target +tilt 10\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)
+    assert re.search(r"^spin axis ends at +tilt 1[01]\.[0-9]{4} deg", done.stdout, re.MULTILINE)
+    words = " ".join(done.stdout.split())
+    assert "alone on the nutation and on the axis error" in words
+    assert "on the shift of H" not in words

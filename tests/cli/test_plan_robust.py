@@ -113,3 +113,15 @@ def test_impulses_are_refused(run: Run, arguments: tuple[str, ...], said: str) -
 def test_impulses_are_flown_where_they_must(run: Run) -> None:
     done = run("plan", "--robust", "--impulses", "--force", "--scheme", "four-pulse")
     assert "by the impulse sum (17)" in done.stdout
+
+
+def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Run, sat: Path, tmp_path: Path) -> None:
+    options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
+    done = run("plan", sat.name, *options, "--json", "plan.json")
+    found = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
+    assert found["target"]["axis"] == pytest.approx({"tilt_deg": 3.0, "azimuth_deg": 45.0})
+    for one in (*found["candidates"], found["recommended"], found["against"]):
+        assert one is None or one["final"]["momentum"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
+    assert found["recommended"]["final"] == found["recommended"]["plan"]["final"]
+    assert re.search(r"^H ends at +tilt 3\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)
+    assert re.search(r"^target +tilt 3\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)

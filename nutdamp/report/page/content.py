@@ -99,7 +99,10 @@ def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
     body, left, pulses = chosen.spacecraft, chosen.flown, chosen.pulses
     assert left is not None
     yield Figure("nutation", f"{degrees(body.nutation)} → {degrees(left.nutation)}")
-    yield Figure("shift of H", degrees(left.momentum_shift))
+    if body.goal.axis is None:
+        yield Figure("shift of H", degrees(left.momentum_shift))
+    else:
+        yield Figure("off the target", f"{degrees(body.to_turn)} → {degrees(left.axis_error)}")
     yield Figure("pulses", f"{len(pulses)}, until {moment(pulses.end)}" if len(pulses) else "none")
     if pulses.propellant is None:
         yield Figure("impulse", quantity(pulses.total_impulse, "N m s"))

@@ -78,6 +78,8 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         (Column("shift of H", "deg"), lambda plan: _angle(plan.flown, "momentum_shift")),
     ]
     body = compared.spacecraft
+    if body.goal.axis is not None:
+        columns.append((Column("off the target", "deg"), lambda plan: _angle(plan.flown, "axis_error")))
     columns += [
         (Column(f"axis: {angle_names(body)[0]}", "deg"), lambda plan: _pointing(plan, 0)),
         (Column(f"axis: {angle_names(body)[1]}", "deg"), lambda plan: _pointing(plan, 1)),
