@@ -173,7 +173,8 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
     if "optimal" not in {one.scheme for one in compared.plans} and body.channels and parts != {Part.SPIN}:
-        yield "--scheme optimal was not compared; it may reach more."
+        more = "can fire several pulses of a channel in each half turn" if plan.full else "may reach more"
+        yield f"--scheme optimal was not compared; it {more}."
 
 
 def _unplanned(compared: Comparison) -> str:

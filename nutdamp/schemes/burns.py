@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes.program import Burn, Program, Solution
 from nutdamp.schemes.windows import SLACK, Windows
@@ -54,8 +56,23 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
 def repaired(program: Program, solution: Solution) -> Solution:
     """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden.
 
+    Where that leaves too little, burns longer than their channel may be on become several side by side.
     Raises Unrepairable.
     """
+    allowed = program.forbidden.copy()
+    try:
+        return _repaired(program, solution)
+    except Unrepairable:
+        program.forbidden = allowed
+        if not _divide(program, solution.burns):
+            raise
+    return _repaired(program, program.solve())
+
+
+def _repaired(program: Program, solution: Solution) -> Solution:
+    """The solution with what breaks a limit moved to other slots. Raises Unrepairable."""
+    if solution.unmet > UNMET:
+        raise Unrepairable
     for _ in range(REPAIRS):
         broken = next(_broken(program, solution.burns), None)
         if broken is None:
@@ -68,12 +85,43 @@ def repaired(program: Program, solution: Solution) -> Solution:
     raise Unrepairable
 
 
+def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
+    """Forbid slots at regular distances about too long burns, so that no burn can be too long; whether there are any.
+
+    Between two pulses the thruster is off for the gap, and no shorter than its shortest pulse: valves take their time.
+    """
+    every = np.arange(len(program.centres))
+    divided = False
+    for row, channel in enumerate(program.channels):
+        long = sorted((one for one in burns if one.channel is channel and _too_long(one)), key=lambda one: one.t)
+        window = math.floor(channel.max_on_time / program.width + SLACK) if long else 0
+        if window == 0:
+            continue
+        divided = True
+        pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - SLACK), 1)
+        middles = np.searchsorted(program.centres, [one.t for one in long])
+        nearest = np.searchsorted(0.5 * (middles[1:] + middles[:-1]), every)
+        pieces = np.array([math.ceil(one.on_time / (window * program.width)) for one in long])
+        # The first of the pieces begins so that all of them are centred on the burn.
+        first = middles - (pieces * (window + pause) - pause) // 2
+        within = (every - first[nearest]) % (window + pause)
+        program.forbidden[row, within >= window] = True
+        ends = np.flatnonzero(np.diff(nearest))
+        for back in range(pause):  # windows of neighbouring patterns do not join
+            program.forbidden[row, ends - back] = True
+    return divided
+
+
+def _too_long(burn: Burn) -> bool:
+    return burn.on_time > burn.channel.max_on_time + SLACK
+
+
 def _broken(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
     """What to forbid: ends of too long burns, too short ones, the less of two too near, the least if too many."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
-        if burn.on_time > longest + SLACK:
+        if _too_long(burn):
             reach = burn.on_time + width
             yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
             yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
