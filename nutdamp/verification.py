@@ -26,6 +26,10 @@ AGREE = 1e-9
 """rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
 
 
+WITHOUT = "without "
+"""How the rows of the budget begin that leave out what plans reckon with."""
+
+
 @dataclass(frozen=True, slots=True)
 class Method:
     """One way to fly the schedule: its residual (rad), or why it could not be flown.
@@ -57,11 +61,12 @@ class Method:
 
 @dataclass(frozen=True, slots=True)
 class Imperfection:
-    """Residual (rad) with one imperfection alone, everything else ideal."""
+    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans reckon with."""
 
     name: str
     nutation: float
     momentum_shift: float
+    axis_error: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +101,13 @@ class Verification:
         return [method for method in self.methods if method.outside and not method.missing]
 
 
-def verify(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None) -> Verification:
+def verify(
+    spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None, *, expected: bool = False
+) -> Verification:
     """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
 
-    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one.
+    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one; ``expected``: it was
+    planned on the motion with the disturbances.
     """
     end = schedule.end + spacecraft.inertial_period
     judge = flight.flown(spacecraft, schedule, end)
@@ -112,7 +120,9 @@ def verify(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | Non
         _by_basilisk(spacecraft, schedule, end),
     )
     momentum_drift, energy_drift = _conserved(judge)
-    return Verification(methods, momentum_drift, energy_drift, _budget(spacecraft, schedule, unrounded))
+    return Verification(
+        methods, momentum_drift, energy_drift, _budget(spacecraft, schedule, unrounded, expected=expected)
+    )
 
 
 def _motion(flown: Flight, times: Vector) -> tuple[Vector, Vector]:
@@ -313,45 +323,48 @@ def _conserved(flown: Flight) -> tuple[float, float]:
     return worst[0], worst[1]
 
 
-def _budget(spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None) -> tuple[Imperfection, ...]:
-    """Residual of the ideal flight, with each imperfection alone, and with all of them."""
+def _budget(
+    spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
+) -> tuple[Imperfection, ...]:
+    """Residual of the ideal flight, with each imperfection alone, with all of them; and without what plans reckon with.
+
+    Plans reckon with the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
+    with disturbances: these are part of the ideal flight, so that it leaves little.
+    """
     exact = schedule if unrounded is None else unrounded
     inertia = spacecraft.inertia
-    ideal = replace(
-        spacecraft,
-        inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)),
-        disturbances=(),
-        dissipation=None,
-    )
-    sharp = _sharp(ideal, exact, axial=False)
-    rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, _transverse(exact))]
-    if any(pulse.impulse[2] != 0.0 for pulse in exact):
-        rows.append(("axial torque", ideal, _sharp(ideal, exact, axial=True)))
-    if not inertia.symmetric:
-        rows.append(("I1 ≠ I2", replace(ideal, inertia=inertia), sharp))
+    ideal = spacecraft if expected else replace(spacecraft, disturbances=())
+    sharp = _sharp(ideal, exact)
+    rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, exact)]
     if spacecraft.limits.tick is not None:
         rounded = Schedule(tuple(trim.commandable(spacecraft, pulse) for pulse in exact))
-        rows.append(("command resolution", ideal, _sharp(ideal, rounded, axial=False)))
-    if spacecraft.growth != 0.0:
-        rows.append(("energy dissipation", replace(ideal, dissipation=spacecraft.dissipation), sharp))
-    if spacecraft.disturbances:
-        rows.append(("disturbances", replace(ideal, disturbances=spacecraft.disturbances), sharp))
+        rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
+    if spacecraft.disturbances and not expected:
+        rows.append(("disturbances", spacecraft, sharp))
     rows.append(("all: as flown", spacecraft, schedule))
+    if any(pulse.impulse[2] != 0.0 for pulse in exact):
+        rows.append((f"{WITHOUT}axial torque", ideal, _sharp(ideal, _transverse(exact))))
+    if not inertia.symmetric:
+        mean = replace(inertia, moments=(inertia.A, inertia.A, inertia.C))
+        rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
+    if spacecraft.growth != 0.0:
+        rows.append((f"{WITHOUT}dissipation", replace(ideal, dissipation=None), sharp))
+    if spacecraft.disturbances and expected:
+        rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
     return tuple(
-        Imperfection(name, left.nutation, left.momentum_shift)
+        Imperfection(name, left.nutation, left.momentum_shift, left.axis_error)
         for name, body, pulses in rows
         for left in (flight.flown(body, pulses).residual,)
     )
 
 
-def _sharp(spacecraft: Spacecraft, schedule: Schedule, *, axial: bool) -> Schedule:
+def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Every pulse as an ideal impulse at its centre, as strong as it acts on ω."""
-    flat = schedule if axial else _transverse(schedule)
-    effective = flight.effective_impulses(spacecraft, flat)
+    effective = flight.effective_impulses(spacecraft, schedule)
     return Schedule(
         tuple(
             Pulse(pulse.t, 0.0, pulse.channel, np.array([impulse.real, impulse.imag, pulse.impulse[2]]))
-            for pulse, impulse in zip(flat, effective, strict=True)
+            for pulse, impulse in zip(schedule, effective, strict=True)
         )
     )
 

@@ -63,7 +63,8 @@ def command(
 
     plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
     with working("verifying", quiet=quiet):
-        found = verify(body, plan.pulses, None if schedule else unrounded(plan))
+        smooth = None if schedule else unrounded(plan)
+        found = verify(body, plan.pulses, smooth, expected=options.with_disturbances)
     outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.output import json_text

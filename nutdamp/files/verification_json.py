@@ -41,6 +41,7 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
                 "imperfection": row.name,
                 "nutation_deg": math.degrees(row.nutation),
                 "momentum_shift_deg": math.degrees(row.momentum_shift),
+                "axis_error_deg": math.degrees(row.axis_error),
             }
             for row in found.budget
         ],

@@ -10,7 +10,7 @@ from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header
 from nutdamp.report.text import MISSING, degrees
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.verification import AGREE, Verification
+from nutdamp.verification import AGREE, WITHOUT, Verification
 
 
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
@@ -29,7 +29,8 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
         Text(),
         Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
         Text(),
-        budget_table(found),
+        budget_table(spacecraft, found),
+        *[Text(note, style="dim") for note in (budget_note(found),) if note],
     )
 
 
@@ -73,10 +74,20 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-def budget_table(found: Verification) -> Table:
-    """One row an imperfection: what it leaves, alone."""
-    table = columns("imperfection\n", "nutation left\ndeg", "shift of H\ndeg")
+def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
+    """One row an imperfection: what it leaves, alone; then what is left without something that plans reckon with."""
+    aimed = spacecraft.goal.axis is not None
+    table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
     for row in found.budget:
-        angles = (row.nutation, row.momentum_shift)
+        angles = (row.nutation, row.axis_error)
         table.add_row(row.name, *(degrees(angle).removesuffix(" deg") for angle in angles))
     return table
+
+
+def budget_note(found: Verification) -> str:
+    """Why leaving something out leaves more, in a sentence; empty where nothing is left out."""
+    names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
+    if not names:
+        return ""
+    subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    return f"Plans reckon with {subject}; a row 'without' shows what the same pulses leave in a body that lacks it."

@@ -29,7 +29,7 @@ from nutdamp.report.page.document import (
 from nutdamp.report.page.pictures import dispersion_picture_of, pictures_of
 from nutdamp.report.page.sheets import comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.report.text import degrees, mass, moment, quantity
-from nutdamp.report.verify_tables import budget_table, conservation, methods_table, verdict
+from nutdamp.report.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 
@@ -159,10 +159,14 @@ def _schedule(chosen: Plan) -> Section:
 
 
 def _budget(chosen: Plan) -> Section:
-    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen))
+    expected = chosen.options.with_disturbances
+    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     blocks: list[Block] = [
-        sheet_of("What each imperfection alone leaves, everything else ideal", budget_table(verified)),
+        sheet_of(
+            "What each imperfection alone leaves, everything else ideal", budget_table(chosen.spacecraft, verified)
+        ),
+        *[Prose(note) for note in (budget_note(verified),) if note],
         sheet_of("The schedule flown by independent means", methods_table(verified)),
         Prose(f"{verdict(verified)} {conservation(chosen.spacecraft, verified)}"),
     ]
