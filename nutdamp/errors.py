@@ -34,9 +34,13 @@ class Fault(NamedTuple):
     problem: str
 
     def __str__(self) -> str:
+        return f"{self.place}: {self.where}: {self.problem}" if self.where else f"{self.place}: {self.problem}"
+
+    @property
+    def place(self) -> str:
+        """``FILE:LINE:COLUMN``; what has no line is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
         file = printable(self.file)
-        place = f"{file}:{self.line}:{self.column}" if self.line else file
-        return f"{place}: {self.where}: {self.problem}" if self.where else f"{place}: {self.problem}"
+        return f"{file}:{self.line}:{self.column}" if self.line else file
 
     @property
     def as_warning(self) -> str:

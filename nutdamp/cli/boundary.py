@@ -40,7 +40,7 @@ def run(group: click.Group) -> None:
     except click.ClickException as wrong:
         message = io.StringIO()
         wrong.show(file=message)
-        say(message.getvalue().rstrip("\n"))
+        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as what steers a terminal
         status = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")

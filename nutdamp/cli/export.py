@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 
 import click
@@ -25,15 +26,14 @@ from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
 from nutdamp.schemes import NAMES, Options
 
 
-@click.command("export")
+@click.command("export", context_settings={"allow_extra_args": True})
 @spacecraft_argument
 @click.option(
     "--format",
     "form",
     type=click.Choice(FORMATS),
-    required=True,
-    help="apm: state and pulses (CCSDS); aem: attitude history (CCSDS); stk: the same as .a; basilisk: a script that "
-    "flies the schedule; json: as `plan --json`.",
+    help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS); stk: the same as .a; basilisk: a "
+    "script that flies the schedule; json: as `plan --json`.",
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
@@ -42,9 +42,11 @@ from nutdamp.schemes import NAMES, Options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
 @quiet_option
+@click.pass_context
 def command(
+    ctx: click.Context,
     spacecraft: Input,
-    form: str,
+    form: str | None,
     xml: bool,
     scheme: str | None,
     schedule: str | None,
@@ -59,6 +61,7 @@ def command(
     apm, aem and stk need attitude.epoch and attitude.frame in the spacecraft file. Vectors are in the axes of that
     file.
     """
+    form = _format(form, spacecraft, ctx.args)
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to export: either --scheme or --schedule")
     if until is not None and until <= 0.0:
@@ -75,3 +78,17 @@ def command(
     if plan.meets_requirement is False and scheme != "none":
         remark(f"{plan.scheme} does not meet the requirement")
         sys.exit(REQUIREMENT_MISSED)
+
+
+def _format(form: str | None, spacecraft: Input, more: list[str]) -> str:
+    """The format named; a usage error that shows how to name it, also where it was given as if it were a file."""
+    words = [word for word in (spacecraft.path, *more) if word is not None]
+    meant = next((word.lower() for word in words if word.lower() in FORMATS), None)
+    if more and (meant is None or form is not None):
+        raise click.UsageError(f"got unexpected extra argument{'s' * (len(more) > 1)} ({' '.join(more)})")
+    if form is not None:
+        return form
+    if meant is None:
+        raise click.UsageError(f"name the format: --format {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+    named = [word for word in words if word.lower() != meant]
+    raise click.UsageError(f"the format is an option: nutdamp export {shlex.join([*named, '--format', meant])}")

@@ -110,6 +110,15 @@ class Direction(ParamType[Angles]):
         return Angles(first, second, tuple(part for part in parts if not part[-1:].isalpha() and part[-1:] != "°"))
 
 
+def is_count(word: str) -> bool:
+    """Whether a word of the command line is a number: one that `Count` takes, or refuses as a number of cases."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 class Count(ParamType[int]):
     """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
 

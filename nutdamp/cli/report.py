@@ -22,10 +22,10 @@ from nutdamp.cli.common import (
     spacecraft_argument,
     tell_unread,
 )
-from nutdamp.cli.disperse import fly
+from nutdamp.cli.disperse import SAMPLES, fly
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Count
+from nutdamp.cli.parameters import FILE, Count, is_count
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
 from nutdamp.schemes import PLANNED, Options
@@ -35,7 +35,21 @@ if TYPE_CHECKING:
     from nutdamp.planning import Plan
 
 
-@click.command("report")
+class Report(click.Command):
+    """``report``, in which ``--disperse`` may stand without a number."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put in `SAMPLES` where no number follows ``--disperse``: what else follows is a file or an option."""
+        given: list[str] = []
+        for index, word in enumerate(args):
+            given.append(word)
+            following = args[index + 1 : index + 2]
+            if word == "--disperse" and "--" not in given and not (following and is_count(following[0])):
+                given[-1] = f"--disperse={SAMPLES}"
+        return super().parse_args(ctx, given)
+
+
+@click.command("report", cls=Report)
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Compare this one only; repeatable.")
 @scheme_options
@@ -47,7 +61,12 @@ if TYPE_CHECKING:
     show_default=True,
     help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",
 )
-@click.option("--disperse", type=Count(), help="Fly the recommended schedule in so many dispersed cases.")
+@click.option(
+    "--disperse",
+    type=Count(),
+    metavar="[N]",
+    help=f"Fly the recommended schedule in N dispersed cases; {SAMPLES} where no number follows.",
+)
 @impulse_options
 @quiet_option
 def command(

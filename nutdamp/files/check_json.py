@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from nutdamp import __version__, survey
-from nutdamp.errors import CannotRead, Fault, FaultyFile
+from nutdamp.errors import CannotRead, Fault, FaultyFile, printable
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.spacecraft import Spacecraft
 
@@ -20,7 +20,10 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
 def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
     """A file that could not be read or says something that cannot be; ``doubts`` are warnings."""
     if isinstance(wrong, CannotRead):
-        faults: list[dict[str, Any]] = [{"line": None, "column": None, "where": "", "problem": wrong.reason}]
+        whole = printable(wrong.path)
+        faults: list[dict[str, Any]] = [
+            {"place": whole, "line": None, "column": None, "where": "", "problem": wrong.reason}
+        ]
     else:
         faults = _faults_json(wrong.faults)
     return {
@@ -35,8 +38,16 @@ def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterab
 
 
 def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+    """Each with its ``place`` as messages have it; line and column are null where that is no place in a file."""
     return [
-        {"line": fault.line, "column": fault.column, "where": fault.where, "problem": fault.problem} for fault in faults
+        {
+            "place": fault.place,
+            "line": fault.line or None,
+            "column": fault.column or None,
+            "where": fault.where,
+            "problem": fault.problem,
+        }
+        for fault in faults
     ]
 
 

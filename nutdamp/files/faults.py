@@ -5,7 +5,6 @@ One table holds the wording of pydantic's errors.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, get_args, get_origin
@@ -16,7 +15,7 @@ from pydantic_core import ErrorDetails
 from nutdamp.errors import Fault, FaultyFile, in_order
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
-from nutdamp.files.facts import MOMENT, Finding
+from nutdamp.files.facts import MOMENT, Finding, nearest
 from nutdamp.files.fields import section_of
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.plausibility import doubts
@@ -75,7 +74,7 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
         for key in [key for key in node.value if key not in fields]:
             dropped = node.value.pop(key)
             beside = bool(node.keys[key].setting)
-            meant = _meant(key, [field for field in fields if beside or field not in node.value])
+            meant = nearest(key, [field for field in fields if beside or field not in node.value])
             cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
             if meant and meant not in node.value:
                 node.value[meant], node.keys[meant] = dropped, node.keys[key]
@@ -91,13 +90,6 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
             yield Finding((*path, step), f"empty; {cure}")
         below = section_of(annotation) if fields else None
         yield from _spelling(child, below, (*path, step), _holds_names(annotation))
-
-
-def _meant(key: str, fields: list[str]) -> str | None:
-    """The field that a misspelt key or word stands for, whatever its case."""
-    folded = {field.casefold(): field for field in fields}
-    close = difflib.get_close_matches(key.casefold(), folded, n=1, cutoff=0.7)
-    return folded[close[0]] if close else None
 
 
 def _holds_names(annotation: Any) -> bool:
@@ -140,7 +132,7 @@ def _count(details: ErrorDetails) -> str:
 
 def _choice(details: ErrorDetails) -> str:
     expected, given = details["ctx"]["expected"], details["input"]
-    meant = _meant(given, re.findall("'([^']*)'", expected)) if isinstance(given, str) else None
+    meant = nearest(given, re.findall("'([^']*)'", expected)) if isinstance(given, str) else None
     return _stands(details, expected) + (f"; did you mean {shown(meant)}?" if meant else "")
 
 

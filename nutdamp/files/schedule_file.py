@@ -18,6 +18,7 @@ import numpy as np
 
 from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.facts import nearest
 from nutdamp.files.input import read_utf8
 from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, overlapping
@@ -82,11 +83,11 @@ class _Reader:
         if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
             raise FaultyFile([Fault(self.name, 1, 1, "", "columns are separated by commas, not by semicolons or tabs")])
         if not set(STARTS) & set(self.header):
-            self._fault(1, STARTS[0], f"the column is missing (or {STARTS[1]}, the centre of each pulse)")
+            self._fault(1, STARTS[0], f"the column is missing (or {STARTS[1]}, the centre){self._misspelt(STARTS[0])}")
         bare = not {*TORQUE, *IMPULSE} & set(self.header)  # else a pulse without channel is one of the torquer
         for column in ("on_time_s", "channel") if bare else ("on_time_s",):
             if column not in self.header:
-                self._fault(1, column, "the column is missing")
+                self._fault(1, column, f"the column is missing{self._misspelt(column)}")
         for column in {entry for entry in self.header if self.header.count(entry) > 1}:
             self._fault(1, column, "the column stands twice")
         if self.faults:
@@ -94,6 +95,24 @@ class _Reader:
         for column in self.header:
             if column not in HEADER and column != UTC:
                 self._warn(1, column, f"the column {shown(column)} is not known: ignored")
+
+    def _misspelt(self, column: str) -> str:
+        """The column of the header that may be meant to be a missing one, in words."""
+        found = nearest(column, [entry for entry in self.header if entry not in HEADER])
+        return "" if found is None else f"; rename {shown(found)} if that is meant"
+
+    def _instead(self, name: str) -> str:
+        """The channel that a name not in the file may stand for, or all there are."""
+        found = nearest(name, list(self.channels))
+        return f"it has {', '.join(map(shown, self.channels))}" if found is None else f"did you mean {shown(found)}?"
+
+    def _on_times(self, cells: Cells) -> str:
+        """The on-times that the channel of a row can have, in words."""
+        channel = self.channels.get(cells.get("channel", ""))
+        if channel is None or channel.max_on_time == math.inf:
+            least = 0.0 if channel is None else channel.min_on_time
+            return f"{least:g} s or more is expected (0 for an ideal impulse)"
+        return f"{channel.min_on_time:g} s to {channel.max_on_time:g} s is expected (0 for an ideal impulse)"
 
     def _pulse(self, line: int, row: list[str]) -> Pulse | None:
         """The pulse of one row; None where it has faults."""
@@ -124,11 +143,11 @@ class _Reader:
         if time is None or on_time is None:
             return None
         if on_time < 0.0:
-            self._fault(line, "on_time_s", f"{on_time:g} s is negative; an ideal impulse has 0")
+            self._fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
             return None
         start = time if column == STARTS[0] else time - 0.5 * on_time
         if start < -1e-9:
-            self._fault(line, column, f"the pulse would start at {start:g} s, before t = 0")
+            self._fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
             return None
         t = max(start, 0.0) + 0.5 * on_time if column == STARTS[0] else max(time, 0.5 * on_time)
         if not Pulse(t, on_time, "", np.zeros(3)).resolved:
@@ -175,7 +194,7 @@ class _Reader:
         columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
         if channel is not None:
             return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
-        known = f" (it has {', '.join(map(shown, self.channels))})" if self.channels else ""
+        known = f" ({self._instead(name)})" if self.channels else ""
         kind = "a steered pulse" if name == STEERABLE else f"{shown(name)}, not in the spacecraft file{known},"
         return f"{kind} needs {columns}"
 
@@ -210,7 +229,11 @@ class _Reader:
             self._fault(line, column, f"{shown(cells[column])} is not a number")
             return None
         if not abs(value) <= LARGEST:
-            self._fault(line, column, f"{shown(cells[column])} is not a finite number of sensible size")
+            self._fault(
+                line,
+                column,
+                f"{shown(cells[column])} is out of range, {-LARGEST:g} to {LARGEST:g}",
+            )
             return None
         return value
 

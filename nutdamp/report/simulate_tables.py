@@ -84,7 +84,7 @@ def _extremes(found: Extremes, flight: Flight) -> Table:
     if given is not None:
         frame = given.frame or "the frame of the file"
         west, east = map(longitude, found.right_ascension)
-        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, eastward")
+        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
         table.add_row("declination", _range(found.declination))
     table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
     return table

@@ -205,3 +205,26 @@ def test_import_statuses(run: Run, dated: Path) -> None:
     plan = json.loads(run("plan", "a.yaml", "--scheme", "one-pulse", "--json", "-").stdout)
     assert plan["spacecraft"]["nutation_deg"] == pytest.approx(5.0, rel=1e-13)
     assert math.isclose(plan["spacecraft"]["A_kgm2"], 120.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("body.yaml", "apm"), "the format is an option: nutdamp export body.yaml --format apm"),
+        (("AEM", "my body.yaml"), "the format is an option: nutdamp export 'my body.yaml' --format aem"),
+        (("stk",), "the format is an option: nutdamp export --format stk"),
+        ((), "name the format: --format apm, aem, stk, basilisk or json"),
+        (("body.yaml", "other.yaml"), "got unexpected extra argument (other.yaml)"),
+        (("body.yaml", "--format", "apm", "x", "y"), "got unexpected extra arguments (x y)"),
+    ],
+)
+def test_a_format_without_its_option_says_how_to_name_it(run: Run, words: tuple[str, ...], said: str) -> None:
+    done = run("export", *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[-1] == f"Error: {said}"
+
+
+def test_messages_of_the_command_line_hold_no_escaped_tabs(run: Run) -> None:
+    done = run("import")
+    assert done.returncode == 2
+    assert "\\t" not in done.stderr

@@ -172,3 +172,38 @@ def test_what_the_browser_prints_is_the_file(monkeypatch: pytest.MonkeyPatch, tm
     copy = "for word; do case $word in --print-to-pdf=*) out=${word#*=};; file://*) page=${word#file://};; esac; done"
     monkeypatch.setenv(pdf.VARIABLE, printer(tmp_path, f'{copy}; cp "$page" "$out"'))
     assert pdf.printed("<p>ω", "report.pdf") == "<p>ω".encode()
+
+
+@pytest.mark.parametrize(
+    ("words", "cases"),
+    [
+        (("--disperse",), "20,000"),
+        (("--disperse", "-o", "page.md"), "20,000"),
+        (("--disperse", "spacecraft.yaml"), "20,000"),
+        (("spacecraft.yaml", "--disperse", "300"), "300"),
+        (("--disperse=3e2", "spacecraft.yaml"), "300"),
+        (("--disperse", "300", "spacecraft.yaml"), "300"),
+    ],
+)
+def test_the_number_of_dispersed_cases_may_be_left_out(
+    run: Run, tmp_path: Path, words: tuple[str, ...], cases: str
+) -> None:
+    assert run("init").returncode == 0
+    done = run("report", "--scheme", "two-pulse", *words, *(() if "-o" in words else ("-o", "page.md")))
+    assert done.returncode == 4, done.stderr
+    assert f"Requirement with dispersions ({cases} cases)" in (tmp_path / "page.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("number", ["0", "-3", "nan", "1.5"])
+def test_a_number_that_counts_no_cases_is_refused(run: Run, number: str) -> None:
+    done = run("report", "--disperse", number, "-o", "page.md")
+    assert done.returncode == 2
+    assert "not a number of cases" in done.stderr
+
+
+def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
+    assert run("report", "--scheme", "half-cone", "--target", "10deg,45deg", "-o", "page.md").returncode == 0
+    page = (tmp_path / "page.md").read_text("utf-8")
+    assert "off the target: **10 deg → &lt; 1e-9 deg**" in page
+    assert "shift of H: **" not in page
+    assert page.count("| off the target") >= 1

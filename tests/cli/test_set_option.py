@@ -45,7 +45,8 @@ def test_all_files_of_a_check_are_set(run: Run, tmp_path: Path) -> None:
     assert done.stdout.count("31 rpm") == 2
     done = run("check", "a.yaml", "--set", "mass=0", "--json", "-")
     (fault,) = json.loads(done.stdout)["files"][0]["faults"]
-    assert (fault["line"], fault["where"]) == (0, "mass")
+    assert (fault["line"], fault["column"], fault["where"]) == (None, None, "mass")
+    assert fault["place"].startswith("--set mass=")
 
 
 def test_what_is_no_setting_is_a_usage_error(run: Run) -> None:

@@ -76,8 +76,8 @@ def test_the_shortest_schedule_has_three_kinds_of_columns(run: Run, tmp_path: Pa
         ("t_s,on_time_s\n1,2\n", "channel: the column is missing"),
         ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,a,0,0\n", ":2:1: impulse_1_Nms: 'a' is not a"),
         ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,-1,1,0,0\n", "negative"),
-        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,4,1,0,0\n", "before t = 0"),
-        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\nnan,0,1,0,0\n", "finite"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,4,1,0,0\n", "0 s or later is expected"),
+        ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\nnan,0,1,0,0\n", "out of range"),
         ("t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,1\n", "3 values under 5 columns"),
         ("t_s,t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,1,0,1,0,0\n", "twice"),
         (

@@ -235,3 +235,23 @@ def test_a_schedule_that_is_no_schedule_by_its_size_is_refused(tmp_path: Path, m
     monkeypatch.setattr(schedule_file, "MOST_PULSES", 3)
     rows = "".join(f"{start},0.5,+M1\n" for start in range(4))
     assert problems(f"start_s,on_time_s,channel\n{rows}", tmp_path) == ["5: : more than 3 pulses"]
+
+
+def test_faults_say_what_would_be_right(tmp_path: Path) -> None:
+    header = "start_s,on_time_s,channel\n"
+    assert problems(f"{header}1,0.5,+m1\n", tmp_path)[0].startswith(
+        "2: channel: '+m1', not in the spacecraft file (did you mean '+M1'?), needs"
+    )
+    assert "(it has '+M1', '-M1', '+M2', '-M2')" in problems(f"{header}1,0.5,engine\n", tmp_path)[0]
+    assert problems(f"{header}1,-1,+M1\n-2,0.5,+M1\n1e16,1,+M1\n", tmp_path) == [
+        "2: on_time_s: -1 s is negative; 0.02 s to 2 s is expected (0 for an ideal impulse)",
+        "3: start_s: the pulse would start at -2 s; 0 s or later is expected",
+        "4: start_s: '1e16' is out of range, -1e+15 to 1e+15",
+    ]
+    assert problems("start_s,on_time,chanel\n", tmp_path) == [
+        "1: on_time_s: the column is missing; rename 'on_time' if that is meant",
+        "1: channel: the column is missing; rename 'chanel' if that is meant",
+    ]
+    assert problems("start,on_time_s,channel\n", tmp_path) == [
+        "1: start_s: the column is missing (or t_s, the centre); rename 'start' if that is meant"
+    ]
