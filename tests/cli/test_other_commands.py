@@ -39,7 +39,7 @@ def test_init_writes_a_file_that_plans(run: Run, tmp_path: Path) -> None:
 def test_check_prints_derived_quantities(run: Run) -> None:
     done = run("check")
     assert done.returncode == 0
-    for text in ("a = 0.3333", "nutation period", "smallest step", "deg apart about axis 3", "Nearest of the channels"):
+    for text in ("a = 0.3333", "nutation period", "smallest step", "deg apart about axis 3", "come nearest to that"):
         assert text in done.stdout
 
 
