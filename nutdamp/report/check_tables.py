@@ -98,9 +98,9 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
     pair = survey.nearest_pair(spacecraft)
     if pair is not None:
         lines.append(
-            f"Of the channels {pair.first.name} then {pair.second.name} come nearest to that half a nutation turn apart: "
-            f"the second is {abs(math.degrees(pair.miss)):.2f} deg off. `plan` may wait longer or shorter, and the second "
-            "is then off by another angle."
+            f"Of the channels {pair.first.name} then {pair.second.name} come nearest to that half a nutation turn "
+            f"apart: the second is {abs(math.degrees(pair.miss)):.2f} deg off. `plan` may wait longer or shorter, and "
+            "the second is then off by another angle."
         )
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
