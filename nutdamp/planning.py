@@ -179,8 +179,17 @@ class Plan:
     @property
     def binding(self) -> tuple[str, ...]:
         """Keys of the file that name the limits which end what the schedule does, as far as that can be seen."""
+        limits = self.spacecraft.limits
         found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
-        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(self.spacecraft.limits.blackout)
+        if not any(found.values()):
+            found |= {"min_on_time": self.shortest, "limits.tick": limits.tick is not None}
+        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(limits.blackout)
+
+    @property
+    def shortest(self) -> bool:
+        """Whether a pulse is no longer than its channel has to be on."""
+        least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
+        return any(0.0 < one.on_time <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
 
     @property
     def full(self) -> bool:
@@ -215,7 +224,7 @@ class Plan:
             Obstacle.MAX_PULSES: f"limits.max_pulses = {self.spacecraft.limits.max_pulses} ends it",
             Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
             Obstacle.LIMITS: f"{self.scheme} is held by {' and '.join(self.binding)}",
-            Obstacle.SCHEME: f"{self.scheme} takes out no more",
+            Obstacle.SCHEME: f"with these channels {self.scheme} takes out no more",
         }[self.obstacle]
         return (f"{_degrees(left)} of nutation remain: {reason}",)
 

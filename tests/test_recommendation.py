@@ -284,6 +284,28 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in made.remarks)
 
 
+def test_pulses_that_may_not_be_shorter_are_named() -> None:
+    body = spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4))
+    compared = compare(body, ("two-pulse",))
+    (made,) = compared.plans
+    assert made.binding == ("min_on_time",)
+    assert any("two-pulse is held by min_on_time" in remark for remark in made.remarks)
+    assert "and min_on_time allows no shorter ones; damping takes 21 N m s." in verdicts.warnings(compared)[0]
+
+
+def test_where_nothing_is_feasible_what_was_not_compared_is_named() -> None:
+    body = spinner(channels=cross(8.0), limits=Limits(horizon=0.01))
+    assert verdicts.reason(compare(body, schemes.CLASSIC)).endswith("feasible; --scheme optimal was not compared")
+    assert verdicts.reason(compare(body, ("optimal",))) == "no scheme is feasible"
+    assert verdicts.reason(compare(replace(body, goal=Goal(spin=3.1)), schemes.CLASSIC)) == "no scheme is feasible"
+
+
+def test_three_things_required_are_listed_as_in_a_sentence() -> None:
+    body = replace(spinner(requirement=BOTH), goal=Goal(spin=3.0))
+    listed = "nutation within 0.5 deg, shift of H within 0.2 deg and spin within 0.1 % of 28.648 rpm"
+    assert verdicts.required(body) == listed
+
+
 def test_what_binds_is_named_and_nothing_else() -> None:
     """A file without on-times and blackout windows: neither can be what stands in the way."""
     single = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0))

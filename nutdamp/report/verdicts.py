@@ -56,7 +56,8 @@ def reason(compared: Comparison) -> str:
     """Why the recommended plan, or none."""
     found, body = compared.recommendation, compared.spacecraft
     if found.plan is None:
-        return "no scheme is feasible"
+        untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
+        return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}"
     if found.ground is Ground.ONLY:
         return _only(compared)
     cost = "propellant" if found.by_propellant else "impulse"
@@ -172,9 +173,14 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
         }.get(plan.obstacle, _spent(plan))
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
-    if "optimal" not in {one.scheme for one in compared.plans} and body.channels and parts != {Part.SPIN}:
+    if _optimal_untried(compared) and parts != {Part.SPIN}:
         more = "can fire several pulses of a channel in each half turn" if plan.full else "may reach more"
         yield f"--scheme optimal was not compared; it {more}."
+
+
+def _optimal_untried(compared: Comparison) -> bool:
+    """Whether there are channels for it, and it was not compared."""
+    return bool(compared.spacecraft.channels) and "optimal" not in {one.scheme for one in compared.plans}
 
 
 def _unplanned(compared: Comparison) -> str:
@@ -195,10 +201,13 @@ def _spent(plan: Plan) -> str:
     body, pulses = plan.spacecraft, plan.pulses
     count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
     width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.full else ""
+    if plan.shortest:
+        width = ", and min_on_time allows no shorter ones"
+    last = "The last one" if len(pulses) != 1 else "It"
     blackout = ", with blackout windows" if body.limits.blackout else ""
     return (
         f"Its {count} {quantity(pulses.total_impulse, 'N m s')}{width}; damping takes "
-        f"{quantity(body.least_impulse, 'N m s')}. The last one ends at {moment(pulses.end)} of a horizon of "
+        f"{quantity(body.least_impulse, 'N m s')}. {last} ends at {moment(pulses.end)} of a horizon of "
         f"{duration(body.horizon)}{blackout}."
     )
 
@@ -295,7 +304,7 @@ def required(spacecraft: Spacecraft) -> str:
             texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
         else:
             texts.append(f"{PARTS[bound.part]} within {degrees(bound.most)}")
-    return " and ".join(texts)
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 2 else texts)
 
 
 def cases_verdict(share: float, probability: float) -> str:
