@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import cached_property
 
 from nutdamp import compliance, flight, schemes
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
+from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule, touching
-from nutdamp.schemes.model import steady_omega
 from nutdamp.spacecraft import Spacecraft, Vector
 
 NO_NUTATION = 1e-12
@@ -26,17 +25,6 @@ TELLING = math.radians(1e-6)
 
 BUG = "internal error, please report"
 """Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
-
-
-class Obstacle(Enum):
-    """What keeps a plan from leaving less nutation."""
-
-    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
-    STEADY_TILT = "disturbances, under which a tilt stays"
-    MAX_PULSES = "limits.max_pulses"
-    RESOLUTION = "limits.tick, or the shortest pulse"
-    LIMITS = "limits of the file that bind"
-    SCHEME = "the scheme"
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,69 +151,25 @@ class Plan:
         return ("; ".join(told),) if len(told) > 1 else ()
 
     @property
-    def obstacle(self) -> Obstacle:
+    def hindrance(self) -> Hindrance:
         """What keeps the plan from leaving less nutation."""
-        body, limits = self.spacecraft, self.spacecraft.limits
-        if self.full and self.to_the_end:
-            return Obstacle.LIMITS
-        if body.disturbances:
-            return Obstacle.STEADY_TILT if self.options.with_disturbances else Obstacle.UNPLANNED_DISTURBANCES
-        if len(self.pulses) == limits.max_pulses:
-            return Obstacle.MAX_PULSES
-        if limits.tick is not None and self.flight.residual.nutation < 0.1 * body.nutation:
-            return Obstacle.RESOLUTION
-        return Obstacle.LIMITS if self.binding else Obstacle.SCHEME
-
-    @property
-    def binding(self) -> tuple[str, ...]:
-        """Keys of the file that name the limits which end what the schedule does, as far as that can be seen."""
-        limits = self.spacecraft.limits
-        found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
-        if not any(found.values()):
-            found |= {"min_on_time": self.shortest, "limits.tick": limits.tick is not None}
-        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(limits.blackout)
-
-    @property
-    def shortest(self) -> bool:
-        """Whether a pulse is no longer than its channel has to be on."""
-        least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
-        return any(0.0 < one.on_time <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
-
-    @property
-    def full(self) -> bool:
-        """Whether every pulse is as long as its channel may be on; never where nothing says how long that is."""
-        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
-        most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
-        return bool(most) and all(
-            one.on_time >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
-        )
-
-    @property
-    def to_the_end(self) -> bool:
-        """Whether less than one nutation period is left of the horizon after the last pulse."""
-        body = self.spacecraft
-        period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
-        return body.horizon - self.pulses.end < period
-
-    @property
-    def steady_tilt(self) -> float:
-        """Angle in rad at which the disturbances hold the body once the pulses are over."""
-        inertia, spin = self.spacecraft.inertia, self.spacecraft.spin
-        return math.atan(inertia.A * abs(steady_omega(self.spacecraft, self.pulses.end)) / (inertia.C * abs(spin)))
+        left = self.flight.residual.nutation
+        return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
 
     def _remainder(self) -> tuple[str, ...]:
         """Why nutation is left."""
         left = self.flight.residual.nutation
         if left < TELLING or self.options.coarse or self.options.literal:
             return ()
+        found = self.hindrance
         reason = {
             Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
-            Obstacle.STEADY_TILT: f"{math.degrees(self.steady_tilt):.3g}° is the steady tilt under the disturbances",
+            Obstacle.STEADY_TILT: f"{math.degrees(found.steady_tilt):.3g}° is the steady tilt under the disturbances",
             Obstacle.MAX_PULSES: f"limits.max_pulses = {self.spacecraft.limits.max_pulses} ends it",
             Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
-            Obstacle.LIMITS: f"{self.scheme} is held by {' and '.join(self.binding)}",
+            Obstacle.LIMITS: f"{self.scheme} is held by {' and '.join(found.binding)}",
             Obstacle.SCHEME: f"with these channels {self.scheme} takes out no more",
-        }[self.obstacle]
+        }[found.obstacle]
         return (f"{_degrees(left)} of nutation remain: {reason}",)
 
     def _asymmetry(self) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from cases_dir import case
 from nutdamp import compliance, flight, planning, schemes
 from nutdamp.compliance import Part
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import Comparison, Obstacle, Plan, compare
+from nutdamp.hindrance import Obstacle
+from nutdamp.planning import Comparison, Plan, compare
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.report import verdicts
 from nutdamp.schedule import Schedule
@@ -273,14 +274,14 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     compared = compare(weak, ("four-pulse",))
     (text,) = verdicts.warnings(compared)
     made = compared.plans[0]
-    assert made.obstacle is Obstacle.LIMITS
+    assert made.hindrance.obstacle is Obstacle.LIMITS
     assert text.startswith("four-pulse does not damp the nutation. It leaves ")
     assert "(0.05 deg would count as damped)" in text
     given = made.pulses.total_impulse
     assert f"Its {len(made.pulses)} pulses give {given:.4g} N m s, each as long as max_on_time allows; " in text
     assert "damping takes 21 N m s" in text
     assert f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s." in text
-    assert made.binding == ("max_on_time", "limits.horizon")
+    assert made.hindrance.binding == ("max_on_time", "limits.horizon")
     assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in made.remarks)
 
 
@@ -288,7 +289,7 @@ def test_pulses_that_may_not_be_shorter_are_named() -> None:
     body = spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4))
     compared = compare(body, ("two-pulse",))
     (made,) = compared.plans
-    assert made.binding == ("min_on_time",)
+    assert made.hindrance.binding == ("min_on_time",)
     assert any("two-pulse is held by min_on_time" in remark for remark in made.remarks)
     assert "and min_on_time allows no shorter ones; damping takes 21 N m s." in verdicts.warnings(compared)[0]
 
@@ -310,10 +311,10 @@ def test_what_binds_is_named_and_nothing_else() -> None:
     """A file without on-times and blackout windows: neither can be what stands in the way."""
     single = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0))
     made = planning.plan(single, "one-pulse")
-    assert made.obstacle is Obstacle.SCHEME or made.binding == ("limits.horizon",)
+    assert made.hindrance.obstacle is Obstacle.SCHEME or made.hindrance.binding == ("limits.horizon",)
     assert not any("max_on_time" in remark or "blackout" in remark for remark in made.remarks)
     dark = replace(single, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),)))
-    assert "limits.blackout" in planning.plan(dark, "one-pulse").binding
+    assert "limits.blackout" in planning.plan(dark, "one-pulse").hindrance.binding
 
 
 @pytest.mark.parametrize(
@@ -331,7 +332,7 @@ def test_the_warning_names_what_stands_in_the_way(
     body = spinner(channels=cross(8.0, max_on_time=0.6), limits=limits)
     options = schemes.Options(with_disturbances=planned)
     compared = compare(replace(body, disturbances=disturbances), ("four-pulse",), options)
-    assert compared.plans[0].obstacle is obstacle
+    assert compared.plans[0].hindrance.obstacle is obstacle
     assert text in verdicts.warnings(compared)[0]
 
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from nutdamp import compliance, outcome, schemes
 from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
-from nutdamp.planning import Comparison, Obstacle, Plan
+from nutdamp.hindrance import Obstacle
+from nutdamp.planning import Comparison, Plan
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
 from nutdamp.spacecraft import Spacecraft
@@ -165,16 +166,16 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
     parts = {bound.part for bound in plan.shortfalls}
     if body.disturbances and not plan.options.with_disturbances:
         yield _unplanned(compared)
-    if Part.NUTATION in parts and plan.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
+    if Part.NUTATION in parts and plan.hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
         yield {
-            Obstacle.STEADY_TILT: f"Under the disturbances a tilt of {degrees(plan.steady_tilt)} stays.",
+            Obstacle.STEADY_TILT: f"Under the disturbances a tilt of {degrees(plan.hindrance.steady_tilt)} stays.",
             Obstacle.MAX_PULSES: f"limits.max_pulses = {limits.max_pulses} allows no more pulses.",
             Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less.",
-        }.get(plan.obstacle, _spent(plan))
+        }.get(plan.hindrance.obstacle, _spent(plan))
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
     if _optimal_untried(compared) and parts != {Part.SPIN}:
-        more = "can fire several pulses of a channel in each half turn" if plan.full else "may reach more"
+        more = "can fire several pulses of a channel in each half turn" if plan.hindrance.full else "may reach more"
         yield f"--scheme optimal was not compared; it {more}."
 
 
@@ -200,8 +201,8 @@ def _spent(plan: Plan) -> str:
     """How much of what damping takes the pulses give, and what ends them."""
     body, pulses = plan.spacecraft, plan.pulses
     count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
-    width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.full else ""
-    if plan.shortest:
+    width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.hindrance.full else ""
+    if plan.hindrance.shortest:
         width = ", and min_on_time allows no shorter ones"
     last = "The last one" if len(pulses) != 1 else "It"
     blackout = ", with blackout windows" if body.limits.blackout else ""

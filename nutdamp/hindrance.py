@@ -1,0 +1,89 @@
+"""What keeps a schedule from leaving less nutation: disturbances, limits of the file, or the scheme itself.
+
+It gives data; `Plan.remarks` and `nutdamp.report.verdicts` have the words.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from nutdamp.schedule import Schedule
+from nutdamp.schemes.model import steady_omega
+from nutdamp.spacecraft import Spacecraft
+
+RESOLVED = 0.1
+"""Share of the nutation below which what is left may be what the resolution of commands leaves."""
+
+
+class Obstacle(Enum):
+    """What keeps a plan from leaving less nutation."""
+
+    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
+    STEADY_TILT = "disturbances, under which a tilt stays"
+    MAX_PULSES = "limits.max_pulses"
+    RESOLUTION = "limits.tick, or the shortest pulse"
+    LIMITS = "limits of the file that bind"
+    SCHEME = "the scheme"
+
+
+@dataclass(frozen=True, eq=False)
+class Hindrance:
+    """What stands in the way of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
+
+    spacecraft: Spacecraft
+    pulses: Schedule
+    aware: bool
+    nutation: float
+
+    @property
+    def obstacle(self) -> Obstacle:
+        """What counts most."""
+        body, limits = self.spacecraft, self.spacecraft.limits
+        if self.full and self.to_the_end:
+            return Obstacle.LIMITS
+        if body.disturbances:
+            return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
+        if len(self.pulses) == limits.max_pulses:
+            return Obstacle.MAX_PULSES
+        if limits.tick is not None and self.nutation < RESOLVED * body.nutation:
+            return Obstacle.RESOLUTION
+        return Obstacle.LIMITS if self.binding else Obstacle.SCHEME
+
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Keys of the file that name the limits which end what the schedule does, as far as that can be seen."""
+        limits = self.spacecraft.limits
+        found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
+        if not any(found.values()):
+            found |= {"min_on_time": self.shortest, "limits.tick": limits.tick is not None}
+        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(limits.blackout)
+
+    @property
+    def full(self) -> bool:
+        """Whether every pulse is as long as its channel may be on; never where nothing says how long that is."""
+        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
+        most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
+        return bool(most) and all(
+            one.on_time >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
+        )
+
+    @property
+    def shortest(self) -> bool:
+        """Whether a pulse is no longer than its channel has to be on."""
+        least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
+        return any(0.0 < one.on_time <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
+
+    @property
+    def to_the_end(self) -> bool:
+        """Whether less than one nutation period is left of the horizon after the last pulse."""
+        body = self.spacecraft
+        period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
+        return body.horizon - self.pulses.end < period
+
+    @property
+    def steady_tilt(self) -> float:
+        """Angle in rad at which the disturbances hold the body once the pulses are over."""
+        inertia, spin = self.spacecraft.inertia, self.spacecraft.spin
+        return math.atan(inertia.A * abs(steady_omega(self.spacecraft, self.pulses.end)) / (inertia.C * abs(spin)))
