@@ -175,3 +175,10 @@ def test_pulses_after_the_end_are_not_shown(run: Run) -> None:
     screen = run("simulate", "--scheme", "four-pulse", "--until", "2 s", "--flown").stdout
     assert "2 of its 4 pulses begin before 2.000 s, where the track ends" in screen
     assert "3.6667" not in screen
+
+
+def test_a_plan_says_when_its_end_is_not_the_last_word(run: Run) -> None:
+    """Where dissipation or disturbances go on after the last pulse, the time is told for which the end holds."""
+    words = " ".join(run("plan", "--scheme", "four-pulse", "--set", "dissipation={time_constant: 50 s}").stdout.split())
+    assert re.search(r"as the last pulse ends, at [0-9.]+ s; changed further by dissipation", words)
+    assert "changed further" not in run("plan", "--scheme", "four-pulse").stdout

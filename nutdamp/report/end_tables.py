@@ -8,7 +8,7 @@ from rich.table import Table
 
 from nutdamp.flight import Flight
 from nutdamp.report.layout import facts
-from nutdamp.report.text import degrees, longitude, pointing, quantity
+from nutdamp.report.text import degrees, longitude, moment, pointing, quantity
 from nutdamp.spacecraft import Spacecraft, Vector
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
@@ -46,6 +46,10 @@ def end_table(flown: Flight) -> Table:
     if body.goal.axis is not None:
         table.add_row("target", direction_text(body, body.goal.axis))
     table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
+    lasting = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
+    if lasting:
+        end = moment(flown.schedule.end)
+        table.add_row("", f"as the last pulse ends, at {end}; changed further by {' and '.join(lasting)}")
     if body.attitude is None:
         table.add_row("", FRAME_N)
     elif body.attitude.frame is not None:

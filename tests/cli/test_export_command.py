@@ -6,9 +6,11 @@ import csv
 import io
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
+from cases_dir import case
 from process import Run
 
 DATED = """
@@ -228,3 +230,10 @@ def test_messages_of_the_command_line_hold_no_escaped_tabs(run: Run) -> None:
     done = run("import")
     assert done.returncode == 2
     assert "\\t" not in done.stderr
+
+
+def test_angles_that_are_rounding_are_written_as_0(run: Run) -> None:
+    """The spin axis of this file lies on the equator of the frame, and body axis 1 along the node."""
+    done = run("export", str(case("geo-target.yaml")), "--format", "apm", "--scheme", "four-pulse")
+    angles = dict(re.findall(r"^(SPIN_[A-Z]+|NUTATION_PHASE) += (\S+) \[deg\]$", done.stdout, re.MULTILINE))
+    assert (angles["SPIN_ALPHA"], angles["SPIN_DELTA"], angles["SPIN_ANGLE"]) == ("270.0", "0.0", "0.0")

@@ -122,11 +122,11 @@ def _spin(body: Spacecraft) -> Values:
     """
     inertia = body.inertia
     rates, quaternion = inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    axes = attitude.matrix(quaternion)
+    axes = cleaned(attitude.matrix(quaternion))
     right_ascension = math.atan2(axes[1, 2], axes[0, 2])
     declination = math.atan2(axes[2, 2], math.hypot(axes[0, 2], axes[1, 2]))
     # The first axis after the first two turns is the node; the angle from it to body axis 1 is the third.
-    node = np.array([-math.sin(right_ascension), math.cos(right_ascension), 0.0])
+    node = cleaned([-math.sin(right_ascension), math.cos(right_ascension), 0.0])
     momentum = inertia.tensor @ rates
     transverse = math.hypot(momentum[0], momentum[1])
     phase = math.atan2(-momentum[1], momentum[0]) if transverse > 0.0 else 0.0
