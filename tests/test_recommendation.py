@@ -301,6 +301,22 @@ def test_where_nothing_is_feasible_what_was_not_compared_is_named() -> None:
     assert verdicts.reason(compare(replace(body, goal=Goal(spin=3.1)), schemes.CLASSIC)) == "no scheme is feasible"
 
 
+def test_no_limit_is_named_that_the_file_does_not_set() -> None:
+    body = spinner(channels=cross(8.0), limits=Limits(horizon=0.5))
+    assert (planning.plan(body, "two-pulse").why or "").endswith("nutation within the horizon of 0.5 s")
+    bound = replace(
+        body, limits=Limits(horizon=0.5, gap=0.1, blackout=((0.1, 0.2),)), channels=cross(8.0, max_on_time=1.0)
+    )
+    assert (planning.plan(bound, "two-pulse").why or "").endswith(
+        "within the horizon of 0.5 s, on-times, gap and blackout windows"
+    )
+
+
+def test_what_cannot_fire_optimal_either_is_not_sent_there() -> None:
+    axial = spinner(channels=(channel("A", 0.0, 0.0, 8.0),))
+    assert verdicts.reason(compare(axial, schemes.CLASSIC)) == "no scheme is feasible"
+
+
 def test_three_things_required_are_listed_as_in_a_sentence() -> None:
     body = replace(spinner(requirement=BOTH), goal=Goal(spin=3.0))
     listed = "nutation within 0.5 deg, shift of H within 0.2 deg and spin within 0.1 % of 28.648 rpm"
@@ -435,7 +451,7 @@ def test_of_plans_that_leave_nothing_but_rounding_the_cheapest() -> None:
     quiet = judged("quiet", 3e-13, propellant=0.2, asked=tiny)
     assert chosen(quiet, noisy) == "noisy"
     assert recommend([quiet, noisy]).ground is Ground.COST
-    assert said(quiet, noisy).endswith("as others do; of these least propellant")
+    assert said(quiet, noisy).endswith("feasible plans, within 0.001 deg; of these least propellant")
     shifting = Requirement(nutation=math.radians(1e-13), momentum_shift=math.radians(0.1))
     dear = judged("dear", 1e-13, shift=0.3, propellant=0.2, asked=shifting)
     assert chosen(dear, judged("cheap", 0.0, shift=0.3, propellant=0.1, asked=shifting)) == "cheap"

@@ -74,9 +74,9 @@ def reason(compared: Comparison) -> str:
     if found.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
     then = {
-        Ground.COST: f", as others do; of these least {cost}",
-        Ground.SHIFT: f", as others do for the same {cost}; of these least shift of H",
-        Ground.END: f", as others do for the same {cost}; of these it ends first",
+        Ground.COST: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}",
+        Ground.SHIFT: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then least shift of H",
+        Ground.END: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then it ends first",
     }
     return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
 
@@ -180,8 +180,9 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
 
 
 def _optimal_untried(compared: Comparison) -> bool:
-    """Whether there are channels for it, and it was not compared."""
-    return bool(compared.spacecraft.channels) and "optimal" not in {one.scheme for one in compared.plans}
+    """Whether there are channels that it can fire, and it was not compared."""
+    able = any(channel.damps for channel in compared.spacecraft.channels)
+    return able and "optimal" not in {one.scheme for one in compared.plans}
 
 
 def _unplanned(compared: Comparison) -> str:

@@ -26,6 +26,19 @@ def no_channels(spacecraft: Spacecraft) -> str:
     return "the file names no thrusters, and this scheme fires body-fixed ones"
 
 
+def bounded_by(spacecraft: Spacecraft) -> str:
+    """The limits that a schedule of its channels has to keep, by name: the horizon, and those that the file sets."""
+    limits, channels = spacecraft.limits, spacecraft.channels
+    there = {
+        "on-times": any(one.min_on_time > 0.0 or math.isfinite(one.max_on_time) for one in channels),
+        "gap": limits.gap > 0.0,
+        "ticks": limits.tick is not None,
+        "blackout windows": bool(limits.blackout),
+    }
+    names = [f"the horizon of {spacecraft.horizon:.4g} s", *(name for name in there if there[name])]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def no_target() -> str:
     """The scheme only turns the spin axis to a target, and there is none."""
     return "needs a target axis: --target, or goal in the file"

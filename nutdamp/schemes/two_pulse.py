@@ -21,7 +21,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options, trim
-from nutdamp.schemes.advice import FADED, no_channels
+from nutdamp.schemes.advice import FADED, bounded_by, no_channels
 from nutdamp.schemes.journey import tolerable
 from nutdamp.schemes.model import model_of
 from nutdamp.schemes.walk import ALIGNED, Walk
@@ -120,7 +120,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
     if best is None:
         raise Infeasible(
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
-            f"together; horizon ({windows.horizon:.4g} s), gap and blackout windows leave no room for both"
+            f"together; no room for both within {bounded_by(spacecraft)}"
         )
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
@@ -387,7 +387,4 @@ def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         )
     if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
         return f"dissipation takes the nutation out before the channels ({names}) come to oppose it"
-    return (
-        f"no two of the channels ({names}) bring H back and oppose the nutation within the horizon of "
-        f"{spacecraft.horizon:.4g} s, the on-times, gap and blackout windows"
-    )
+    return f"no two of the channels ({names}) bring H back and oppose the nutation within {bounded_by(spacecraft)}"
