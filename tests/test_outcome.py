@@ -173,7 +173,7 @@ def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run) ->
 
 def test_pulses_after_the_end_are_not_shown(run: Run) -> None:
     screen = run("simulate", "--scheme", "four-pulse", "--until", "2 s", "--flown").stdout
-    assert "2 of its 4 pulses begin before 2.000 s, where the track ends" in screen
+    assert "the track ends at 2.000 s, with 2 of 4 pulses begun" in screen
     assert "3.6667" not in screen
 
 

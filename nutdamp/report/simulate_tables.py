@@ -24,8 +24,8 @@ def simulation_screen(
     """
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule) < pulses:
-        begun = f"{len(flight.schedule)} of its {pulses} pulses begin before {moment(found.until)}"
-        parts.append(Text(f"{begun}, where the track ends"))
+        begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
+        parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
     if len(flight.schedule):
         parts += [Text(), _pulses(flight)]
     parts += [Text(), _ends(impulses, flown, found.until)]
