@@ -71,7 +71,7 @@ def _percentiles(results: Results) -> Table:
         values = [float(plan), *found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
         largest = scale * max(abs(found.minimum), abs(found.maximum))
         table.add_row(Text(name, style="dim"), *(_beside(scale * value, largest) for value in values))
-    for column in table.columns:
+    for column in table.columns[1:]:
         column.no_wrap = True
     return table
 
