@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference
-from builders import Outcome, aimed, channel, cross, fan, off_target, spinner
+from builders import Outcome, aimed, channel, cross, events, fan, off_target, spinner
+from cases_dir import case
 from checker import violations
 
 from nutdamp import flight, planning
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import pointing
 from nutdamp.schemes import Options
 from nutdamp.schemes.model import model_of
@@ -267,3 +269,28 @@ def test_on_time_to_turn_is_its_inverse() -> None:
     turned = 40.0 * on_time * pointing.arc_efficiency(3.0, on_time)
     assert pointing.on_times_to_turn(np.array([turned, 100.0]), 40.0, -3.0)[0] == pytest.approx(on_time, rel=1e-12)
     assert np.isnan(pointing.on_times_to_turn(np.array([100.0]), 40.0, 3.0)[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "quarters"),
+    [("crash-target-is-spin-axis.yaml", 0.0), ("crash-tilt-equals-nutation.yaml", 1.0)],
+)
+@pytest.mark.parametrize("scheme", ["two-pulse", "half-cone", "rhumb-line"])
+def test_a_target_that_the_spin_axis_meets_by_itself_takes_one_impulse_when_it_is_there(
+    name: str, quarters: float, scheme: str
+) -> None:
+    """Where the spin axis is at t = 0, or on its way about H a quarter turn later: damped then and there, at A|ω0|."""
+    body = read_spacecraft(case(name).read_text(encoding="utf-8"), name)
+    plan = planning.plan(body, scheme)
+    (pulse,) = plan.pulses
+    moments = np.asarray(body.inertia.moments)
+    round_h = 2.0 * math.pi * moments[0] / float(np.linalg.norm(moments * body.omega0))
+    assert pulse.t == pytest.approx(0.25 * quarters * round_h, abs=1e-9)
+    assert pulse.magnitude == pytest.approx(moments[0] * math.hypot(*body.omega0[:2]), rel=1e-9)
+    rotation = reference.frame_n(body.inertia.moments, body.omega0)
+    turned = reference.fly(body.inertia.moments, body.omega0, events(plan.pulses), plan.pulses.end + 1.0, rotation)
+    tilt, azimuth = math.radians(5.0), 0.5 * math.pi * quarters
+    target = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+    assert reference.angle(turned.rotation[:, 2], target) < 1e-8
+    assert reference.angle(reference.momentum(body.inertia.moments, turned), target) < 1e-8
+    assert reference.nutation(body.inertia.moments, turned.rates, 1.0) < 1e-8
