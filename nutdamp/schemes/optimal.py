@@ -139,6 +139,8 @@ class _Search(Problem):
                 high = end
                 break
             low = end
+        if high == horizon and not _Search(self.within(horizon), self.options).found():
+            return self  # shorter ones are looked at on the way to a schedule
         while high - low > SHARP * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)

@@ -28,6 +28,9 @@ LATEST = 64.0
 SHARPEST = 1e-3
 """Relative accuracy of a least time by the program of small angles."""
 
+NAMED = 5e-3
+"""The same where it is only advice."""
+
 
 class Problem:
     """What stays the same while a schedule is looked for."""
@@ -65,11 +68,14 @@ class Problem:
 
     def feasible(self, horizon: float) -> bool:
         """Whether the program of small angles has a solution within ``horizon`` s."""
-        return self.program(self.within(horizon)).solve().unmet <= UNMET
+        return self.program(self.within(horizon)).solve(enough=True).unmet <= UNMET
 
-    def least_horizon(self, low: float, high: float) -> float:
-        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow."""
-        while high - low > SHARPEST * high:
+    def least_horizon(self, low: float, high: float, sharp: float = SHARPEST) -> float:
+        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow.
+
+        To a share ``sharp`` of it, and feasible.
+        """
+        while high - low > sharp * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if self.feasible(middle) else (middle, high)
         return high
@@ -171,7 +177,7 @@ class Problem:
         while later < LATEST * horizon:
             later *= 2.0
             if self.feasible(later):
-                needed = self.least_horizon(0.5 * later, later)
+                needed = self.least_horizon(0.5 * later, later, NAMED)
                 shifts = self.equations.shift and body.transverse_rate > 0.0
                 more = ", or use --free-axis" if shifts else ""
                 return f"set limits.horizon to {needed:.4g} s or later ({needed - horizon:.3g} s more){more}"

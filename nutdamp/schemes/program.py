@@ -37,6 +37,12 @@ PEAK = 1e-6
 BEST = 250
 """Columns taken in per round, the best priced first."""
 
+MANY = 4
+"""Share of all columns worth taking in that is taken in, over one, while they do not supply what is needed."""
+
+PROVED = 1e-6
+"""Shortfall by which a program is proved to have no solution, over all there is to do."""
+
 FIRST = 400
 """Columns to begin with."""
 
@@ -163,8 +169,11 @@ class Program:
         """Channels (channels,) that give all that is needed within one slot, and so act at a moment."""
         return np.asarray(self._strong)
 
-    def solve(self, columns: Columns | None = None) -> Solution:
-        """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation."""
+    def solve(self, columns: Columns | None = None, *, enough: bool = False) -> Solution:
+        """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation.
+
+        ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
+        """
         nothing = np.zeros(len(self.influence.goal))
         if self._scale == 0.0:
             return Solution((), 0.0, 0.0, np.zeros(2), nothing)
@@ -174,7 +183,10 @@ class Program:
         if found is None:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            new = self._priced(found.prices, chosen)
+            unmet = float(found.x[len(chosen.t) :][: 2 * len(nothing)].sum())
+            if enough and (unmet <= SOME or self._out_of_reach(found.prices)):
+                break
+            new = self._priced(found.prices, chosen, unmet)
             more = chosen.joined(new)
             better = self._master(more) if len(new.t) else None
             if better is None:  # nothing lowers the cost any more, or what would is lost on the solver
@@ -251,15 +263,27 @@ class Program:
         rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
         return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
 
-    def _gains(self, weights: Vector) -> Vector:
-        """What one unit of each channel in each slot is worth by prices ``weights``, less what it costs."""
+    def _worth(self, weights: Vector) -> Vector:
+        """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
         if self._grid is None:
             lost = self.influence.widths(np.array([self.width]))[0]
             self._grid = self.influence.rows(self.centres) * lost[:, None]
-        gains = self._direction @ np.tensordot(weights, self._grid, axes=(0, 1)).T
-        gains -= (self._price / self._dearest)[:, None] * self._dearness(self.centres)
-        gains[self.forbidden] = -np.inf
-        return np.asarray(gains)
+        worth = self._direction @ np.tensordot(weights, self._grid, axes=(0, 1)).T
+        worth[self.forbidden] = -np.inf
+        return np.asarray(worth)
+
+    def _gains(self, weights: Vector) -> Vector:
+        """The same, less what it costs."""
+        return np.asarray(self._worth(weights) - (self._price / self._dearest)[:, None] * self._dearness(self.centres))
+
+    def _out_of_reach(self, weights: Vector) -> bool:
+        """Whether prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
+        if self._strong.any():  # these act at moments, of which the slots are only samples
+            return False
+        size = float(np.abs(weights).max())
+        most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
+        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
 
     def _first(self) -> Columns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
@@ -275,15 +299,19 @@ class Program:
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
         return _alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
 
-    def _priced(self, duals: Vector, taken: Columns) -> Columns:
-        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
+    def _priced(self, duals: Vector, taken: Columns, unmet: float) -> Columns:
+        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
+
+        More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
+        """
         gains = self._gains(duals)
         weak = np.where(self._strong[:, None], -np.inf, gains)
         slots = taken.width > 0.0
         weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
         channel, slot = np.nonzero(weak > PRICE)
-        if len(slot) > BEST:
-            best = np.argpartition(weak[channel, slot], -BEST)[-BEST:]
+        most = max(BEST, len(slot) // MANY if unmet > SOME else 0)
+        if len(slot) > most:
+            best = np.argpartition(weak[channel, slot], -most)[-most:]
             channel, slot = channel[best], slot[best]
         found = self._slots(channel, slot)
         return found.joined(self._peaks(gains, duals)) if self._strong.any() else found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,8 @@ from cases_dir import case
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.planning import plan
 from nutdamp.schemes import Options, linear
+from nutdamp.schemes.optimal_problem import Problem
+from nutdamp.schemes.program import Program
 from nutdamp.spacecraft import Goal, Limits, Spacecraft
 
 MICRODEGREE = math.radians(1e-6)
@@ -141,3 +144,49 @@ def test_a_weak_axial_torque_is_scaled_up() -> None:
     made = plan(replace(spinning, goal=Goal(None, 3.0)), "optimal")
     assert made.flown is not None, made.why
     assert made.spin_change == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns taken in a few at a time ended before they supplied the goal; 64 times the horizon seemed too short."""
+    body = load_spacecraft(case("geo-target.yaml"))
+    down = math.radians(-20.0)
+    body = replace(body, goal=Goal(axis=np.array([0.0, math.cos(down), math.sin(down)])))
+    solved: list[int] = []
+    least = linear.least
+
+    def counted(*given: Any) -> linear.Optimum | None:
+        solved.append(1)
+        return least(*given)
+
+    monkeypatch.setattr(linear, "least", counted)
+    why = plan(body, "optimal").why or ""
+    found = re.search(r"set limits.horizon to (\S+) s or later", why)
+    assert found, why
+    assert len(solved) < 200  # 385 before, for less
+    options, needed = Options(), float(found.group(1))
+    for share, feasible in ((1.001, True), (0.99, False)):
+        program = Problem(replace(body, limits=replace(body.limits, horizon=share * needed)), options).program()
+        assert (unmet_by_all_slots(program) < 1e-7) == feasible
+
+
+def unmet_by_all_slots(program: Program) -> float:
+    """What all slots together cannot supply, by one program of least slack over every one of them."""
+    slots, channels = len(program.centres), len(program.channels)
+    size = float(np.linalg.norm(program.influence.goal))
+    most = np.array([program.width * one.strength / size for one in program.channels])
+    every = [
+        program.influence.rows(program.centres)
+        @ (np.asarray(one.torque) / one.strength)
+        * program.influence.widths(np.array([program.width]))[0]
+        for one in program.channels
+    ]
+    matrix = np.concatenate(every).T
+    count = len(matrix)
+    found = scipy.optimize.linprog(
+        np.concatenate([np.zeros(slots * channels), np.ones(2 * count)]),
+        A_eq=np.hstack([matrix, np.eye(count), -np.eye(count)]),
+        b_eq=program.influence.goal / size,
+        bounds=[*((0.0, one) for one in np.repeat(most, slots)), *((0.0, None),) * (2 * count)],
+    )
+    assert found.fun is not None
+    return float(found.fun)
