@@ -21,7 +21,7 @@ import pytest
 
 from nutdamp.cli import main
 
-SEEDS, BLOCKS, QUICK = 2000, 40, 100
+SEEDS, BLOCKS, QUICK = 2000, 40, 40
 STATUSES = (0, 2, 3, 4)
 SCHEMES = ("one-pulse", "two-pulse", "four-pulse", "half-cone", "rhumb-line")
 CLASSIC, AIMED = SCHEMES[:3], SCHEMES[3:]
