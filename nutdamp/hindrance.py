@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from nutdamp.schedule import Schedule
-from nutdamp.schemes.model import steady_omega
+from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Spacecraft
 
 RESOLVED = 0.1

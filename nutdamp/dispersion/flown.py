@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nutdamp import flight
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dispersion.truth import Model, Triple, Truth, rotated
-from nutdamp.physics import many
+from nutdamp.physics import rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RealWidths:
-    """Flies truths of ``model`` by Euler's equations, see `nutdamp.physics.many`.
+    """Flies truths of ``model`` by Euler's equations, see `nutdamp.physics.rigid_cases`.
 
     Disturbances and dissipation act as the estimate has them, whatever the truth's moments are.
     """
@@ -36,7 +36,7 @@ class RealWidths:
         parts = (*truth.moments, *truth.omega0, *truth.starts, *(part for pulse in truth.impulses for part in pulse))
         count = max(np.size(part) for part in parts)
         moments, rates = _whole(truth.moments, count), _whole(truth.omega0, count)
-        pulses = many.Pulses(
+        pulses = rigid_cases.Pulses(
             _whole(truth.starts, count),
             np.array(self.model.on_times),
             np.array([_whole(impulse, count) for impulse in truth.impulses]).reshape(-1, 3, count),
@@ -44,8 +44,8 @@ class RealWidths:
         upright = np.zeros((4, count))
         upright[0] = 1.0  # the true body axes at t = 0 are where everything is seen from
         setting = self._setting
-        bodies = many.Bodies(moments, setting.constant, setting.forcing)
-        settled, turned = many.fly(bodies, rates, upright, pulses)
+        bodies = rigid_cases.Bodies(moments, setting.constant, setting.forcing)
+        settled, turned = rigid_cases.fly(bodies, rates, upright, pulses)
         momentum = _triple(moments * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)

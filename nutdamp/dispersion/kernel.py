@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from nutdamp.dispersion.truth import TINY, Cases, Model, Triple, Truth, plus, rotated, times
 from nutdamp.physics import energy_sink
-from nutdamp.physics.many import cos_sin
+from nutdamp.physics.rigid_cases import cos_sin
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""

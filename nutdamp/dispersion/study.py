@@ -31,7 +31,7 @@ from nutdamp.dispersion.statistics import (
 from nutdamp.dispersion.truth import Cases, Model, Truth
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
-from nutdamp.physics import many
+from nutdamp.physics import rigid_cases
 
 Array = NDArray[np.float64]
 Fly = Callable[[Truth], Ends]
@@ -39,7 +39,7 @@ Fly = Callable[[Truth], Ends]
 CHUNK = 8_192
 """Cases that the kernel works on at once, so that they stay in the cache."""
 
-STRIDE = many.BLOCK
+STRIDE = rigid_cases.BLOCK
 """Cases that are always flown together, as real widths need it; chunks are multiples of it."""
 
 PORTION = 2 * STRIDE

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.inputs import Inputs, list_inputs
 from nutdamp.physics import attitude
-from nutdamp.physics.many import cos_sin
+from nutdamp.physics.rigid_cases import cos_sin
 from nutdamp.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Thruster, Vector
 

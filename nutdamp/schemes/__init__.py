@@ -12,7 +12,7 @@ from nutdamp.units import LARGEST
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
-    from nutdamp.schemes.model import Model
+    from nutdamp.schemes.tools.symmetric_model import Model
     from nutdamp.spacecraft import Spacecraft
 
 CLASSIC = ("one-pulse", "two-pulse", "four-pulse")
@@ -108,7 +108,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Options) -> Schedule:
     """
     if name not in NAMES:
         raise KeyError(name)
-    from nutdamp.schemes.model import model_of
+    from nutdamp.schemes.tools.symmetric_model import model_of
 
     model = model_of(spacecraft)
     scheme = import_module(_module(name))
@@ -125,7 +125,7 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Options) -> list[Sc
     scheme = import_module(_module(name))
     if not hasattr(scheme, "alternatives"):
         return []
-    from nutdamp.schemes.model import model_of
+    from nutdamp.schemes.tools.symmetric_model import model_of
 
     model = model_of(spacecraft)
     return [_finished(name, model, made, options) for made in scheme.alternatives(model.body, options)]
@@ -137,7 +137,7 @@ def _module(name: str) -> str:
 
 def _finished(name: str, model: Model, made: Schedule, options: Options) -> Schedule:
     """A schedule for the ``model`` as one for the true spacecraft, trimmed on its motion where that differs."""
-    from nutdamp.schemes import trim
+    from nutdamp.schemes.tools import least_squares
 
     made = model.translate(made)
     if not model.exact:
@@ -152,5 +152,5 @@ def _finished(name: str, model: Model, made: Schedule, options: Options) -> Sche
     spin = name == "optimal" and model.truth.goal.spin is not None
     if spin:  # and the pulse that gives most to the spin
         chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-    bounds = getattr(import_module(_module(name)), "on_times", lambda _: trim.ANY)(options)
-    return trim.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin, on_times=bounds)
+    bounds = getattr(import_module(_module(name)), "on_times", lambda _: least_squares.ANY)(options)
+    return least_squares.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin, on_times=bounds)

@@ -6,11 +6,11 @@ import itertools
 import math
 
 from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import Options
-from nutdamp.schemes.advice import no_alignment, no_channels
-from nutdamp.schemes.walk import Walk
-from nutdamp.schemes.windows import usable
+from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
+from nutdamp.schemes.tools.reasons import no_alignment, no_channels
 from nutdamp.spacecraft import Channel, Spacecraft
 
 DEFAULT_SHARE = 0.125
@@ -28,21 +28,21 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
-    walk = Walk(spacecraft)
-    on_times = {channel.name: _on_time(walk, channel, options.on_time) for channel in channels}
+    builder = ImpulseBuilder(spacecraft)
+    on_times = {channel.name: _on_time(builder, channel, options.on_time) for channel in channels}
     if spacecraft.inertia.a == 0.0:
-        _standing(walk, channels, options)
+        _standing(builder, channels, options)
     else:
-        _turning(walk, channels, on_times, options)
-    if not walk.pulses:
+        _turning(builder, channels, on_times, options)
+    if not builder.pulses:
         raise Infeasible(no_alignment(spacecraft, channels))
-    return walk.schedule()
+    return builder.schedule()
 
 
-def _on_time(walk: Walk, channel: Channel, asked: float | None) -> float:
+def _on_time(builder: ImpulseBuilder, channel: Channel, asked: float | None) -> float:
     """Length of a full pulse of ``channel``, s."""
     if asked is None:
-        return max(min(channel.max_on_time, DEFAULT_SHARE * walk.period), channel.min_on_time)
+        return max(min(channel.max_on_time, DEFAULT_SHARE * builder.period), channel.min_on_time)
     if not (channel.min_on_time <= asked <= channel.max_on_time and 0.0 < asked < math.inf):
         raise Infeasible(
             f"an on-time of {asked:.4g} s is outside what {channel.name} allows: "
@@ -51,39 +51,39 @@ def _on_time(walk: Walk, channel: Channel, asked: float | None) -> float:
     return asked
 
 
-def _turning(walk: Walk, channels: list[Channel], on_times: dict[str, float], options: Options) -> None:
+def _turning(builder: ImpulseBuilder, channels: list[Channel], on_times: dict[str, float], options: Options) -> None:
     """Alignment after alignment, whichever helpful channel comes first."""
-    while not walk.full and not walk.settled:
-        pulses = [_next(walk, channel, on_times[channel.name], options.coarse) for channel in channels]
-        helpful = [pulse for pulse in pulses if pulse is not None and walk.helps(pulse)]
+    while not builder.full and not builder.settled:
+        pulses = [_next(builder, channel, on_times[channel.name], options.coarse) for channel in channels]
+        helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
         if not helpful:
             return
-        walk.fire(min(helpful, key=lambda pulse: pulse.t))
+        builder.fire(min(helpful, key=lambda pulse: pulse.t))
 
 
-def _next(walk: Walk, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
+def _next(builder: ImpulseBuilder, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
     """The next pulse of ``channel``: a full one, or in fine damping just what is left."""
-    just_enough = None if coarse else walk.on_time_for(channel, walk.left, on_time)
-    return walk.align(channel, on_time if just_enough is None else just_enough)
+    just_enough = None if coarse else builder.on_time_for(channel, builder.left, on_time)
+    return builder.align(channel, on_time if just_enough is None else just_enough)
 
 
-def _standing(walk: Walk, channels: list[Channel], options: Options) -> None:
+def _standing(builder: ImpulseBuilder, channels: list[Channel], options: Options) -> None:
     """A sphere: ω does not turn, so the two channels on either side of -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
-    shares = _shares(channels, -walk.A * walk.omega)
+    shares = _shares(channels, -builder.A * builder.omega)
     for channel, impulse in shares:
         unit = impulse / abs(channel.transverse)
         longest = channel.max_on_time if options.on_time is None else options.on_time
         count = 1 if math.isinf(longest) else max(math.ceil(unit / longest - 1e-9), 1)
         for _ in range(count):
             wanted = longest if options.coarse and not math.isinf(longest) else unit / count
-            on_time = walk.windows.on_time(wanted, channel.min_on_time, channel.max_on_time)
-            start = walk.windows.earliest_start(on_time, walk.ready)
-            if walk.full or start is None:
+            on_time = builder.windows.on_time(wanted, channel.min_on_time, channel.max_on_time)
+            start = builder.windows.earliest_start(on_time, builder.ready)
+            if builder.full or start is None:
                 return
             pulse = channel_pulse(channel, start + 0.5 * on_time, on_time)
-            if not walk.helps(pulse):
+            if not builder.helps(pulse):
                 break
-            walk.fire(pulse)
+            builder.fire(pulse)
 
 
 def _shares(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:

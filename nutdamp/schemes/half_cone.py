@@ -3,8 +3,8 @@
 From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of the spin axis, each
 further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is not removed
 first: the first pulse comes at the moment from which the whole row is cheapest, and jumps straight onto its first cone.
-The last cone is the acquisition of `acquisition`, which takes out what the others left. Only a nutation that one pulse
-cannot take out is damped first (`approach`).
+The last cone is the acquisition of `pair_search`, which takes out what the others left. Only a nutation that one pulse
+cannot take out is damped first (`predamping`).
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Arc
+from nutdamp.limits import Windows, usable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.schemes import Options, acquisition, approach, trim
-from nutdamp.schemes.advice import no_channels, no_target
-from nutdamp.schemes.journey import Journey
-from nutdamp.schemes.steering import Steering
-from nutdamp.schemes.windows import Windows, usable
+from nutdamp.schemes import Options
+from nutdamp.schemes.tools import least_squares, pair_search, predamping
+from nutdamp.schemes.tools.flown_builder import FlownBuilder
+from nutdamp.schemes.tools.reasons import no_channels, no_target
+from nutdamp.schemes.tools.steerable_pair import SteerablePair
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 WORTH_A_CONE = 0.01
@@ -62,18 +63,18 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
         raise Infeasible(no_target())
     if spacecraft.torquer is None and not usable(spacecraft):
         raise Infeasible(no_channels(spacecraft))
-    journey = Journey(spacecraft)
+    builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
-        journey.fire(approach.damping(journey.here))
+        builder.fire(predamping.damping(builder.here))
     if options.cones is not None:
-        return _row(journey, options.cones)
-    here = journey.here
+        return _row(builder, options.cones)
+    here = builder.here
     best: Schedule | None = None
     reason: Infeasible | None = None
     failed = 0
     for cones in _counts(_fewest(here), _most(here)):
         try:
-            made = _row(journey.fork(), cones)
+            made = _row(builder.fork(), cones)
         except Infeasible as why:
             reason, failed = why, failed + 1
             if best is not None or failed > PATIENCE:
@@ -141,30 +142,30 @@ def _no_time(spacecraft: Spacecraft) -> str:
     )
 
 
-def _row(journey: Journey, cones: int) -> Schedule:
+def _row(builder: FlownBuilder, cones: int) -> Schedule:
     """That many half cones, each planned from the motion that the one before leaves."""
-    spacecraft, damped = journey.here, len(journey.pulses)
-    if journey.allowed < cones + 1:
-        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {journey.allowed}")
+    spacecraft, damped = builder.here, len(builder.pulses)
+    if builder.allowed < cones + 1:
+        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {builder.allowed}")
     for remaining in range(cones, 1, -1):
-        journey.fire(_first_of(journey.here, remaining))
-    journey.fire(acquisition.schedule(journey.here, straight=True))
+        builder.fire(_first_of(builder.here, remaining))
+    builder.fire(pair_search.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
     ideal = pointing.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
-    made = journey.schedule()
+    made = builder.schedule()
     note = f"{cones} half cone{'s' if cones > 1 else ''}"
     if damped:
         note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
     elif len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
         note += f"; {made.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
-    return journey.schedule(note)
+    return builder.schedule(note)
 
 
 def _first_of(here: Spacecraft, cones: int) -> tuple[Pulse, ...]:
     """The pulse onto the first of ``cones`` half cones."""
     torquer = here.torquer
     if torquer is not None:
-        return Steering(here, torquer).one(cones)
+        return SteerablePair(here, torquer).one(cones)
     return (_fixed(here, usable(here), cones),)
 
 
@@ -202,7 +203,7 @@ def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
             f"none of the channels ({names}) is in phase for a cone with {cones} to go within the {span:.4g} s that "
             "the horizon leaves it, on-times and blackout windows kept; another number of cones or rhumb-line can help"
         )
-    return trim.commandable(here, best[2])
+    return least_squares.commandable(here, best[2])
 
 
 def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:

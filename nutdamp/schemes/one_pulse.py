@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 
 from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import Options
-from nutdamp.schemes.advice import no_alignment, no_channels
-from nutdamp.schemes.walk import Walk
-from nutdamp.schemes.windows import usable
+from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
+from nutdamp.schemes.tools.reasons import no_alignment, no_channels
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable
 
 TRAIN_SHARE = 0.25
@@ -29,45 +29,45 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG
     """
     torquer = spacecraft.torquer
     if torquer is not None:
-        walk = _steered(spacecraft, torquer)
-        if walk.pulses:
-            return walk.schedule()
+        builder = _steered(spacecraft, torquer)
+        if builder.pulses:
+            return builder.schedule()
         raise Infeasible(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
-    walks = [walk for walk in (_fixed(spacecraft, channel) for channel in channels) if walk.pulses]
+    walks = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
     if not walks:
         raise Infeasible(no_alignment(spacecraft, channels))
     best = min(walks, key=_preference)
     return best.schedule()
 
 
-def _preference(walk: Walk) -> tuple[bool, int, float, float]:
-    chosen = walk.schedule()
+def _preference(builder: ImpulseBuilder) -> tuple[bool, int, float, float]:
+    chosen = builder.schedule()
     return (
-        not walk.settled and walk.left > LEFT_OVER * walk.spacecraft.least_impulse,
+        not builder.settled and builder.left > LEFT_OVER * builder.spacecraft.least_impulse,
         len(chosen),
         chosen.cost,
         chosen.end,
     )
 
 
-def _fixed(spacecraft: Spacecraft, channel: Channel) -> Walk:
+def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
     """Pulses of one channel at its successive alignments."""
 
-    def fire(walk: Walk, impulse: float) -> Pulse | None:
-        on_time = walk.on_time_for(channel, impulse)
-        return walk.align(channel, min(channel.max_on_time, 0.5 * walk.period) if on_time is None else on_time)
+    def fire(builder: ImpulseBuilder, impulse: float) -> Pulse | None:
+        on_time = builder.on_time_for(channel, impulse)
+        return builder.align(channel, min(channel.max_on_time, 0.5 * builder.period) if on_time is None else on_time)
 
     spin_rate = channel.axial / spacecraft.inertia.C
     return _train(spacecraft, abs(channel.transverse), spin_rate, channel.max_on_time, fire)
 
 
-def _steered(spacecraft: Spacecraft, torquer: Steerable) -> Walk:
+def _steered(spacecraft: Spacecraft, torquer: Steerable) -> ImpulseBuilder:
     """Pulses of a steerable torquer, one behind the other."""
     torque = math.inf if torquer.torque is None else torquer.torque
-    return _train(spacecraft, torque, 0.0, math.inf, lambda walk, impulse: walk.steer(torquer, impulse))
+    return _train(spacecraft, torque, 0.0, math.inf, lambda builder, impulse: builder.steer(torquer, impulse))
 
 
 def _train(
@@ -75,10 +75,10 @@ def _train(
     torque: float,
     spin_rate: float,
     max_on_time: float,
-    fire: Callable[[Walk, float], Pulse | None],
-) -> Walk:
+    fire: Callable[[ImpulseBuilder, float], Pulse | None],
+) -> ImpulseBuilder:
     """The fewest equal pulses that take out what is left; fewer where the limits end it or nothing is gained."""
-    start = Walk(spacecraft)
+    start = ImpulseBuilder(spacecraft)
 
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
@@ -94,21 +94,21 @@ def _train(
         count = math.ceil(min(start.left / share, most + 1.0))
         if count > most:  # rather longer pulses than too many
             count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
-    walk = _fire_train(spacecraft, count, capacity(longest), fire)
-    if spacecraft.growth > 0.0 and walk.pulses and walk.left > LEFT_OVER * start.left:
+    builder = _fire_train(spacecraft, count, capacity(longest), fire)
+    if spacecraft.growth > 0.0 and builder.pulses and builder.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
         longer = _fire_train(spacecraft, count + 1, capacity(longest), fire)
-        walk = min(walk, longer, key=lambda one: one.left)
-    return walk
+        builder = min(builder, longer, key=lambda one: one.left)
+    return builder
 
 
 def _fire_train(
-    spacecraft: Spacecraft, count: int, strongest: float, fire: Callable[[Walk, float], Pulse | None]
-) -> Walk:
-    walk = Walk(spacecraft)
+    spacecraft: Spacecraft, count: int, strongest: float, fire: Callable[[ImpulseBuilder, float], Pulse | None]
+) -> ImpulseBuilder:
+    builder = ImpulseBuilder(spacecraft)
     for remaining in range(count, 0, -1):
-        pulse = fire(walk, min(walk.left / remaining, strongest))
-        if walk.full or pulse is None or not walk.helps(pulse):
+        pulse = fire(builder, min(builder.left / remaining, strongest))
+        if builder.full or pulse is None or not builder.helps(pulse):
             break
-        walk.fire(pulse)
-    return walk
+        builder.fire(pulse)
+    return builder

@@ -15,13 +15,14 @@ import math
 import numpy as np
 
 from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
 from nutdamp.physics import pointing
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options, approach, trim
-from nutdamp.schemes.advice import no_channels, no_target
-from nutdamp.schemes.journey import ROUNDING, Journey, tolerable
-from nutdamp.schemes.train import LAST, UNEQUAL, Attempt, Train
-from nutdamp.schemes.windows import usable
+from nutdamp.schemes import Options
+from nutdamp.schemes.tools import least_squares, predamping
+from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
+from nutdamp.schemes.tools.pulse_train import LAST, UNEQUAL, Attempt, Train
+from nutdamp.schemes.tools.reasons import no_channels, no_target
 from nutdamp.spacecraft import Spacecraft
 
 TRIMMED = (4, 6, LAST)
@@ -57,33 +58,33 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
 def on_times(options: Options) -> tuple[float, float]:
     """Bounds (s) that the last pulses keep, whoever trims them: an on-time asked for is held."""
     asked = options.on_time
-    return trim.ANY if asked is None else ((1.0 - UNEQUAL) * asked, (1.0 + UNEQUAL) * asked)
+    return least_squares.ANY if asked is None else ((1.0 - UNEQUAL) * asked, (1.0 + UNEQUAL) * asked)
 
 
 def _train(spacecraft: Spacecraft, options: Options) -> Schedule:
     """The train from t = 0, or else after what damps the nutation. Raises Infeasible with the reason."""
-    journey, reason = Journey(spacecraft), Infeasible("")
-    train = Train(journey.here, options)
+    builder, reason = FlownBuilder(spacecraft), Infeasible("")
+    train = Train(builder.here, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
         try:
-            return _best(journey, train)
+            return _best(builder, train)
         except Infeasible as why:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    journey.fire(approach.damping(journey.here))
-    if journey.left <= ROUNDING:
-        return journey.schedule("what damps the nutation brings H to the target already: no train is needed")
-    return _best(journey, Train(journey.here, options))
+    builder.fire(predamping.damping(builder.here))
+    if builder.left <= ROUNDING:
+        return builder.schedule("what damps the nutation brings H to the target already: no train is needed")
+    return _best(builder, Train(builder.here, options))
 
 
 def _another(spacecraft: Spacecraft, options: Options) -> str:
     """Which pulse length would do instead of the one asked for, the nearest first, in words."""
-    journey, exact = Journey(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
+    builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
-        if spacecraft.least_impulse > 1e-9 * journey.here.inertia.C * abs(spacecraft.spin):
-            journey.fire(approach.damping(journey.here))
-        lengths = Train(journey.here, options._replace(on_time=None)).lengths_near(options.on_time or 0.0)
+        if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
+            builder.fire(predamping.damping(builder.here))
+        lengths = Train(builder.here, options._replace(on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
     for length in lengths[:OTHERS]:
@@ -93,23 +94,23 @@ def _another(spacecraft: Spacecraft, options: Options) -> str:
             made = _train(spacecraft, options._replace(on_time=rounded))
         except Infeasible:
             continue
-        if float(np.linalg.norm(trim.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
+        if float(np.linalg.norm(least_squares.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
             continue
         return f"--on-time {rounded:.4g}s works, with {len(made)} pulses in all"
     return "no other length was found that works"
 
 
-def _best(journey: Journey, train: Train) -> Schedule:
-    """The train from where the ``journey`` is that leaves least; raises Infeasible where that is too much.
+def _best(builder: FlownBuilder, train: Train) -> Schedule:
+    """The train from where the ``builder`` is that leaves least; raises Infeasible where that is too much.
 
     Of those that leave nothing the first one, unless a later one costs clearly less.
     """
     best: tuple[float, Schedule] | None = None
-    before = sum(pulse.magnitude for pulse in journey.pulses)
+    before = sum(pulse.magnitude for pulse in builder.pulses)
     for attempt in train.attempts():
         if best is not None and best[0] <= EXACT and not attempt.closes:
             continue  # it would cost no less
-        made, left = _flown(journey.fork(), train, attempt)
+        made, left = _flown(builder.fork(), train, attempt)
         left = max(left, EXACT)
         if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
             best = left, made
@@ -125,29 +126,29 @@ def _cheaper(made: Schedule, other: Schedule, before: float) -> bool:
     return made.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
 
 
-def _flown(journey: Journey, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
+def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
     """The train, each pulse aimed from where H then is, the last trimmed; and what it leaves, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
-        pulse = train.next_pulse(journey.here, remaining, attempt)
+        pulse = train.next_pulse(builder.here, remaining, attempt)
         if pulse is None:
             break
-        journey.fire((pulse,))
-    fired = min(count, len(journey.pulses))
+        builder.fire((pulse,))
+    fired = min(count, len(builder.pulses))
     for last in TRIMMED:
-        if journey.left < EXACT:
+        if builder.left < EXACT:
             break
-        journey.trim(min(last, fired), attempt.bounds)
-    return journey.schedule(_note(journey, train, count)), journey.left
+        builder.trim(min(last, fired), attempt.bounds)
+    return builder.schedule(_note(builder, train, count)), builder.left
 
 
-def _note(journey: Journey, train: Train, count: int) -> str:
+def _note(builder: FlownBuilder, train: Train, count: int) -> str:
     """What the train is, in words."""
-    on_times = np.array([pulse.on_time for pulse in journey.pulses[-count:]])
+    on_times = np.array([pulse.on_time for pulse in builder.pulses[-count:]])
     efficiency = pointing.arc_efficiency(train.here.spin, float(on_times[0]))
     line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
     names = ", ".join(channel.name for channel in train.channels)
-    damped = len(journey.pulses) - count
+    damped = len(builder.pulses) - count
     return (
         (f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then " if damped > 0 else "")
         + f"{count} pulses"

@@ -1,6 +1,6 @@
 """Two pulses half an inertial nutation turn apart, Magnus 1970 (22): no nutation, and H back where it was.
 
-With a target axis the two pulses are those of `acquisition`, of which these are the case that H is to stay.
+With a target axis the two pulses are those of `pair_search`, of which these are the case that H is to stay.
 
 With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
 torque directions d1, d2 the shift of H closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both
@@ -18,14 +18,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
+from nutdamp.limits import Windows, for_pairs
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options, trim
-from nutdamp.schemes.advice import FADED, bounded_by, no_channels
-from nutdamp.schemes.journey import tolerable
-from nutdamp.schemes.model import model_of
-from nutdamp.schemes.walk import ALIGNED, Walk
-from nutdamp.schemes.windows import Windows, for_pairs
+from nutdamp.schemes import Options
+from nutdamp.schemes.tools import least_squares
+from nutdamp.schemes.tools.flown_builder import tolerable
+from nutdamp.schemes.tools.impulse_builder import ALIGNED, ImpulseBuilder
+from nutdamp.schemes.tools.reasons import FADED, bounded_by, no_channels
+from nutdamp.schemes.tools.symmetric_model import model_of
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
 
 DEAREST = 2.0
@@ -58,9 +59,9 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
     """
     if spacecraft.goal.axis is not None and not options.literal:
         try:
-            from nutdamp.schemes import acquisition  # here, because few plans have a target
+            from nutdamp.schemes.tools import pair_search  # here, because few plans have a target
 
-            return acquisition.schedule(spacecraft)
+            return pair_search.schedule(spacecraft)
         except Infeasible:
             made = _wide(spacecraft)
             if made is None:
@@ -81,7 +82,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
         made = _damping(spacecraft, Options())
     except Infeasible:
         return None
-    return made if float(np.linalg.norm(trim.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+    return made if float(np.linalg.norm(least_squares.misses(spacecraft, made))) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
@@ -114,7 +115,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
             _pair(spacecraft, torquer, halves, start, wait, on_times)
             for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
         )
-        best = next((pulses for pulses in placed if trim.keeps_limits(spacecraft, pulses)), None)
+        best = next((pulses for pulses in placed if least_squares.keeps_limits(spacecraft, pulses)), None)
         if best is not None:
             break
     if best is None:
@@ -124,7 +125,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
         )
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
-    return trim.refine(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
+    return least_squares.refine(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
 
 
 def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
@@ -162,17 +163,17 @@ def _pair(
     on_times: tuple[float, ...],
 ) -> tuple[Pulse, Pulse]:
     """The two pulses against ω, the first from ``start`` s on."""
-    walk = Walk(spacecraft)
+    builder = ImpulseBuilder(spacecraft)
     pulses = []
     for centre, on_time, half in zip(
         (start + 0.5 * on_times[0], start + 0.5 * on_times[0] + wait), on_times, halves[:2], strict=True
     ):
-        begin = walk.windows.nearest_tick(centre - 0.5 * on_time)
+        begin = builder.windows.nearest_tick(centre - 0.5 * on_time)
         centre = begin + 0.5 * on_time
-        angle = cmath.phase(-walk.omega_at(centre))
+        angle = cmath.phase(-builder.omega_at(centre))
         asked = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
         pulses.append(steerable_pulse(torquer, centre, angle, **asked))
-        walk.fire(pulses[-1])
+        builder.fire(pulses[-1])
     return pulses[0], pulses[1]
 
 
@@ -229,20 +230,20 @@ def _shortlist(spacecraft: Spacecraft, channels: list[Channel], options: Options
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
         made, left = _trimmed(spacecraft, candidate, options.literal)
-        if trim.keeps_limits(spacecraft, made.pulses):
+        if least_squares.keeps_limits(spacecraft, made.pulses):
             yield made, left
 
 
 def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, trimmed on the real widths and made commandable, and its flown residual in rad."""
     pulses = tuple(
-        trim.commandable(spacecraft, channel_pulse(channel, t, on_time))
+        least_squares.commandable(spacecraft, channel_pulse(channel, t, on_time))
         for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
     )
     made = Schedule(pulses)
     if not literal:
-        made = trim.refine(spacecraft, made, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(trim.misses(spacecraft, made)))
+        made = least_squares.refine(spacecraft, made, chosen=(0, 1), momentum=True)
+    left = float(np.linalg.norm(least_squares.misses(spacecraft, made)))
     return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
 
 

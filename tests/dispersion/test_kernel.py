@@ -19,7 +19,7 @@ from nutdamp.dispersion.single import realised
 from nutdamp.dispersion.study import Study
 from nutdamp.dispersion.truth import Model
 from nutdamp.physics import rates
-from nutdamp.physics.many import cos_sin
+from nutdamp.physics.rigid_cases import cos_sin
 from nutdamp.schedule import Schedule, steerable_pulse
 from nutdamp.spacecraft import Steerable
 from nutdamp.tolerances import Dispersions, Tolerance

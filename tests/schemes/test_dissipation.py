@@ -18,7 +18,7 @@ from nutdamp import flight, planning
 from nutdamp.physics import rigid
 from nutdamp.planning import plan
 from nutdamp.schedule import Schedule
-from nutdamp.schemes.walk import Walk
+from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
 NEARLY_NOTHING = math.radians(1e-7)
@@ -94,11 +94,11 @@ def test_targets_are_reached(steerable: Steerable, scheme: str, C: float) -> Non
 @pytest.mark.parametrize("spin", [2.0, -2.0])
 def test_a_walk_coasts_as_the_flight_does(C: float, spin: float) -> None:
     body = replace(spinner(A=100.0, C=C, spin=spin, degrees=50.0), dissipation=12.0)
-    walk = Walk(body)
+    builder = ImpulseBuilder(body)
     times = np.linspace(0.0, 40.0, 9)
     rates, _ = flight.flown(body, Schedule(), 40.0).motion(times)
     for time, row in zip(times, rates, strict=True):
-        assert walk.omega_at(float(time)) == pytest.approx(complex(row[0], row[1]), abs=1e-12)
+        assert builder.omega_at(float(time)) == pytest.approx(complex(row[0], row[1]), abs=1e-12)
 
 
 def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> None:
@@ -109,12 +109,12 @@ def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> No
     )
     found = []
     for earliest in np.arange(0.0, 60.0, 2.0):
-        walk = Walk(replace(body, limits=replace(body.limits, earliest=float(earliest))))
-        pulse = walk.align(jet, 0.01)
+        builder = ImpulseBuilder(replace(body, limits=replace(body.limits, earliest=float(earliest))))
+        pulse = builder.align(jet, 0.01)
         if pulse is None:
             break
-        omega = walk.omega_at(pulse.t)
-        turn = cmath.phase(-omega * walk.acts(pulse).conjugate())
+        omega = builder.omega_at(pulse.t)
+        turn = cmath.phase(-omega * builder.acts(pulse).conjugate())
         assert abs(turn) < 1e-9
         assert pulse.start >= earliest
         found.append(pulse.t)

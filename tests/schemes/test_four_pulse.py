@@ -148,7 +148,7 @@ def test_skew_channels_change_the_spin_by_their_axial_impulse_over_c() -> None:
     axial = math.fsum(pulse.impulse[2] for pulse in plan.pulses)
     assert axial != 0.0
     assert plan.spin_change == pytest.approx(axial / 80.0, rel=1e-9)
-    # The walk counts the changing spin exactly, so fine damping still leaves nothing.
+    # The builder counts the changing spin exactly, so fine damping still leaves nothing.
     assert Outcome(spacecraft, plan.pulses).nutation < 1e-10
 
 

@@ -14,9 +14,10 @@ from cases_dir import case
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import broken_limits, compare, plan
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options, burns
-from nutdamp.schemes.optimal_problem import Problem
-from nutdamp.schemes.program import Burn, Program
+from nutdamp.schemes import Options
+from nutdamp.schemes.optimal import repair
+from nutdamp.schemes.optimal.linear_program import Burn, Program
+from nutdamp.schemes.optimal.problem import Problem
 from nutdamp.spacecraft import Limits
 
 NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
@@ -65,7 +66,7 @@ def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: floa
     program = Problem(body, Options()).program()
     channel = body.channels[1]
     long = tuple(Burn(channel, t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
-    assert burns._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
+    assert repair._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
     assert not program.forbidden[[0, 2, 3]].any()  # nothing is too long there
     runs = [(key, len(list(group))) for key, group in itertools.groupby(program.forbidden[1].tolist())]
     assert max(count for key, count in runs if not key) * program.width <= longest + 1e-12

@@ -17,10 +17,11 @@ from hypothesis import strategies as st
 from nutdamp import flight, planning
 from nutdamp.errors import Infeasible
 from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.limits import SLACK, Windows
 from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC, Options, steering
-from nutdamp.schemes.walk import MOST_PULSES, Walk
-from nutdamp.schemes.windows import SLACK, Windows
+from nutdamp.schemes import CLASSIC, Options
+from nutdamp.schemes.tools import steerable_pair
+from nutdamp.schemes.tools.impulse_builder import MOST_PULSES, ImpulseBuilder
 from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Steerable
 
 PLENTY = 3_000_000
@@ -97,19 +98,19 @@ def test_the_next_alignment_is_found_or_given_up() -> None:
     for seed in range(300):
         rng = np.random.default_rng(seed)
         body = disturbed(rng)
-        walk = Walk(body)
+        builder = ImpulseBuilder(body)
         for one in body.channels:
             on_time = power(rng, -6, 0) * min(body.body_period, body.inertial_period)
             for _ in range(3):
                 with within(200_000):
-                    pulse = walk.align(one, on_time)
+                    pulse = builder.align(one, on_time)
                 if pulse is None:
                     break
-                assert pulse.start >= walk.ready - SLACK, seed
-                assert not walk.pulses or pulse.t > walk.now, seed
-                assert walk.windows.allows(pulse.start, pulse.on_time, walk.ready), seed
+                assert pulse.start >= builder.ready - SLACK, seed
+                assert not builder.pulses or pulse.t > builder.now, seed
+                assert builder.windows.allows(pulse.start, pulse.on_time, builder.ready), seed
                 found += 1
-                walk.fire(pulse)
+                builder.fire(pulse)
     assert found > 500
 
 
@@ -139,8 +140,8 @@ def test_a_search_that_gains_a_little_in_every_step_ends() -> None:
         return np.asarray(1.0 / (1.0 + np.exp(np.minimum(1e-9 * points[:, 0], 700.0))))
 
     with within(PLENTY):
-        steering._descend(cost, np.array([0.0]), np.array([1.0]))
-    assert steps <= steering.COMPASS_STEPS + 1
+        steerable_pair._descend(cost, np.array([0.0]), np.array([1.0]))
+    assert steps <= steerable_pair.COMPASS_STEPS + 1
 
 
 def test_a_channel_that_can_do_nothing_ends_the_walk() -> None:

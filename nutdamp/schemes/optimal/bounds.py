@@ -1,0 +1,304 @@
+"""What no schedule can beat: lower bounds of the cost, by duality and by the length of the way.
+
+The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
+schedules that leave no more than `Left`, and none of them knows of gaps, ticks and on-times, which can only raise the
+cost.
+
+*Nutation.* w = A ω e^{iφ} with φ = a ∫ω3 dt obeys dw/dt = M e^{iφ}, at any angle. Let y be complex with
+Re(y* m e^{iφ}) ≤ c for the torque m and the cost c per second of every channel, and for every phase φ at which it may
+be on. Then the cost Σ ∫ c dt of a schedule is at least Re(y* (w(end) - w(0))) ≥ -Re(y* A ω0) - |y| A |ω(end)|. The best
+such y is the optimum of the dual of a linear program; each is a bound.
+
+*Axial torque* changes ω3, and so the phases: by no more than what a schedule of a given cost can give to the spin.
+Schedules that cost more need no bound.
+
+*Spin.* A final spin costs impulse too: with M3 in place of one component, and |m| in place of the other.
+
+*First order.* The same for the program of small angles, with all its equations. A price y that is too high somewhere is
+lowered until it is not, for channels that act within a moment; from those that have to be on for long, what a slot of
+them gains is taken off: ∫ max(0, y·m e^{iφ} - c) dt. Between the times looked at, gains are known by their curvature.
+
+*Turn.* Where ω3 stays, H·e3 = Cω3, so H never comes nearer to the origin than r = C|ω3|. From |H0| = r/cos θ0 the
+shortest way round that sphere to the direction of the target is the tangent, r tan θ0, and an arc of the sphere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.limits import SLACK, usable
+from nutdamp.schemes.optimal.linear_program import Program
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+TURN = 2.0 * math.pi
+
+LOOKS = 33
+"""Directions looked at at once where the best is looked for."""
+
+NARROWINGS = 9
+"""Times that the search is narrowed to a sixteenth: to 1e-11 rad."""
+
+QUARTERINGS = 9
+"""Times that what lies between two times is looked at in quarters: to a 1e-5 of a slot."""
+
+PARTS = 4
+"""Parts of a slot in which the gain of a channel that is on for long is summed."""
+
+LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
+"""Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
+too high in the middle of a slot of w rad, which adds up over very many alignments; each factor gives a bound."""
+
+ENOUGH = 1e-10
+"""Relative height of a price that is not worth a closer look."""
+
+ROUNDING = 1e-12
+"""Share by which gains are lowered and prices raised, so that no bound is too high by the rounding of sums."""
+
+
+class Left(NamedTuple):
+    """What may be left: ``nutation`` and distance ``off`` the target in rad, ``spin`` as a share of the final one."""
+
+    nutation: float = 0.0
+    off: float = 0.0
+    spin: float = 0.0
+
+
+def rigorous(spacecraft: Spacecraft, prices: dict[str, float], cost: float, left: Left, *, shift: bool) -> float | None:
+    """Cost that no schedule of the channels of a symmetric body goes below; None where nothing is known to hold.
+
+    ``prices`` per second by the names of the channels, ``cost`` that of a schedule known, which leaves ``left``;
+    ``shift``: H counts, not only the nutation.
+    """
+    channels = usable(spacecraft, axial=True)
+    if spacecraft.disturbances or spacecraft.growth != 0.0 or any(one.name not in prices for one in channels):
+        return None
+    if left.nutation >= 0.5 * math.pi:  # the spin axis points away from H
+        return None
+    costs = np.array([prices[channel.name] for channel in channels])
+    torques = np.array([channel.torque for channel in channels])
+    axial = bool(torques[:, 2].any())
+    found = [_nutation(spacecraft, channels, costs, cost, left)]
+    if spacecraft.goal.spin is not None:
+        found.append(_nutation_and_spin(spacecraft, torques, costs, left))
+    if shift and not axial:
+        found.append(_turn(spacecraft, torques, costs, left))
+    best = max(found)
+    return best if math.isfinite(best) else None
+
+
+def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, left: Left) -> float:
+    """Least cost of taking the nutation out, at the phases at which the channels may be on."""
+    inertia, limits = spacecraft.inertia, spacecraft.limits
+    faster = cost * float(max(abs(one.axial) / price for one, price in zip(channels, costs, strict=True))) / inertia.C
+    goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    stays = inertia.C * (abs(spacecraft.spin) + faster) * math.tan(left.nutation)
+    if abs(goal) <= stays:
+        return 0.0
+    low, wide = _arcs(
+        [
+            (min(phases) - wider, max(phases) + wider)
+            for begins, ends in free_times(spacecraft, spacecraft.horizon)
+            for phases in [(inertia.a * spacecraft.spin * begins, inertia.a * spacecraft.spin * ends)]
+            for wider in [abs(inertia.a) * faster * max(ends - limits.earliest, 0.0)]
+        ]
+    )
+    points = np.array([channel.transverse for channel in channels]) / costs
+    strength, angle = np.abs(points), np.angle(points)
+
+    def value(directions: Vector) -> Vector:
+        # From the begin of each arc to the direction, for each channel: inside, the whole strength is to be had.
+        apart = np.mod(directions[:, None, None] - angle[:, None] - low, TURN)
+        beside = np.maximum(np.cos(apart), np.cos(apart - wide))
+        reach = (strength * np.where(apart <= wide, 1.0, beside).max(axis=2)).max(axis=1)
+        return _ratio(abs(goal) * np.cos(directions - np.angle(goal)) - stays, abs(goal), reach, float(strength.max()))
+
+    return _largest(value, float(np.angle(goal)), math.acos(stays / abs(goal)))
+
+
+def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) -> float:
+    """Least cost of taking the nutation out and changing the spin, whatever the phases."""
+    final = spacecraft.goal.spin
+    assert final is not None
+    C, allowed = spacecraft.inertia.C, abs(final) * left.spin
+    stays = C * (abs(final) + allowed) * math.tan(left.nutation)
+    change = final - spacecraft.spin
+    change = math.copysign(max(abs(change) - allowed, 0.0), change)
+    goal = complex(max(spacecraft.least_impulse - stays, 0.0), C * change)
+    if goal == 0.0:
+        return 0.0
+    points = np.column_stack([np.hypot(torques[:, 0], torques[:, 1]), torques[:, 2]]) / costs[:, None]
+
+    def value(directions: Vector) -> Vector:
+        inside = np.clip(directions, -0.5 * math.pi, 0.5 * math.pi)  # more than is needed may be taken of the nutation
+        toward = np.array([np.cos(inside), np.sin(inside)])
+        gain = np.array([goal.real, goal.imag]) @ toward
+        return _ratio(gain, abs(goal), (points @ toward).max(axis=0), float(np.abs(points).max()))
+
+    return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
+
+
+def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) -> float:
+    """Least cost of the way of H to the direction of the target, round the sphere of radius C|ω3|."""
+    nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - left.off, 0.0)
+    way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
+    dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
+    return spacecraft.inertia.C * abs(spacecraft.spin) * way / dearest * (1.0 - ROUNDING)
+
+
+def free_times(spacecraft: Spacecraft, horizon: float) -> list[tuple[float, float]]:
+    """When pulses may be on, (begin, end) s in order: from the earliest start to ``horizon`` s, blackout left out."""
+    limits = spacecraft.limits
+    begins, free = limits.earliest - SLACK, []
+    for dark, light in sorted(limits.blackout):
+        if dark + SLACK > begins:
+            free.append((begins, min(dark, horizon) + SLACK))
+        begins = max(begins, light - SLACK)
+        if begins >= horizon:
+            return free
+    return [*free, (begins, max(horizon, begins) + SLACK)]
+
+
+def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:
+    """Begins in [0, 2π) and lengths, rad, of the arcs that ``spans`` of phases (begin, end) cover, joined."""
+    merged: list[list[float]] = []
+    for low, high in sorted((begin % TURN, begin % TURN + end - begin) for begin, end in spans):
+        if merged and low <= merged[-1][1]:
+            merged[-1][1] = max(merged[-1][1], high)
+        else:
+            merged.append([low, high])
+    begins, ends = np.array(merged).T
+    return begins, np.minimum(ends - begins, TURN)
+
+
+def _ratio(gain: Vector, most: float, reach: Vector, strongest: float) -> Vector:
+    """Cost (n,) of a ``gain`` of up to ``most``, where one unit of cost reaches up to ``strongest``, here ``reach``."""
+    gain, reach = gain - ROUNDING * most, reach + ROUNDING * strongest
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(gain <= 0.0, 0.0, np.where(reach > 0.0, gain / reach, np.inf))
+
+
+def _largest(value: Callable[[Vector], Vector], middle: float, reach: float) -> float:
+    """The largest ``value`` (n,) -> (n,) of directions up to ``reach`` rad from ``middle``; it has one peak there."""
+    best = 0.0
+    for _ in range(NARROWINGS):
+        directions = middle + reach * np.linspace(-1.0, 1.0, LOOKS)
+        values = value(directions)
+        index = int(np.argmax(values))
+        best = max(best, float(values[index]))
+        middle, reach = float(directions[index]), 2.0 * reach / (LOOKS - 1)
+    return best
+
+
+def first_order(program: Program, prices: Vector) -> float:
+    """Cost that the ``program`` of small angles cannot go below, by ``prices`` (equations,) of one N m s each.
+
+    Any prices give a bound; the best are those of a solution.
+    """
+    if not prices.any():
+        return 0.0
+    gains = _Gains(program, prices)
+    lowered = max(gains.highest(program.strong), 0.0 if program.strong.all() else 1.0)
+    if lowered <= 0.0:
+        return 0.0
+    goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
+    factors = lowered * np.array([1.0] if program.strong.all() else LOWERINGS)
+    best = max(goal / factor - gains.lasting(~program.strong, factor) for factor in map(float, factors))
+    return float(max(best, 0.0) * (1.0 - ROUNDING))
+
+
+class _Gains:
+    """What a second of each channel is worth by some prices, over its cost, at all times at which it may be on."""
+
+    def __init__(self, program: Program, prices: Vector) -> None:
+        self.program, self.prices = program, prices
+        self.torques = np.array([channel.torque for channel in program.channels])
+        spans = free_times(program.spacecraft, program.end)
+        edges = [
+            np.linspace(begins, ends, max(math.ceil((ends - begins) / program.width), 1) + 1) for begins, ends in spans
+        ]
+        self.begins = np.concatenate([part[:-1] for part in edges])
+        self.lengths = np.concatenate([np.diff(part) for part in edges])
+        # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
+        rates = program.influence.turning
+        bend = sum(
+            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
+            for rate in np.unique(rates)
+        )
+        self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
+
+    def at(self, times: Vector) -> Vector:
+        """Worth over cost at ``times`` (n,) s, (n, channels)."""
+        worth = np.tensordot(self.program.influence.rows(times), self.prices, axes=(1, 0)) @ self.torques.T
+        return np.asarray(worth / self.program.costs)
+
+    def mean(self, centres: Vector, lengths: Vector) -> Vector:
+        """Mean of worth over cost in stretches about ``centres`` (n,) s, ``lengths`` (n,) s long, (n, channels)."""
+        lost = self.program.influence.widths(lengths)
+        worth = np.einsum("ne,nek->nk", lost * self.prices, self.program.influence.rows(centres)) @ self.torques.T
+        return np.asarray(worth / self.program.costs)
+
+    def highest(self, which: NDArray[np.bool_]) -> float:
+        """The highest worth over cost of ``which`` channels at any time; a little more where that is not exact."""
+        which_ones = np.flatnonzero(which)
+        if not len(which_ones):
+            return 0.0
+        before, after = self.at(self.begins)[:, which], self.at(self.begins + self.lengths)[:, which]
+        tops = _top(before, after, self.bends[which_ones], self.lengths[:, None])
+        best = float(max(before.max(), after.max()))
+        slot, index = np.nonzero(tops > best + ENOUGH * abs(best))
+        begins, lengths, channel = self.begins[slot], self.lengths[slot], which_ones[index]
+        highest = tops[slot, index]
+        for _ in range(QUARTERINGS):
+            if not len(begins):
+                return best + ENOUGH * abs(best)
+            lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
+            begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
+            every = np.arange(len(begins))
+            before, after = self.at(begins)[every, channel], self.at(begins + lengths)[every, channel]
+            highest = _top(before, after, self.bends[channel], lengths)
+            best = max(best, float(before.max()), float(after.max()))
+            there = highest > best + ENOUGH * abs(best)
+            begins, lengths, channel, highest = begins[there], lengths[there], channel[there], highest[there]
+        return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
+
+    def lasting(self, which: NDArray[np.bool_], lowered: float) -> float:
+        """What ``which`` channels gain by being on whenever it pays, with prices ``lowered`` by that factor."""
+        which_ones = np.flatnonzero(which)
+        if not len(which_ones):
+            return 0.0
+        costs, bends = self.program.costs[which_ones], self.bends[which_ones] / lowered
+        ends = [self.at(times)[:, which_ones] / lowered - 1.0 for times in (self.begins, self.begins + self.lengths)]
+        pays = np.flatnonzero((_top(ends[0], ends[1], bends, self.lengths[:, None]) > 0.0).any(axis=1))
+        begins, lengths = self.begins[pays], self.lengths[pays] / PARTS
+        total, before = 0.0, self.at(begins)[:, which_ones] / lowered - 1.0
+        for part in range(PARTS):
+            after = self.at(begins + (part + 1) * lengths)[:, which_ones] / lowered - 1.0
+            mean = self.mean(begins + (part + 0.5) * lengths, lengths)[:, which_ones] / lowered - 1.0
+            arch = bends * lengths[:, None] ** 2
+            gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
+            crossing = _top(before, after, bends, lengths[:, None]) > 0.0
+            gained = np.where(crossing & (gained == 0.0), _positive_mean(before, after) + arch / 12.0, gained)
+            total += float((gained * lengths[:, None] @ costs).sum())
+            before = after
+        return total
+
+
+def _top(before: Vector, after: Vector, bend: Vector, length: Vector) -> Vector:
+    """The most that a function of second derivative up to ``bend`` can be between its values at two ends."""
+    arch = 0.5 * bend * length**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        within = 0.5 * (before + after) + 0.25 * arch + 0.25 * (after - before) ** 2 / arch
+    return np.asarray(np.where(np.abs(after - before) < arch, within, np.maximum(before, after)))
+
+
+def _positive_mean(before: Vector, after: Vector) -> Vector:
+    """Mean of the positive part of a straight line from one value to another."""
+    most, least = np.maximum(before, after), np.minimum(before, after)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = 0.5 * most**2 / (most - least)
+    return np.asarray(np.where(most <= 0.0, 0.0, np.where(least >= 0.0, 0.5 * (most + least), crossing)))

@@ -1,0 +1,62 @@
+"""What other schemes plan, as starts for the scheme optimal: they know large angles, and far targets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+
+from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options
+from nutdamp.spacecraft import Spacecraft
+
+TRAINS = ((1, 12), (2, 24), (1, 24), (2, 12), (1, 48), (2, 48))
+"""Pulses in each spin turn, and in all, of the trains to a target that are tried beside the usual one."""
+
+CONES = (12, 6, 3)
+"""Half cones in a row that are tried beside the number that the scheme takes."""
+
+
+def by_other_schemes(spacecraft: Spacecraft, options: Options, *, shift: bool) -> Iterator[Schedule]:
+    """Schedules by the channels of the ``spacecraft`` for the same goal, one after the other; ``shift``: H counts.
+
+    The later ones take longer to plan, and are rarely better.
+    """
+    from nutdamp.schemes import half_cone, one_pulse, rhumb_line, two_pulse
+
+    # The Sun keeps the phase of trains alone.
+    body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
+    plain = options._replace(on_time=None, per_turn=1, cones=None)
+    plans: list[Callable[[], Schedule | Iterable[Schedule]]] = []
+    if not shift:
+        plans.append(partial(one_pulse.schedule, body, plain))
+    elif body.goal.axis is None:
+        plans.append(partial(two_pulse.alternatives, body, plain))
+    else:
+        plans.append(partial(two_pulse.schedule, body, plain))
+        plans += [partial(rhumb_line.schedule, body, one) for one in (plain, *_trains(body, plain))]
+        plans += [partial(half_cone.schedule, body, plain._replace(cones=cones)) for cones in (None, *CONES)]
+    for plan in plans:
+        try:
+            made = plan()
+            every = [made] if isinstance(made, Schedule) else list(made)
+        except Infeasible:
+            continue
+        yield from every
+
+
+def _trains(body: Spacecraft, plain: Options) -> Iterator[Options]:
+    """Trains of so many pulses, as long as the channels allow."""
+    channels = usable(body)
+    if not channels:
+        return
+    weakest = min(abs(channel.transverse) for channel in channels)
+    shortest, longest = max(one.min_on_time for one in channels), min(one.max_on_time for one in channels)
+    tried: set[tuple[int, float]] = set()
+    for per_turn, count in TRAINS:
+        on_time = min(max(body.turning_impulse / (count * weakest), shortest), longest)
+        if (per_turn, on_time) not in tried:
+            tried.add((per_turn, on_time))
+            yield plain._replace(per_turn=per_turn, on_time=on_time)

@@ -1,0 +1,403 @@
+"""Many sequences of pulses at once, each brought to the cheapest schedule near it: its channels, in its order.
+
+Unknown are starts and on-times; what the flight leaves of the equations must vanish, and on-times, gap, windows and
+horizon bound them linearly. A primal-dual interior-point iteration with quasi-Newton curvature (Nocedal and Wright
+2006, ch. 18.3 and 19) that keeps all bounds at every step, on arrays that carry the sequence first. Slopes are
+differences of flights, which cost little where hundreds are flown at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import flight
+from nutdamp.physics import attitude, rigid_cases
+from nutdamp.schemes.optimal import residual_equations
+from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+Indices = NDArray[np.int_]
+
+SIDES = 32
+"""Sides of the polygon within which H may end off its target, where it may."""
+
+DIFFERENCE = 1e-6
+"""Step of the difference quotients, in scaled unknowns."""
+
+SHARES = np.array([0.5, 0.2, 0.05, 0.01])
+"""Shares of a step that are tried where the whole does not help."""
+
+BARRIER = 1e-9
+"""Share of the cost at which the barrier of the bounds ends."""
+
+SETTLED = 1e-7
+"""Largest error of the conditions for an optimum, relative, at which a sequence is done."""
+
+FLAT = 1e-5
+"""Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it."""
+
+LEAST_ROOM = 1e-10
+"""Share of the room to a bound that a step must leave."""
+
+PROXIMAL = 1e-9
+"""Weight that keeps the multipliers finite where equations depend on one another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sequences:
+    """``which`` (b, n): the channels of b sequences of n pulses, by number.
+
+    ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n) s: its on-time.
+    """
+
+    which: Indices
+    begins: Vector
+    ends: Vector
+    shortest: Vector
+    longest: Vector
+
+    def of(self, rows: Any) -> Self:
+        """Some of the sequences."""
+        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+class Task:
+    """What is to be done by ``channels`` at ``costs`` per second, see `Equations`; H may end ``off`` N m s off target.
+
+    Unknowns x (b, 2n) of a sequence are the starts of its pulses, then their on-times, s; two more where H may end
+    off its target: how far, over ``off``.
+    """
+
+    def __init__(
+        self, body: Spacecraft, equations: Equations, channels: tuple[Channel, ...], costs: Vector, off: float = 0.0
+    ) -> None:
+        self.body, self.channels, self.costs = body, channels, costs
+        self.chosen = equations.chosen
+        self.torques = np.array([channel.torque for channel in channels])
+        self.off = off if equations.shift else 0.0
+        self.loose = 2 if self.off > 0.0 else 0
+        self.momentum = float(np.linalg.norm(body.momentum))
+        self.spin = body.spin if body.goal.spin is None else body.goal.spin
+        size = max(body.least_impulse, body.turning_impulse, body.inertia.C * abs(self.spin - body.spin))
+        self.unit = size / np.linalg.norm(self.torques, axis=1)
+        """s of each channel that are worth all there is to do"""
+        self.least = float(np.min(costs * self.unit))
+        self.pace = min(1.0 / abs(body.spin), body.inertial_period)
+        setting, start = flight.make_setting(body), body.initial
+        self._forced = setting.constant, setting.forcing
+        self._coasting = np.zeros(3), setting.forcing._replace(turning=())
+        self._start = np.asarray(setting.moments, dtype=float), start.rates, start.quaternion
+        self._target, self._across = body.target_axis, residual_equations.square_to_target(body)
+
+    def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
+        """What the flights of ``x`` (b, …) leave of the equations, (b, equations), over |H|.
+
+        Pulses act as so many ``kicks`` spread over them, without disturbances; 0 is the true motion.
+        """
+        parts = [slice(begin, begin + rigid_cases.BLOCK) for begin in range(0, len(x) or 1, rigid_cases.BLOCK)]
+        return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])
+
+    def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
+        count, n = which.shape
+        moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
+        bodies = rigid_cases.Bodies(moments, *(self._coasting if kicks else self._forced))
+        now = np.zeros(count)
+        for pulse in range(n):
+            begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
+            for kick in range(kicks):
+                t = begin + on_time * ((kick + 0.5) / kicks)
+                rigid_cases.advance(bodies, rates, turn, now, t - now, None)
+                rates += torque * (on_time / kicks) / moments
+                now = t
+            if not kicks:
+                rigid_cases.advance(bodies, rates, turn, now, begin - now, None)
+                rigid_cases.advance(bodies, rates, turn, begin, on_time, torque)
+                now = begin + on_time
+        momentum = rates * moments
+        inertial = attitude.rotate(turn.T, momentum.T)
+        shift = inertial @ self._across.T
+        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
+        if self.loose:
+            shift = shift - self.off * x[:, -2:]
+        every = np.column_stack([momentum[:2].T, shift, self.body.inertia.C * (rates[2] - self.spin)])
+        return np.asarray(every[:, self.chosen] / self.momentum)
+
+    def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
+        """What the unknowns in units of ``scale`` (b, …) change in the misses, ``here`` now: (b, equations, …)."""
+        number = x.shape[1]
+        moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
+        there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
+        changes = there.reshape(*moved.shape[:2], len(self.chosen)) - here[:, None, :]
+        return np.swapaxes(changes, 1, 2) / DIFFERENCE
+
+    def price(self, which: Indices, on: Vector) -> Vector:
+        """What sequences cost with on-times ``on`` (…, n) s."""
+        return np.asarray(np.sum(self.costs[which] * on, axis=-1))
+
+    def scale(self, which: Indices) -> Vector:
+        """Natural sizes of the unknowns, (b, …)."""
+        count, n = which.shape
+        return np.hstack([np.full((count, n), self.pace), self.unit[which], np.ones((count, self.loose))])
+
+    def bounds(self, sequences: Sequences) -> tuple[Vector, Vector]:
+        """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and ``off``."""
+        count, n = sequences.which.shape
+        one, none = np.eye(n), np.zeros((n, n))
+        after = one - np.eye(n, k=-1)
+        rows = [
+            np.hstack([after, -np.eye(n, k=-1)])[1:],
+            np.hstack([one, none]),
+            np.hstack([-one, -one]),
+            np.hstack([none, one]),
+            np.hstack([none, -one]),
+        ]
+        levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
+        levels += [sequences.shortest, -sequences.longest]
+        matrix = np.vstack(rows)
+        if self.loose:
+            angles = 2 * math.pi / SIDES * np.arange(SIDES)
+            sides = np.hstack([np.zeros((SIDES, 2 * n)), -np.column_stack([np.cos(angles), np.sin(angles)])])
+            matrix = np.vstack([np.hstack([matrix, np.zeros((len(matrix), 2))]), sides])
+            levels.append(np.full((count, SIDES), -math.cos(math.pi / SIDES)))
+        return matrix, np.hstack(levels)
+
+
+@dataclass(eq=False)
+class State:
+    """Where the descents of b sequences are: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
+
+    ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations, ``curvature`` (b, v, v) of
+    the Lagrangian, ``barrier`` and ``penalty`` (b,), ``error`` (b,) of the conditions for an optimum.
+    """
+
+    x: Vector
+    slack: Vector
+    dual: Vector
+    misses: Vector
+    slopes: Vector
+    prices: Vector
+    curvature: Vector
+    barrier: Vector
+    penalty: Vector
+    error: Vector
+
+    def of(self, rows: Any) -> State:
+        """Those of some sequences."""
+        return State(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def put(self, rows: Any, other: State) -> None:
+        """Replace those of some sequences."""
+        for field in fields(self):
+            getattr(self, field.name)[rows] = getattr(other, field.name)
+
+
+class Descent:
+    """The descents of ``sequences`` from ``x`` (b, v), which must lie within all bounds."""
+
+    def __init__(self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1) -> None:
+        self.task, self.sequences, self.kicks = task, sequences, kicks
+        self.scale = task.scale(sequences.which)
+        rows, levels = task.bounds(sequences)
+        scaled = rows * self.scale[:, None, :]
+        size = np.abs(scaled).max(axis=2)
+        self.rows = scaled / size[:, :, None]
+        n = sequences.which.shape[1]
+        self.price = np.zeros_like(self.scale)
+        self.price[:, n : 2 * n] = (task.costs * task.unit)[sequences.which] / task.least
+        count, number = x.shape
+        slack = (x @ rows.T - levels) / size
+        misses = task.misses(sequences.which, x, kicks)
+        self.state = State(
+            x=np.array(x),
+            slack=slack,
+            dual=barrier / slack,
+            misses=misses,
+            slopes=task.slopes(sequences.which, x, self.scale, misses, kicks),
+            prices=np.zeros((count, len(task.chosen))),
+            curvature=np.repeat(np.eye(number)[None], count, axis=0),
+            barrier=np.full(count, barrier),
+            penalty=np.ones(count),
+            error=np.full(count, np.inf),
+        )
+
+    @property
+    def cost(self) -> Vector:
+        """What the sequences cost now, (b,)."""
+        which = self.sequences.which
+        return self.task.price(which, self.state.x[:, which.shape[1] : 2 * which.shape[1]])
+
+    @property
+    def left(self) -> Vector:
+        """Largest miss, (b,), over |H|."""
+        return np.asarray(np.abs(self.state.misses).max(axis=1))
+
+    def keep(self, rows: Indices) -> None:
+        """Go on with some of the sequences only."""
+        self.sequences, self.state = self.sequences.of(rows), self.state.of(rows)
+        self.scale, self.rows, self.price = self.scale[rows], self.rows[rows], self.price[rows]
+
+    def run(self, steps: int) -> None:
+        """Take at most so many steps with each sequence."""
+        for _ in range(steps):
+            going = np.flatnonzero(self.state.error > SETTLED)
+            if not len(going):
+                break
+            with np.errstate(all="ignore"):  # a sequence that gets lost is left as it is
+                self.state.put(going, self._stepped(going))
+
+    def close(self, steps: int = 5) -> None:
+        """Take the last misses away by the least moves, measured by the room that is left."""
+        state, which = self.state, self.sequences.which
+        for _ in range(steps):
+            curvature = _weighted(self.rows, 1.0 / state.slack**2)
+            move, _ = _newton(state.slopes, curvature, np.zeros_like(state.x), state.misses, state.prices * 0.0)
+            move[~np.isfinite(move).all(axis=1)] = 0.0
+            closer = np.einsum("bri,bi->br", self.rows, move)
+            step = _to_bound(state.slack, closer, np.full(len(move), 0.5))[:, None]
+            x, slack = state.x + step * move * self.scale, state.slack + step * closer
+            misses = self.task.misses(which, x, self.kicks)
+            better = np.abs(misses).sum(axis=1) < np.abs(state.misses).sum(axis=1)
+            if not better.any():
+                break
+            state.x[better], state.slack[better], state.misses[better] = x[better], slack[better], misses[better]
+
+    def _stepped(self, at: Indices) -> State:
+        old = self.state.of(at)
+        rows, price, scale, which = self.rows[at], self.price[at], self.scale[at], self.sequences.which[at]
+        weight = old.dual / old.slack
+        uphill = price - np.einsum("br,bri->bi", old.barrier[:, None] / old.slack, rows)
+        curvature = old.curvature + _weighted(rows, weight)
+        move, prices = _newton(old.slopes, curvature, uphill, old.misses, old.prices)
+        lost = ~np.isfinite(move).all(axis=1) | ~np.isfinite(prices).all(axis=1)
+        move[lost], prices[lost] = 0.0, 0.0
+        penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
+        ahead = np.einsum("bi,bi->b", uphill, move)
+        line = _Line(self, at, old, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
+        closer = np.einsum("bri,bi->br", rows, move)
+        step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
+        there = line.tried(step)
+        if len(k := line.todo):  # the equations are curved: from there back onto them
+            back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
+            line.tried(step[k] + back)
+        if len(line.todo):
+            line.shortened(step[line.todo])
+        x, slack, misses = line.x, line.slack, line.misses
+        slopes = self.task.slopes(which, x, scale, misses, self.kicks)
+        curvature = _curved(old.curvature, (x - old.x) / scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices))
+        curvature[line.stuck] = np.eye(x.shape[1])
+        dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
+        dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
+        central = old.barrier[:, None] / slack
+        dual = np.clip(dual, 1e-2 * central, 1e2 * central)
+        gradient = price + np.einsum("bmi,bm->bi", slopes, prices) - np.einsum("br,bri->bi", dual, rows)
+        wrong = np.maximum(np.abs(gradient).max(axis=1), np.abs(misses).max(axis=1))
+        near = np.maximum(wrong, np.abs(dual * slack - old.barrier[:, None]).max(axis=1)) < 10.0 * old.barrier
+        barrier = np.where(near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier)
+        flat = (np.abs(ahead) < FLAT) & (old.barrier < FLAT) & (np.abs(misses).max(axis=1) < FLAT)
+        error = np.where(flat | lost, 0.0, np.maximum(wrong, (dual * slack).max(axis=1)))
+        return State(x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error)
+
+
+class _Line:
+    """The search along a step for less of cost, barrier and misses; ``slope`` (b,) is how fast they fall at first."""
+
+    def __init__(self, descent: Descent, at: Indices, old: State, penalty: Vector, slope: Vector) -> None:
+        self.task, self.kicks, self.which = descent.task, descent.kicks, descent.sequences.which[at]
+        self.price, self.scale, self.rows = descent.price[at], descent.scale[at], descent.rows[at]
+        self.old, self.penalty, self.slope = old, penalty, np.minimum(slope, 0.0)
+        self.x, self.slack, self.misses = old.x.copy(), old.slack.copy(), old.misses.copy()
+        self.todo = np.arange(len(at))
+        self.before = self._merit(old.x, old.slack, old.misses, self.todo)
+        self.stuck = np.zeros(len(at), dtype=bool)
+
+    def tried(self, step: Vector) -> Vector:
+        """Take the scaled ``step`` (k, v) of those still to do where it falls enough; the misses where it does not."""
+        k = self.todo
+        x, slack, misses, enough = self._trial(k, step, 1.0)
+        self._take(k[enough], x[enough], slack[enough], misses[enough])
+        self.todo = k[~enough]
+        return misses[~enough]
+
+    def shortened(self, step: Vector) -> None:
+        """Take the first of the `SHARES` of the ``step`` (k, v) of those still to do that falls enough, or the last."""
+        k, count = self.todo, len(SHARES)
+        share = np.repeat(SHARES, len(k))
+        x, slack, misses, enough = self._trial(np.tile(k, count), share[:, None] * np.tile(step, (count, 1)), share)
+        x, slack, misses = (part.reshape(count, len(k), -1) for part in (x, slack, misses))
+        enough = enough.reshape(count, len(k))
+        self.stuck[k] = ~enough.any(axis=0)
+        first, every = np.where(self.stuck[k], count - 1, np.argmax(enough, axis=0)), np.arange(len(k))
+        self._take(k, x[first, every], slack[first, every], misses[first, every])
+
+    def _trial(
+        self, k: Indices, step: Vector, share: Vector | float
+    ) -> tuple[Vector, Vector, Vector, NDArray[np.bool_]]:
+        """Unknowns, slacks and misses after a step, and whether it falls enough for its ``share`` of the whole."""
+        old = self.old
+        slack = old.slack[k] + np.einsum("bri,bi->br", self.rows[k], step)
+        inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)
+        x = np.where(inside[:, None], old.x[k] + step * self.scale[k], old.x[k])
+        slack = np.where(inside[:, None], slack, old.slack[k])
+        misses = self.task.misses(self.which[k], x, self.kicks)
+        merit = self._merit(x, slack, misses, k)
+        least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
+        return x, slack, misses, inside & (merit <= least)
+
+    def _take(self, k: Indices, x: Vector, slack: Vector, misses: Vector) -> None:
+        self.x[k], self.slack[k], self.misses[k] = x, slack, misses
+
+    def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
+        dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k]) - self.old.barrier[k] * np.log(slack).sum(axis=1)
+        return np.asarray(dear + self.penalty[k] * np.abs(misses).sum(axis=1))
+
+
+def _weighted(rows: Vector, weight: Vector) -> Vector:
+    """rowsᵀ weight rows, (b, v, v), for rows (b, r, v) and weights (b, r)."""
+    return np.asarray(np.matmul(np.swapaxes(rows * weight[:, :, None], 1, 2), rows))
+
+
+def _newton(slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, prices: Vector) -> tuple[Vector, Vector]:
+    """Step (b, v) in scaled unknowns and prices (b, m) of the equations, by the conditions for an optimum."""
+    count, m, v = slopes.shape
+    system = np.zeros((count, v + m, v + m))
+    system[:, :v, :v] = curvature
+    system[:, :v, v:] = np.swapaxes(slopes, 1, 2)
+    system[:, v:, :v] = slopes
+    system[:, v:, v:] = -PROXIMAL * np.eye(m)
+    right = np.concatenate([-uphill, -misses - PROXIMAL * prices], axis=1)
+    try:
+        found = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:  # some are singular: those are lost, not all
+        found = np.full(right.shape, np.nan)
+        for row in range(count):
+            with suppress(np.linalg.LinAlgError):
+                found[row] = np.linalg.solve(system[row], right[row])
+    return found[:, :v], found[:, v:]
+
+
+def _to_bound(value: Vector, change: Vector, barrier: Vector) -> Vector:
+    """Largest step (b,), at most 1, that leaves a little of each ``value`` (b, r)."""
+    keep = np.maximum(0.99, 1.0 - barrier)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.where(change < 0.0, -keep * value / change, np.inf)
+    return np.asarray(np.minimum(steps.min(axis=1), 1.0))
+
+
+def _curved(curvature: Vector, moved: Vector, change: Vector) -> Vector:
+    """Powell's damped BFGS update of (b, v, v) by the ``change`` (b, v) of the gradient along ``moved`` (b, v)."""
+    along = np.einsum("bij,bj->bi", curvature, moved)
+    size, gain = np.einsum("bi,bi->b", moved, along), np.einsum("bi,bi->b", moved, change)
+    spread = np.where(size > gain, size - gain, 1.0)
+    share = np.where(gain >= 0.2 * size, 1.0, 0.8 * size / spread)[:, None]
+    change = share * change + (1.0 - share) * along
+    gain = np.einsum("bi,bi->b", moved, change)
+    good = (size > 1e-20) & (gain > 1e-20)
+    size, gain = np.where(good, size, 1.0)[:, None, None], np.where(good, gain, 1.0)[:, None, None]
+    update = change[:, :, None] * change[:, None, :] / gain - along[:, :, None] * along[:, None, :] / size
+    return np.asarray(curvature + np.where(good[:, None, None], update, 0.0))

@@ -1,0 +1,392 @@
+"""Least-cost firing of body-fixed channels as a linear program over channels and firing times.
+
+Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
+and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at
+any moment. Columns enter the program by their price, since a handful of equations needs few of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.schemes.optimal import lp_solver
+from nutdamp.schemes.optimal.residual_equations import Influence
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+SLOTS = 64
+"""Slots in the faster of the two turns, at ω3 and at aω3."""
+
+MOST_SLOTS = 600_000
+"""Slots of all channels together: a horizon of more is looked at as far as they reach."""
+
+SLACK_COST = 1e3
+"""Cost of what no column supplies, over the dearest channel's: used only where there is no solution."""
+
+PRICE = 1e-7
+"""Relative reduced cost below which a column cannot lower the cost any more."""
+
+PEAK = 1e-6
+"""The same for the best moment of a strong channel, which may lie ever so little beside one taken."""
+
+BEST = 250
+"""Columns taken in per round, the best priced first."""
+
+MANY = 4
+"""Share of all columns worth taking in that is taken in, over one, while they do not supply what is needed."""
+
+PROVED = 1e-6
+"""Shortfall by which a program is proved to have no solution, over all there is to do."""
+
+FIRST = 400
+"""Columns to begin with."""
+
+ROUNDS = 60
+
+LOOK = 0.05
+"""Peaks of the price this far below zero are looked at more closely within their slots."""
+
+SIDES = 32
+"""Directions in which H may end off the target, where it may."""
+
+TINIEST = 1e-6
+"""Coefficient below which an equation is not scaled up any more."""
+
+SOME = 1e-12
+"""Share of what is needed below which an on-time is rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Burn:
+    """Neighbouring slots of one channel taken together: centre and on-time in s."""
+
+    channel: Channel
+    t: float
+    on_time: float
+
+    @property
+    def impulse(self) -> float:
+        """Torque times on-time, N m s."""
+        return self.on_time * float(np.linalg.norm(self.channel.torque))
+
+
+class Columns(NamedTuple):
+    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
+
+    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
+    """
+
+    channel: NDArray[np.int_]
+    t: Vector
+    width: Vector
+    burn: NDArray[np.int_]
+
+    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> Columns:
+        """Some of the columns."""
+        return Columns(self.channel[which], self.t[which], self.width[which], self.burn[which])
+
+    def joined(self, other: Columns) -> Columns:
+        """These columns and others."""
+        return Columns(
+            np.concatenate([self.channel, other.channel]),
+            np.concatenate([self.t, other.t]),
+            np.concatenate([self.width, other.width]),
+            np.concatenate([self.burn, other.burn]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
+
+    Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the target H is to end,
+    where it may. ``prices`` (equations,) are what one more N m s of each goal costs, zero where that is not known.
+    """
+
+    burns: tuple[Burn, ...]
+    cost: float
+    unmet: float
+    off: Vector
+    prices: Vector
+
+
+@dataclass(eq=False)
+class Program:
+    """The linear program of one spacecraft.
+
+    ``costs`` (channels,) per second of on-time. ``influence`` holds the equations, which may be exchanged for others
+    between solutions. ``off`` N m s is how far from its target H may end. ``haste``: by how much (relatively) the end
+    of the horizon seems dearer than its beginning, among equals the early moments are taken. ``forbidden`` (channels,
+    slots) may not be used.
+    """
+
+    spacecraft: Spacecraft
+    channels: tuple[Channel, ...]
+    costs: Vector
+    influence: Influence
+    off: float = 0.0
+    haste: float = 0.0
+    end: float = field(init=False)
+    width: float = field(init=False)
+    centres: Vector = field(init=False)
+    forbidden: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        body, limits = self.spacecraft, self.spacecraft.limits
+        slot = 2 * math.pi / max(abs(body.inertia.a * body.spin), abs(body.spin)) / SLOTS
+        self.end = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
+        count = max(math.ceil((self.end - limits.earliest) / slot), 1)
+        edges = np.linspace(limits.earliest, self.end, count + 1)
+        self.width = float(edges[1] - edges[0])
+        self.centres = 0.5 * (edges[1:] + edges[:-1])
+        blocked = np.zeros(count, dtype=bool)
+        for begins, ends in limits.blackout:
+            blocked |= (edges[:-1] < ends) & (edges[1:] > begins)
+        self.forbidden = np.tile(blocked, (len(self.channels), 1))
+        self._pool: Columns | None = None
+        self._torques = np.array([channel.torque for channel in self.channels])
+        self.aim(self.influence)
+
+    def aim(self, influence: Influence) -> None:
+        """Take other equations."""
+        self.influence = influence
+        self._scale = float(np.linalg.norm(influence.goal))
+        strength = np.linalg.norm(self._torques, axis=1)
+        self._unit = self._scale / strength  # s of firing that are worth all there is to do
+        self._direction = self._torques / strength[:, None]
+        self._strong = self._unit < self.width
+        self._price = self.costs * self._unit
+        self._dearest = float(self._price.max())
+        self._grid: Vector | None = None
+
+    @property
+    def strong(self) -> NDArray[np.bool_]:
+        """Channels (channels,) that give all that is needed within one slot, and so act at a moment."""
+        return np.asarray(self._strong)
+
+    def solve(self, columns: Columns | None = None, *, enough: bool = False) -> Solution:
+        """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation.
+
+        ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
+        """
+        nothing = np.zeros(len(self.influence.goal))
+        if self._scale == 0.0:
+            return Solution((), 0.0, 0.0, np.zeros(2), nothing)
+        generate = columns is None
+        chosen = self._first() if columns is None else columns
+        found = self._master(chosen)
+        if found is None:
+            return Solution((), math.inf, math.inf, np.zeros(2), nothing)
+        for _ in range(ROUNDS if generate else 0):
+            unmet = float(found.x[len(chosen.t) :][: 2 * len(nothing)].sum())
+            if enough and (unmet <= SOME or self._out_of_reach(found.prices)):
+                break
+            new = self._priced(found.prices, chosen, unmet)
+            more = chosen.joined(new)
+            better = self._master(more) if len(new.t) else None
+            if better is None:  # nothing lowers the cost any more, or what would is lost on the solver
+                break
+            chosen, found = more, better
+        if generate:
+            self._pool = chosen
+        count, equations = len(chosen.t), len(nothing)
+        amounts, slack = found.x[:count], found.x[count:]
+        used = amounts > SOME
+        on_times = amounts[used] * self._unit[chosen.channel[used]]
+        return Solution(
+            self._burns(chosen.of(used), on_times),
+            float(self.costs[chosen.channel[used]] @ on_times),
+            float(slack[: 2 * equations].sum()),
+            self._off_by(slack[2 * equations :]),
+            found.prices * self._dearest / self._scale,
+        )
+
+    def _master(self, columns: Columns) -> lp_solver.Optimum | None:
+        """Amounts (n,) in units of all there is to do, and slacks, of the columns' program; prices (equations,)."""
+        count = len(self.influence.goal)
+        ring = self._ring()
+        matrix = np.hstack([self._coefficients(columns), np.eye(count), -np.eye(count), ring])
+        # Rows and columns to coefficients about one: axial torques may be small beside the transverse ones.
+        level = np.abs(matrix[:, : len(columns.t)]).max(axis=1, initial=TINIEST)
+        cost = np.concatenate(
+            [
+                self._price[columns.channel] / self._dearest * self._dearness(columns.t),
+                np.full(2 * count, SLACK_COST),
+                np.zeros(ring.shape[1]),
+            ]
+        )
+        most = np.full(len(cost), np.inf)
+        wide = np.flatnonzero(columns.width)
+        most[wide] = columns.width[wide] / self._unit[columns.channel[wide]]
+        # The shares of the directions in which H may end off its target add up to no more than `off`.
+        shares = np.zeros((min(ring.shape[1], 1), len(cost)))
+        shares[:, len(cost) - ring.shape[1] :] = 1.0
+        longest = np.zeros((0, len(cost)))
+        if columns.burn.max(initial=-1) >= 0:
+            longest = self._longest(columns, len(cost))
+        limits = np.concatenate([np.full(len(shares), self.off / self._scale), np.ones(len(longest))])
+        goal = self.influence.goal / self._scale / level
+        found = lp_solver.least(cost, matrix / level[:, None], goal, most, np.vstack([shares, longest]), limits)
+        return None if found is None else found._replace(prices=found.prices / level)
+
+    def _longest(self, columns: Columns, count: int) -> Vector:
+        """Rows (burns, ``count``) that hold each burn's on-time, over the longest that its channel may be on."""
+        longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
+        bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
+        numbers, row = np.unique(columns.burn[bounded], return_inverse=True)
+        rows = np.zeros((len(numbers), count))
+        rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
+        return rows
+
+    def _ring(self) -> Vector:
+        """Columns for free in all directions of the shift, (equations, SIDES), where H may end off its target."""
+        if self.off == 0.0:
+            return np.zeros((len(self.influence.goal), 0))
+        angles = 2 * math.pi / SIDES * np.arange(SIDES)
+        ring = np.zeros((len(self.influence.goal), SIDES))
+        ring[2:4] = np.cos(angles), np.sin(angles)
+        return ring
+
+    def _off_by(self, amounts: Vector) -> Vector:
+        return np.asarray(-(self._ring() @ amounts)[2:4] * self._scale) if self.off > 0.0 else np.zeros(2)
+
+    def _dearness(self, times: Vector) -> Vector:
+        return 1.0 + self.haste * times / float(self.centres[-1])
+
+    def _coefficients(self, columns: Columns) -> Vector:
+        """What one unit of each column does in the equations, (equations, n)."""
+        rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
+        return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
+
+    def _worth(self, weights: Vector) -> Vector:
+        """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
+        if self._grid is None:
+            lost = self.influence.widths(np.array([self.width]))[0]
+            self._grid = self.influence.rows(self.centres) * lost[:, None]
+        worth = self._direction @ np.tensordot(weights, self._grid, axes=(0, 1)).T
+        worth[self.forbidden] = -np.inf
+        return np.asarray(worth)
+
+    def _gains(self, weights: Vector) -> Vector:
+        """The same, less what it costs."""
+        return np.asarray(self._worth(weights) - (self._price / self._dearest)[:, None] * self._dearness(self.centres))
+
+    def _out_of_reach(self, weights: Vector) -> bool:
+        """Whether prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
+        if self._strong.any():  # these act at moments, of which the slots are only samples
+            return False
+        size = float(np.abs(weights).max())
+        most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
+        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
+
+    def _first(self) -> Columns:
+        """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
+        if self._pool is not None:
+            pool = self._pool
+            allowed = ~self.forbidden[pool.channel, self._slot(pool.t)]
+            return pool.of(allowed)
+        worth = self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
+        channel, slot = np.nonzero(worth > 0.7 * worth.max(initial=0.0) - 0.3)
+        chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
+        return self._slots(channel[chosen], slot[chosen])
+
+    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
+        return _alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
+
+    def _priced(self, duals: Vector, taken: Columns, unmet: float) -> Columns:
+        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
+
+        More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
+        """
+        gains = self._gains(duals)
+        weak = np.where(self._strong[:, None], -np.inf, gains)
+        slots = taken.width > 0.0
+        weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
+        channel, slot = np.nonzero(weak > PRICE)
+        most = max(BEST, len(slot) // MANY if unmet > SOME else 0)
+        if len(slot) > most:
+            best = np.argpartition(weak[channel, slot], -most)[-most:]
+            channel, slot = channel[best], slot[best]
+        found = self._slots(channel, slot)
+        return found.joined(self._peaks(gains, duals)) if self._strong.any() else found
+
+    def _peaks(self, gains: Vector, duals: Vector) -> Columns:
+        """Moments within slots at which a strong channel is worth most."""
+        padded = np.pad(np.where(self._strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
+        middle = padded[:, 1:-1]
+        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
+        order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
+        channel, centre = channel[order], self.centres[slot[order]]
+        within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
+        times = centre[:, None] + within
+        fives = _alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
+        cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
+        worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
+        best = np.argmax(worth, axis=1)
+        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+        low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+        bend = low - 2.0 * top + high
+        aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+        aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
+        t = times[every, inner] + aside * 0.25 * self.width
+        good = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best]) > PEAK
+        return _alone(channel[good], t[good], np.zeros(int(good.sum())))
+
+    def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
+        """Neighbouring columns of a channel as one burn about their common centre."""
+        burns: list[Burn] = []
+        for index in np.unique(columns.channel):
+            mine = np.flatnonzero(columns.channel == index)
+            mine = mine[np.argsort(columns.t[mine], kind="stable")]
+            apart = (np.diff(columns.t[mine]) > 1.01 * self.width) | (np.diff(columns.burn[mine]) != 0)
+            for group in np.split(mine, np.flatnonzero(apart) + 1):
+                total = float(on_times[group].sum())
+                burns.append(Burn(self.channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+        return tuple(sorted(burns, key=lambda burn: burn.t))
+
+    def forbid(self, channel: Channel | None, start: float, end: float) -> None:
+        """Forbid the slots of a channel (of all channels) that lie within ``start`` to ``end`` s."""
+        inside = (self.centres > start) & (self.centres < end)
+        rows = slice(None) if channel is None else self.channels.index(channel)
+        self.forbidden[rows, inside] = True
+
+    def about(self, burns: Sequence[Burn], zoom: float = 1.0) -> Columns:
+        """Columns from which ``burns`` may be made anew: their slots, and an eighth of the faster turn on each side.
+
+        Strong channels fire within that divided by ``zoom``.
+        """
+        owner = np.full(self.forbidden.shape, -1)
+        away = np.full(self.forbidden.shape, np.inf)
+        impulses = _alone(np.zeros(0, dtype=int), np.zeros(0), np.zeros(0))
+        half = 0.5 * self.width
+        for number, burn in enumerate(burns):
+            index = self.channels.index(burn.channel)
+            reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
+            if self._strong[index]:
+                times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
+                times = np.unique(np.clip(times, self.centres[0] - half, self.centres[-1] + half))
+                times = times[~self.forbidden[index, self._slot(times)]]
+                same = np.full(len(times), index)
+                impulses = impulses.joined(Columns(same, times, np.zeros(len(times)), np.full(len(times), number)))
+            else:
+                distance = np.abs(self.centres - burn.t)
+                nearer = (distance < reach) & (distance < away[index])
+                owner[index, nearer], away[index, nearer] = number, distance[nearer]
+        kept = np.nonzero((owner >= 0) & ~self.forbidden)
+        return self._slots(*kept)._replace(burn=owner[kept]).joined(impulses)
+
+    def _slot(self, times: Vector) -> NDArray[np.int_]:
+        """The slots in which ``times`` (n,) s lie."""
+        slot = np.floor((times - self.centres[0]) / self.width + 0.5).astype(int)
+        return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
+
+
+def _alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
+    """Columns that belong to no burn."""
+    return Columns(channel, t, width, np.full(len(t), -1))

@@ -1,0 +1,189 @@
+"""What the scheme optimal is to do: channels, costs, equations; their program of small angles, bounds and reasons."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
+from nutdamp.schedule import Bounds, Schedule
+from nutdamp.schemes import Options
+from nutdamp.schemes.optimal import bounds, residual_equations
+from nutdamp.schemes.optimal.bounds import Left
+from nutdamp.schemes.optimal.linear_program import Program, Solution
+from nutdamp.schemes.optimal.repair import UNMET
+from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.spacecraft import Spacecraft
+
+LEFT = math.radians(1e-6)
+"""rad of nutation and distance from the target, and share of the spin, below which a plan has been found."""
+
+LATEST = 64.0
+"""Times the horizon up to which a feasible one is looked for, to name it."""
+
+SHARPEST = 1e-3
+"""Relative accuracy of a least time by the program of small angles."""
+
+NAMED = 5e-3
+"""The same where it is only advice."""
+
+
+class Problem:
+    """What stays the same while a schedule is looked for."""
+
+    def __init__(self, spacecraft: Spacecraft, options: Options) -> None:
+        self.spacecraft, self.options = spacecraft, options
+        asked = spacecraft.goal.spin is not None
+        self.channels = tuple(usable(spacecraft, axial=asked))
+        if not self.channels:
+            raise Infeasible(no_channels(spacecraft))
+        if asked and not any(channel.axial for channel in self.channels):
+            raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
+        self.equations = Equations(shift=not options.free_axis, spin=asked)
+        flows = [channel.mass_flow for channel in self.channels]
+        known = [flow for flow in flows if flow is not None]
+        if options.least != "impulse" and len(known) == len(flows):
+            self.costs, self.unit = np.array(known), "kg"
+        else:
+            self.costs = np.array([channel.strength for channel in self.channels])
+            self.unit = "N m s"
+
+    def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
+        """The linear program of small angles, with another horizon or other equations if given."""
+        body, equations = spacecraft or self.spacecraft, equations or self.equations
+        aim = residual_equations.small_angles(body, equations)
+        off = 0.0
+        if self.options.shift is not None and equations.shift:
+            final = body.spin if body.goal.spin is None else body.goal.spin
+            off = body.inertia.C * abs(final) * math.sin(min(self.options.shift, 0.5 * math.pi))
+        return Program(body, self.channels, self.costs, aim, off=off)
+
+    def within(self, horizon: float) -> Spacecraft:
+        """The spacecraft with another horizon."""
+        return replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=horizon))
+
+    def feasible(self, horizon: float) -> bool:
+        """Whether the program of small angles has a solution within ``horizon`` s."""
+        return self.program(self.within(horizon)).solve(enough=True).unmet <= UNMET
+
+    def least_horizon(self, low: float, high: float, sharp: float = SHARPEST) -> float:
+        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow.
+
+        To a share ``sharp`` of it, and feasible.
+        """
+        while high - low > sharp * high:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.feasible(middle) else (middle, high)
+        return high
+
+    def check_number(self, solution: Solution) -> None:
+        """Raise Infeasible where burns of the longest on-time would be more than the moments there are for them."""
+        needed = math.fsum(burn.on_time / burn.channel.max_on_time for burn in solution.burns)
+        if needed > self.program().forbidden.size:
+            longest = max(burn.channel.max_on_time for burn in solution.burns)
+            raise Infeasible(
+                f"at least {needed:.3g} pulses would be needed, for none may be longer than {longest:.3g} s "
+                "(max_on_time)"
+            )
+
+    def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
+        """The schedule with what any other must cost."""
+        program = self.program()
+        first = first or program.solve()
+        least = None if first.unmet > UNMET else bounds.first_order(program, first.prices)
+        return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end))
+
+    def rigorous(self, made: Schedule) -> float | None:
+        """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""
+        body = self.spacecraft
+        left = self.leaves(flight.flown(body, made))
+        return bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
+
+    def prices(self) -> dict[str, float]:
+        """Cost per second, in the unit of the bounds, of every channel of which it is known."""
+        flows = {channel.name: channel.mass_flow for channel in self.spacecraft.channels}
+        if self.unit == "kg":
+            return {name: flow for name, flow in flows.items() if flow is not None}
+        return {channel.name: channel.strength for channel in self.spacecraft.channels}
+
+    def price(self, made: Schedule) -> float:
+        """What a schedule costs by the program's own prices."""
+        price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
+        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
+
+    def left(self, flown: flight.Flight) -> float:
+        """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
+        nutation, off, spin = self.leaves(flown)
+        return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
+
+    def leaves(self, flown: flight.Flight) -> Left:
+        """What a flight leaves of what is asked for."""
+        residual, goal = flown.residual, self.spacecraft.goal
+        off = residual.axis_error if self.equations.shift else 0.0
+        return Left(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
+
+    def rounded(self, made: Schedule) -> float:
+        """What starts and on-times on ticks can leave, rad: half a tick of each, added up as chance does; else zero."""
+        body, half = self.spacecraft, 0.5 * (self.spacecraft.limits.tick or 0.0)
+        rate = max(1.0, abs(body.inertia.a)) * abs(body.spin)
+        each = [pulse.magnitude * math.hypot(1.0 / pulse.on_time, rate) for pulse in made if pulse.on_time > 0.0]
+        return half * math.hypot(*each) / (body.inertia.C * abs(body.spin))
+
+    def not_found(self) -> str:
+        """Why no schedule was found although the program has solutions: the limits that it does not know of."""
+        limits = self.spacecraft.limits
+        shortest = max(channel.min_on_time for channel in self.channels)
+        longest = min(channel.max_on_time for channel in self.channels)
+        kept = {
+            f"a gap of {limits.gap:.4g} s": limits.gap > 0.0,
+            f"max_pulses {limits.max_pulses}": limits.max_pulses is not None,
+            f"on-times of {shortest:.4g} s or more": shortest > 0.0,
+            f"on-times of {longest:.4g} s or less": math.isfinite(longest),
+            f"ticks of {limits.tick or 0.0:.4g} s": limits.tick is not None,
+        }
+        named = [name for name, limited in kept.items() if limited] or ["one pulse after the other"]
+        return (
+            "not found: for small angles, without other limits than the horizon, there are schedules; on the true "
+            f"motion none was found with {', '.join(named)}; another horizon may help"
+        )
+
+    def cure(self) -> str:
+        """Why the program has no solution, and which limit to relax."""
+        body = self.spacecraft
+        names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
+        nutation = Equations(shift=False)
+        left = self.program(body, nutation).solve().unmet
+        if left <= UNMET:
+            wanted = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
+            if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
+                wanted = "the spin cannot be brought to the rate of the goal"
+            out = "the nutation can be taken out, but " if body.transverse_rate > 0.0 else ""
+            what = f"within {horizon:.4g} s {out}{wanted}"
+        else:
+            what = (
+                f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
+                f"{100.0 * min(left, 1.0):.2g} % of it stays"
+            )
+        return f"{what}; {self.relaxed()}"
+
+    def relaxed(self) -> str:
+        """The limit that has to be relaxed, and how far."""
+        body = self.spacecraft
+        horizon = later = body.horizon
+        while later < LATEST * horizon:
+            later *= 2.0
+            if self.feasible(later):
+                needed = self.least_horizon(0.5 * later, later, NAMED)
+                shifts = self.equations.shift and body.transverse_rate > 0.0
+                more = ", or use --free-axis" if shifts else ""
+                return f"set limits.horizon to {needed:.4g} s or later ({needed - horizon:.3g} s more){more}"
+        if body.limits.blackout:
+            free = replace(body, limits=replace(body.limits, blackout=()))
+            if self.program(free).solve().unmet <= UNMET:
+                return "shorten the blackout windows (without any it can be done)"
+        return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"

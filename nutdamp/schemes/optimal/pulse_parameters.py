@@ -1,0 +1,64 @@
+"""What can be turned of a schedule of body-fixed channels: centre and on-time of each pulse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.limits import longest_on_time
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes.optimal import residual_equations
+from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.spacecraft import Spacecraft, Vector
+
+
+class PulseParameters:
+    """Centre and on-time of each pulse, as one vector: (c1, τ1, c2, τ2 …) s, its scale, and how far each may go."""
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        limits, names = spacecraft.limits, {channel.name: channel for channel in spacecraft.channels}
+        self.channels = [names[pulse.channel] for pulse in made]
+        self.made = made
+        pace = 1.0 / abs(spacecraft.spin)
+        ready, bounds = limits.earliest, []
+        for pulse in made:
+            latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - 1e-9)])
+            begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + 1e-9)])
+            bounds.append([begun, latest])
+            ready = pulse.end + limits.gap
+        for index in range(len(bounds) - 1):
+            off, on = made.pulses[index].end, made.pulses[index + 1].start
+            half = 0.5 * max(on - off - limits.gap, 0.0)
+            bounds[index][1] = min(bounds[index][1], off + half)
+            bounds[index + 1][0] = max(bounds[index + 1][0], on - half)
+        self.room = bounds
+        start: list[float] = []
+        scale: list[float] = []
+        lower: list[float] = []
+        upper: list[float] = []
+        for pulse, channel, (begun, latest) in zip(made, self.channels, bounds, strict=True):
+            before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
+            start += [pulse.t, pulse.on_time]
+            scale += [pace, min(pulse.on_time, pace)]
+            lower += [pulse.t - 0.5 * before, min(channel.min_on_time, pulse.on_time)]
+            most = min(longest_on_time(spacecraft, channel), pulse.on_time + min(before, after))
+            upper += [pulse.t + 0.5 * after, max(most, pulse.on_time)]
+        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+
+    def schedule(self, x: Vector) -> Schedule:
+        """The schedule with these settings."""
+        pairs = x.reshape(-1, 2)
+        pulses = (
+            channel_pulse(channel, float(t), float(on)) for channel, (t, on) in zip(self.channels, pairs, strict=True)
+        )
+        return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
+
+    def slopes(self, made: Schedule, flown: flight.Flight, equations: Equations, step: float) -> Vector:
+        """What the scaled parameters change in the equations, (equations, 2k) N m s."""
+        rows = residual_equations.along(flown, equations, step).rows
+        columns = []
+        begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in made), strict=True))
+        for index, channel in enumerate(self.channels):
+            on, off = begins[index] @ channel.torque, ends[index] @ channel.torque
+            columns += [off - on, 0.5 * (on + off)]
+        return np.asarray(np.column_stack(columns) * self.scale)

@@ -1,0 +1,314 @@
+"""Least propellant over channels and firing times: no nutation left, H on its target, and the spin as asked.
+
+The program of `linear_program` finds the burns, at first with small angles. The schedule is flown, the program's
+equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
+and on-times are polished on it. Where that finds nothing, where the horizon is no longer than a few nutation periods
+and where the schedule is dear, `starting_points` looks for a cheaper one from very many starts. Two bounds go with the
+plan: the program's first least cost, of first order, and a rigorous one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.errors import Infeasible
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options
+from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
+from nutdamp.schemes.optimal.descent import Task
+from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
+from nutdamp.schemes.optimal.problem import LEFT, Problem
+from nutdamp.schemes.optimal.refine import refine
+from nutdamp.schemes.optimal.repair import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
+from nutdamp.schemes.tools.least_squares import keeps_limits
+from nutdamp.spacecraft import Spacecraft
+
+CHOICES = 3
+"""Times that burns are chosen among all channels and moments: at small angles, then along the flight before."""
+
+AIMS = 8
+"""Flights along which the burns chosen are corrected, at most."""
+
+LOST = 0.5
+"""Share of what there is to do that corrected burns may fail to supply before others are chosen."""
+
+DEAR = 0.01
+"""Share above the program's least cost from which all channels and moments are looked at again."""
+
+DEARER = 0.03
+"""Share above it from which shorter horizons are looked at too."""
+
+WAYS = 3
+"""Schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks."""
+
+SHORT = 4.0
+"""Inertial nutation periods up to which very many starts are tried."""
+
+STRONG = 0.3
+"""Inertial periods within which a strong channel does all there is to do."""
+
+PROVED = 0.002
+"""Share above the rigorous bound below which they are not: there is little to be saved."""
+
+EQUAL = 1e-6
+"""The same where what H-keeping schedules cost is not looked at any more."""
+
+HALVINGS = 3
+"""Shorter horizons that are looked at where there is a schedule already."""
+
+HASTE = 0.0008
+"""How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
+
+NEAR = 0.05
+"""rad left from which a flight is near enough to be polished."""
+
+SHARP = 0.02
+"""Relative accuracy of a least time by schedules found."""
+
+AS_GOOD = math.radians(1e-3)
+"""rad left on ticks below which schedules are as good as one another."""
+
+MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""By how much more than the program's least time a schedule may need, tried in turn."""
+
+
+def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+    """The cheapest schedule found, with its bounds.
+
+    Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
+    """
+    search = _Search(_before_it_fades(spacecraft), options)
+    if options.least == "time":
+        search = search.sooner()
+    elif options.least == "pulses":
+        return _fewest(search)
+    return search.schedule()
+
+
+def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
+    """With the horizon no later than dissipation has left a millionth of the nutation: waiting on costs ever less."""
+    if spacecraft.growth >= 0.0:
+        return spacecraft
+    faded = spacecraft.limits.earliest - residual_equations.MOST_GROWN / spacecraft.growth
+    return replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
+
+
+def _fewest(search: _Search) -> Schedule:
+    """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
+    from nutdamp.schemes import one_pulse, two_pulse
+
+    body, options = search.spacecraft, search.options
+    scheme = one_pulse if options.free_axis else two_pulse
+    if body.torquer is None and body.goal.spin is None:
+        try:
+            made = scheme.schedule(body, options)
+        except Infeasible:
+            made = Schedule()
+        if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
+            return search.with_bounds(made)
+    return search.schedule()
+
+
+class _Found(NamedTuple):
+    """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
+
+    left: float
+    price: float
+    made: Schedule
+
+
+class _Search(Problem):
+    """The search for the cheapest schedule."""
+
+    def sooner(self) -> _Search:
+        """The same search with the shortest horizon in which a schedule is found."""
+        begin, horizon = self.spacecraft.limits.earliest, self.spacecraft.horizon
+        if not self.feasible(horizon):
+            return self
+        span = self.least_horizon(begin, horizon) - begin
+        low, high = begin + span, horizon
+        for margin in MARGINS:  # small angles let channels fire at once, the schedule does not
+            end = begin + span * (1.0 + margin)
+            if end >= horizon:
+                break
+            if _Search(self.within(end), self.options).found():
+                high = end
+                break
+            low = end
+        if high == horizon and not _Search(self.within(horizon), self.options).found():
+            return self  # shorter ones are looked at on the way to a schedule
+        while high - low > SHARP * high:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)
+        return _Search(self.within(high), self.options)
+
+    def found(self) -> bool:
+        """Whether a schedule is found with this very horizon."""
+        least = self.program().solve()
+        return least.unmet <= UNMET and self.settled(least.cost) is not None
+
+    def schedule(self) -> Schedule:
+        """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
+        first = self.program().solve()
+        self.check_number(first)
+        best = self.cheapest(first)
+        if self.looser and not self.proved(best, EQUAL):
+            kept = _Search(self.spacecraft, self.options._replace(free_axis=False, shift=None))
+            best = self.cheaper(best, kept.cheapest(kept.program().solve()))
+        if best is None:
+            raise Infeasible(self.cure() if UNMET < first.unmet < math.inf else self.not_found())
+        return self.with_bounds(best, first)
+
+    @property
+    def looser(self) -> bool:
+        """Whether H may end elsewhere, so that a schedule that keeps it, or brings it to the target, will do too."""
+        return self.options.free_axis or self.options.shift is not None
+
+    def cheapest(self, first: Solution) -> Schedule | None:
+        """The cheapest schedule found, where the program's ``first`` solution is this."""
+        # Infinite where the solver gave up: then there may be solutions all the same.
+        best = None if UNMET < first.unmet < math.inf else self.programmed(first)
+        if self.doubtful(best, first):
+            best = self.cheaper(best, self.descended(best))
+        return best
+
+    def programmed(self, first: Solution) -> Schedule | None:
+        """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
+        best, horizon = self.settled(first.cost), self.spacecraft.horizon
+        halvings = 0
+        while self.dear(best, first.cost) and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period:
+            halvings += 1
+            if best is not None and halvings > HALVINGS:
+                break
+            shorter = _Search(self.within(horizon), self.options)
+            if not shorter.feasible(horizon):
+                break
+            best = self.cheaper(best, shorter.settled(first.cost))
+        if self.dear(best, first.cost):
+            best = self.cheaper(best, self.others(first.cost))
+        return best
+
+    def doubtful(self, made: Schedule | None, first: Solution) -> bool:
+        """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
+
+        So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
+        as long as the rigorous bound does not prove it cheap enough.
+        """
+        body = self.spacecraft
+        short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
+        strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
+        if UNMET < first.unmet < math.inf:  # at large angles H may be brought there all the same
+            return short
+        if made is None:
+            return True
+        if not strong or not (short or self.dear(made, first.cost)):
+            return False
+        return not self.proved(made, PROVED)
+
+    def proved(self, made: Schedule | None, share: float) -> bool:
+        """Whether the rigorous bound proves that nothing is cheaper than a schedule by more than that share of it."""
+        proof = None if made is None else self.rigorous(made)
+        return made is not None and proof is not None and self.price(made) <= proof * (1.0 + share)
+
+    def task(self) -> Task:
+        """What is to be done, for the descents."""
+        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
+
+    def descended(self, known: Schedule | None) -> Schedule | None:
+        """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
+        found: list[_Found] = []
+        every = starting_points.schedules(self.task(), () if known is None else (known,))
+        if self.spacecraft.limits.tick is not None:
+            every = [self.on_ticks(made) for made in every[:WAYS]]
+        for made in every:
+            left = self.left(flight.flown(self.spacecraft, made))
+            if keeps_limits(self.spacecraft, made.pulses):
+                found.append(_Found(0.0 if left <= LEFT else left, self.worth(made), made))
+        return self.best(found)
+
+    def on_ticks(self, made: Schedule) -> Schedule:
+        """An exact schedule on the ticks of the commands."""
+        missed = residual_equations.misses(flight.flown(self.spacecraft, made), self.equations)
+        off = missed[2:4] if self.options.shift is not None else np.zeros(2)
+        return refine(self.spacecraft, made, self.equations, off, self.program().width)
+
+    def worth(self, made: Schedule) -> float:
+        """What is to be least: the cost, or the number of pulses."""
+        return float(len(made)) if self.options.least == "pulses" else self.price(made)
+
+    def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
+        """The cheaper of two schedules, of which there may be none; the one with fewer pulses where that counts."""
+        there = [made for made in (one, other) if made is not None]
+        return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
+
+    def dear(self, made: Schedule | None, least: float) -> bool:
+        """Whether there is no schedule, or one so dear that it is worth looking for another."""
+        return made is None or self.price(made) > least * (1.0 + DEARER)
+
+    def settled(self, least: float) -> Schedule | None:
+        """The cheapest of the schedules on which the search settles from one choice of burns or another."""
+        program = self.program()
+        program.haste = HASTE
+        found: list[_Found] = []
+        for _ in range(CHOICES):
+            solution = program.solve()
+            if solution.unmet > UNMET:
+                break
+            fewest = self.options.least == "pulses"
+            found += self.corrected(program, thinned(program, solution, least, fewest=fewest), least)
+            if not found or any(one.left == 0.0 and one.price <= least * (1.0 + DEAR) for one in found):
+                break
+        return self.best(found)
+
+    def others(self, least: float) -> Schedule | None:
+        """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
+        names = {channel.name: channel for channel in self.channels}
+        found: list[_Found] = []
+        flights: list[flight.Flight] = []
+        for made in candidates.by_other_schemes(self.spacecraft, self.options, shift=self.equations.shift):
+            flights.append(flight.flown(self.spacecraft, Schedule(made.pulses)))
+            if self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR):
+                break
+        for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
+            left = self.left(way)
+            found.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            program = self.program()
+            program.aim(residual_equations.along(way, self.equations, program.width))
+            burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
+            found += self.corrected(program, program.solve(program.about(burns)), least)
+        return self.best(found)
+
+    def corrected(self, program: Program, solution: Solution, least: float) -> list[_Found]:
+        """Schedules from the burns of a solution, corrected along one flight after the other, unless they get lost."""
+        found: list[_Found] = []
+        last = math.inf
+        for turn in range(AIMS):
+            if solution.unmet > LOST or not solution.burns:
+                break
+            try:
+                solution = repaired(program, solution)
+            except Unrepairable:
+                break
+            made = as_pulses(self.spacecraft, solution.burns)
+            flown = flight.flown(self.spacecraft, made)
+            program.aim(residual_equations.along(flown, self.equations, program.width))
+            if self.left(flown) < NEAR:
+                made = refine(self.spacecraft, made, self.equations, solution.off, program.width)
+                left, price = self.left(flight.flown(self.spacecraft, made)), self.price(made)
+                found.append(_Found(0.0 if left <= LEFT else left, price, made))
+                if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
+                    break
+                last = price if left <= LEFT else math.inf
+            solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
+        return found
+
+    def best(self, found: list[_Found]) -> Schedule | None:
+        """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding."""
+        there = [one for one in found if one.left <= self.rounded(one.made)]
+        best = min(there, key=lambda one: (max(one.left, AS_GOOD), one.price), default=None)
+        return None if best is None else best.made

@@ -1,0 +1,1 @@
+"""What the schemes share: models, builders of schedules, searches, and reasons."""

@@ -1,0 +1,237 @@
+"""Trim a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
+
+A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
+takes longer than a whole plan.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.limits import Windows, longest_on_time
+from nutdamp.physics import attitude
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.tools.symmetric_model import steady_omega
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+CONVERGED = 1e-14
+"""rad; a few roundings of the integration."""
+
+DIFFERENCE = 1e-6
+"""Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
+
+STEPS = 30
+
+INTEGRATED = 50_000
+"""Steps of integration after which a trim is left as it is: some seconds."""
+
+ANY = (0.0, math.inf)
+"""Bounds on on-times that bound nothing."""
+
+PROGRESS = 0.01
+"""Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
+
+
+def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) -> Vector:
+    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+
+    ``spin`` adds a fifth, by how much of itself the final spin asked for is missed.
+
+    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
+    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
+    """
+    return _missed(flight.flown(spacecraft, schedule), spin=spin)
+
+
+def _missed(flight_: flight.Flight, *, spin: bool) -> Vector:
+    spacecraft, schedule = flight_.spacecraft, flight_.schedule
+    moments = np.asarray(flight_.moments)
+    body = flight_.settled.rates * moments
+    after = attitude.rotate(flight_.settled.quaternion, body)
+    steady = steady_omega(spacecraft, schedule.end)
+    body[:2] -= moments[:2] * (steady.real, steady.imag)
+    left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
+    final = spacecraft.goal.spin
+    return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
+
+
+def _across(axis: Vector, vector: Vector) -> Vector:
+    """The two components of ``vector`` square to the unit vector ``axis``."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, other)
+    first /= float(np.linalg.norm(first))
+    return np.array([first @ vector, np.cross(axis, first) @ vector])
+
+
+def refine(
+    spacecraft: Spacecraft,
+    made: Schedule,
+    *,
+    chosen: Sequence[int],
+    momentum: bool,
+    spin: bool = False,
+    on_times: tuple[float, float] = ANY,
+) -> Schedule:
+    """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
+
+    Starts, on-times within their bounds and ``on_times`` s, and directions of steerable pulses are free. ``momentum``:
+    H too is to be brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the
+    spin to the rate asked for. A schedule without pulses stays as it is.
+    """
+    if not made.pulses:
+        return made
+    chosen = sorted({index % len(made) for index in chosen})
+    kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
+    pulses = [_Movable(spacecraft, made.pulses[index], on_times) for index in chosen]
+    ends = np.cumsum([len(one.start) for one in pulses])
+
+    def build(x: Vector) -> Schedule:
+        parts = np.split(x, ends[:-1])
+        return Schedule(
+            (*kept, *(one.turn(part) for one, part in zip(pulses, parts, strict=True))), made.notes, made.bounds
+        )
+
+    steps = 0
+
+    def left(made: Schedule) -> Vector:
+        nonlocal steps
+        flown = flight.flown(spacecraft, made)
+        steps += flown.steps
+        missed = _missed(flown, spin=spin)
+        return missed if momentum else np.delete(missed, [2, 3])
+
+    start, scale, lower, upper = (
+        np.concatenate([getattr(one, name) for one in pulses]) for name in ("start", "scale", "lower", "upper")
+    )
+    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED)
+    trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
+    better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
+    return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made
+
+
+class _Movable:
+    """What can be turned of a pulse: (start, on-time) of a channel, (start, impulse, angle) of a steerable torquer."""
+
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, on_times: tuple[float, float]) -> None:
+        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
+        latest = max(spacecraft.horizon - pulse.on_time, pulse.start)
+        self.channel = _channel(spacecraft, pulse)
+        self.torquer = spacecraft.torquer
+        if self.channel is not None:
+            self.start = np.array([pulse.start, pulse.on_time])
+            self.scale = np.array([pace, pulse.on_time])
+            longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
+            self.lower = np.array([earliest, max(self.channel.min_on_time, on_times[0])])
+            self.upper = np.array([latest, min(longest, on_times[1])])
+        else:
+            self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
+            self.scale = np.array([pace, pulse.magnitude, 1.0])
+            torque = None if self.torquer is None else self.torquer.torque
+            least, most = (0.0, math.inf) if torque is None else (torque * bound for bound in on_times)
+            self.lower = np.array([earliest, least, -np.inf])
+            self.upper = np.array([latest, most, np.inf])
+
+    def turn(self, x: Vector) -> Pulse:
+        """The pulse with these settings."""
+        if self.channel is not None:
+            return channel_pulse(self.channel, x[0] + 0.5 * x[1], float(x[1]))
+        assert self.torquer is not None
+        torque = self.torquer.torque
+        on_time = 0.0 if torque is None else x[1] / torque
+        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[2]), impulse=float(x[1]))
+
+
+def _channel(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
+    """The channel that fires the pulse; None for a steerable torquer."""
+    return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
+
+
+def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
+    """The pulse with start and on-time on the ticks of the commands."""
+    if spacecraft.limits.tick is None:
+        return pulse
+    windows, channel = Windows(spacecraft), _channel(spacecraft, pulse)
+    bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+    on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
+    t = windows.nearest_tick(pulse.start) + 0.5 * on_time
+    if channel is not None:
+        return channel_pulse(channel, t, on_time)
+    scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
+    propellant = None if pulse.propellant is None else pulse.propellant * scale
+    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
+
+
+def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
+    """Whether the pulses, in order, keep every limit on their times."""
+    windows = Windows(spacecraft)
+    ready = windows.limits.earliest
+    for pulse in pulses:
+        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
+            return False
+        ready = pulse.end + windows.limits.gap
+    return True
+
+
+def solve(
+    residual: Callable[[Vector], Vector],
+    start: Vector,
+    scale: Vector,
+    lower: Vector,
+    upper: Vector,
+    enough: Callable[[], bool] = lambda: False,
+) -> tuple[Vector, float]:
+    """Unknowns (n,) within bounds that make ``residual`` (m,) least in norm, and that norm.
+
+    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution. It is
+    left as it is once there was ``enough`` work.
+    """
+    x = np.clip(start, lower, upper)
+    value = residual(x)
+    norm = float(np.linalg.norm(value))
+    for _ in range(STEPS):
+        if norm <= CONVERGED or enough():
+            break
+        jacobian = _slopes(residual, x, value, scale)
+        step = bounded_step(jacobian, value, x, scale, lower, upper)
+        best, best_value, best_norm = x, value, norm
+        for shrink in range(8):
+            trial = np.clip(x + step * 0.5**shrink, lower, upper)
+            trial_value = residual(trial)
+            trial_norm = float(np.linalg.norm(trial_value))
+            if trial_norm < best_norm:
+                best, best_value, best_norm = trial, trial_value, trial_norm
+                break
+        stalled = best_norm > norm * (1.0 - PROGRESS)
+        x, value, norm = best, best_value, best_norm
+        if stalled:
+            break
+    return x, norm
+
+
+def _slopes(residual: Callable[[Vector], Vector], x: Vector, value: Vector, scale: Vector) -> Vector:
+    """Jacobian by the scaled unknowns, (m, n)."""
+    columns = []
+    for index, size in enumerate(scale):
+        moved = x.copy()
+        moved[index] += DIFFERENCE * size
+        columns.append((residual(moved) - value) / DIFFERENCE)
+    return np.column_stack(columns)
+
+
+def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
+    """Least-squares step (n,) for a ``jacobian`` (m, n) by scaled unknowns; one that would leave its bounds stays."""
+    free = np.ones(len(x), dtype=bool)
+    step = np.zeros(len(x))
+    for _ in range(len(x)):
+        step[:] = 0.0
+        step[free] = -np.linalg.lstsq(jacobian[:, free], value, rcond=1e-10)[0] * scale[free]
+        outward = free & (((x <= lower) & (step < 0.0)) | ((x >= upper) & (step > 0.0)))
+        if not outward.any():
+            break
+        free &= ~outward
+    return step

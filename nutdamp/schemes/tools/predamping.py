@@ -1,0 +1,54 @@
+"""Taking the nutation out before H is turned: at a moment at which the spin axis, where H goes, is near the target."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nutdamp.errors import Infeasible
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options, one_pulse
+from nutdamp.schemes.tools.flown_builder import FlownBuilder
+from nutdamp.spacecraft import Spacecraft
+
+MOMENTS = 16
+"""Earliest starts that are tried."""
+
+INTEGRATED = 20_000
+"""Steps of integration after which no more of them are tried."""
+
+IN_REACH = 0.5
+"""Share of the horizon within which the damping begins: the rest is for the turn."""
+
+
+def damping(here: Spacecraft) -> Schedule:
+    """The one-pulse damping from which the rest of the way costs least; H then goes to the momentary spin axis.
+
+    Its pulses cost A|ω0| whenever they come, but the turn that is left, C|ω3| times its angle, differs by the cone.
+    Raises Infeasible where no channel can damp.
+    """
+    h = here.inertia.C * abs(here.spin)
+    # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
+    span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
+    best: tuple[float, Schedule] | None = None
+    reason: Infeasible | None = None
+    steps = 0
+    for number in range(MOMENTS):
+        earliest = here.limits.earliest + number * span / MOMENTS
+        if number > 0 and earliest > IN_REACH * here.horizon:
+            break
+        try:
+            made = one_pulse.schedule(replace(here, limits=replace(here.limits, earliest=earliest)), Options())
+        except Infeasible as why:
+            reason = why
+            continue
+        builder = FlownBuilder(here)
+        builder.fire(made)
+        cost = made.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        if best is None or cost < best[0]:
+            best = cost, made
+        steps += builder.steps
+        if steps > INTEGRATED:
+            break
+    if best is None:
+        raise Infeasible(f"the nutation is to be taken out first, and {reason}")
+    return best[1]

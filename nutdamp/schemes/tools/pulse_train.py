@@ -1,0 +1,376 @@
+"""What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
+
+From one pulse to the next the phasor that a pulse gives the nutation turns by 2πC/(AK) for K pulses a turn; the sum of
+the phasors says which numbers of pulses leave no nutation.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.flight import Arc
+from nutdamp.limits import Windows, usable
+from nutdamp.physics import attitude, pointing
+from nutdamp.schedule import Pulse, channel_pulse, steerable_pulse
+from nutdamp.schemes import Options
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
+
+TURN_SHARE = 0.125
+"""Default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc."""
+
+WIDEST = 0.4
+"""Share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost."""
+
+STEP = math.radians(2.0)
+"""Angle that one ideal impulse turns H by, at most."""
+
+CLOSED = 0.3
+"""Phasors that sum to less than this many pulses count as closed: the rest is trimmed."""
+
+OPEN = 1.2
+"""Sum of the phasors, in pulses, beyond which trimming has no hope."""
+
+MOST_PULSES = 600
+
+UNEQUAL = 0.1
+"""By how much, as a share, the last pulses may be longer or shorter than the others."""
+
+LAST = 10
+"""How many of the last pulses may be trimmed, at most."""
+
+TRIES = 4
+"""Counts that are flown, at most; twice as many where pulses are to have a given length."""
+
+
+class Shot(NamedTuple):
+    """A moment (s) at which a channel, or with None the steerable torquer, has the right phase; all undisturbed."""
+
+    t: float
+    channel: Channel | None
+
+
+class Attempt(NamedTuple):
+    """A train to fly: so many ``pulses`` of ``on_time`` s, the last few trimmed within ``bounds`` (s).
+
+    ``closes``: whether the pulses leave little nutation as they are, so that trimming costs little.
+    """
+
+    pulses: int
+    on_time: float
+    bounds: tuple[float, float]
+    closes: bool
+
+
+class Train:
+    """What a train from the motion of ``here`` can do."""
+
+    def __init__(self, here: Spacecraft, options: Options) -> None:
+        self.here, self.options = here, options
+        self.windows = Windows(here)
+        self.turn = 2.0 * math.pi / abs(here.spin)
+        self.h = here.inertia.C * abs(here.spin)
+        self.sun = here.goal.sun
+        self.channels = [] if here.torquer is not None else _spread(usable(here), options.per_turn)
+        if self.channels:
+            self.torque = min(abs(channel.transverse) for channel in self.channels)
+            self.shortest = max(channel.min_on_time for channel in self.channels)
+            self.longest = min(channel.max_on_time for channel in self.channels)
+        else:
+            assert here.torquer is not None
+            self.torque = math.inf if here.torquer.torque is None else here.torquer.torque
+            self.shortest, self.longest = 0.0, math.inf
+        asked = options.on_time
+        if asked is not None:
+            self._check(asked)
+        self.on_time = min(self.longest, TURN_SHARE * self.turn) if asked is None else asked
+        self.on_time = max(self.on_time, self.shortest)
+        if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
+            raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
+        self.way = pointing.course(here.momentum, here.target_axis, self.sun)[1]
+
+    def turns_by(self, on_time: float) -> float:
+        """By how much a pulse turns H, N m s."""
+        return self.torque * on_time * pointing.arc_efficiency(self.here.spin, on_time)
+
+    @property
+    def strongest(self) -> float:
+        """By how much a full pulse of the train turns H, N m s."""
+        return STEP * self.h if math.isinf(self.torque) else self.turns_by(self.on_time)
+
+    def _check(self, asked: float) -> None:
+        """Raises Infeasible where no pulse can be ``asked`` s long, or should."""
+        if math.isinf(self.torque):
+            raise Infeasible("an on-time is for pulses that last: ideal impulses have none; give the torquer a torque")
+        if not self.shortest <= asked <= self.longest:
+            raise Infeasible(
+                f"an on-time of {asked:.4g} s is outside what the channels allow: "
+                f"{self.shortest:.4g} s to {self.longest:.4g} s"
+            )
+        if asked > 0.5 * self.turn:
+            raise Infeasible(f"an on-time of {asked:.4g} s {_too_long(self.turn)}")
+
+    def length(self, count: int) -> float:
+        """On-time (s) of ``count`` equal pulses that turn H all the way; not a number where that is too far."""
+        if math.isinf(self.torque):
+            return 0.0
+        share = np.array([self.h * self.way / count])
+        return float(pointing.on_times_to_turn(share, self.torque, self.here.spin)[0])
+
+    def attempts(self) -> list[Attempt]:
+        """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
+        left = self.left_by(self.shots())
+        return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
+
+    def _attempt(self, count: int, on_time: float, about: float, left: Vector) -> Attempt:
+        """Pulses of ``on_time`` s, the last within `UNEQUAL` of ``about`` s."""
+        bounds = (1.0 - UNEQUAL) * about, (1.0 + UNEQUAL) * about
+        return Attempt(count, on_time, bounds, bool(left[count - 1] <= CLOSED))
+
+    def _free(self, left: Vector) -> list[Attempt]:
+        """Trains of pulses of any length: `left_by` of 1, 2, … pulses is ``left`` (n,)."""
+        fewest = self.fewest()
+        if fewest > len(left):
+            wide = STEP * self.h if math.isinf(self.torque) else self.turns_by(self.widest)
+            fewest = max(math.ceil(_ratio(self.h * self.way, wide) - 1e-9), 2)
+        most = min(len(left), self._most())
+        if fewest > most:
+            raise Infeasible(self._too_few(fewest, len(left)))
+        closing = [count for count in range(fewest, most + 1) if left[count - 1] <= CLOSED]
+        if not closing:
+            best = int(np.argmin(left[fewest - 1 : most])) + fewest
+            if left[best - 1] > OPEN:
+                raise Infeasible(self._in_phase(fewest, most, float(left[best - 1])))
+            closing = [best]
+        # Of the next few counts the one that closes best, then in turn; at last with trims of any size.
+        near = [count for count in closing if count <= 1.25 * closing[0] + 3]
+        near = sorted(near, key=lambda count: left[count - 1])[:TRIES]
+        tried = [self._attempt(count, self.length(count), self.length(count), left) for count in near]
+        bounds = self.shortest, max(self.on_time, self.widest)
+        return [*tried, Attempt(near[0], self.length(near[0]), bounds, closes=False)]
+
+    def _held(self, left: Vector, asked: float) -> list[Attempt]:
+        """Trains of pulses ``asked`` s long, or equal ones hardly shorter, the fewest first: ``left`` as in `_free`."""
+        fewest = self.fewest()
+        most = min(self._most(), math.floor(_ratio(self.h * self.way, self.turns_by((1.0 - UNEQUAL) * asked)) + 1e-9))
+        if fewest > min(self._most(), len(left)):
+            raise Infeasible(self._too_few(fewest, len(left)))
+        if fewest > most:
+            within = f"within {100 * UNEQUAL:.0f} % of {asked:.4g} s"
+            raise Infeasible(f"{fewest} pulses {within} turn H too far, and {fewest - 1} not far enough")
+        counts = range(fewest, min(most, len(left)) + 1)
+        tried = [self._attempt(fewest, asked, asked, left)] if left[fewest - 1] <= OPEN else []
+        tried += [self._attempt(count, self.length(count), asked, left) for count in counts if left[count - 1] <= OPEN]
+        if not tried:
+            least = float(left[fewest - 1 : counts[-1]].min())
+            raise Infeasible(self._in_phase(fewest, counts[-1], least))
+        return tried[: 2 * TRIES]
+
+    @property
+    def floor(self) -> float:
+        """Impulse (N m s) that no train can do without."""
+        shortest = 0.0 if math.isinf(self.torque) else max((1.0 - UNEQUAL) * self.on_time, self.shortest)
+        return self.h * self.way / pointing.arc_efficiency(self.here.spin, shortest)
+
+    def lengths_near(self, asked: float) -> list[float]:
+        """On-times (s) of trains that may close, in the order of how near they are to the one ``asked``."""
+        left = self.left_by(self.shots())
+        most = min(len(left), self._most())
+        closing = [self.length(count) for count in range(2, most + 1) if left[count - 1] <= OPEN]
+        possible = [one for one in closing if self.shortest <= one <= self.widest and one > 0.0]
+        return sorted(possible, key=lambda one: abs(one - asked))
+
+    @property
+    def widest(self) -> float:
+        """Longest pulse (s) worth firing, unless a longer one is asked for."""
+        return min(self.longest, WIDEST * self.turn)
+
+    def fewest(self) -> int:
+        """Pulses that it takes with the on-time wanted; two at least, to close."""
+        return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
+
+    def _most(self) -> int:
+        """Pulses that are allowed, and not shorter than they can be."""
+        most = self.here.limits.max_pulses
+        allowed = MOST_PULSES if most is None else most
+        if self.shortest > 0.0:
+            allowed = min(allowed, int(_ratio(self.h * self.way, self.turns_by(self.shortest))))
+        return allowed
+
+    def left_by(self, shots: list[Shot]) -> Vector:
+        """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
+        start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
+        ahead = self._ahead(self.here)
+        pushes = np.array([self._body(Arc(A, self.here.inertia.C, 0.0, start), shot, ahead) for shot in shots])
+        if len(shots) == 0:
+            return np.empty(0)
+        turned = np.exp(1j * a * spin * np.array([shot.t for shot in shots]))
+        sums = np.cumsum(pushes * turned)
+        counts = np.arange(1, len(shots) + 1)
+        return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
+
+    def _body(self, arc: Arc, shot: Shot, ahead: Vector) -> complex:
+        """Direction of a pulse in the body, as a unit complex number."""
+        if shot.channel is not None:
+            return shot.channel.transverse / abs(shot.channel.transverse)
+        _, quaternions = arc.motion(np.array([shot.t]))
+        body = attitude.matrix(quaternions[0]).T @ ahead
+        return cmath.exp(1j * math.atan2(body[1], body[0]))
+
+    def shots(self) -> list[Shot]:
+        """Moments of right phase, one pulse after the other as the limits allow them."""
+        found: list[Shot] = []
+        ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
+        firsts = [(self._first(channel), channel) for channel in self.channels]
+        gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
+        for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
+            start = self.windows.earliest_start(on_time, ready)
+            if start is None or len(found) == MOST_PULSES:
+                break
+            centre = start + 0.5 * on_time
+            if firsts:
+                moments = [
+                    (first + max(math.ceil((centre - first) / self.turn - 1e-9), 0) * self.turn, number)
+                    for number, (first, _) in enumerate(firsts)
+                ]
+                t, number = min(moments)
+                shot = Shot(t, firsts[number][1])
+            else:
+                shot = Shot(centre, None)
+            if shot.t + 0.5 * on_time > self.windows.horizon:
+                break
+            free = self.windows.blocked_until(shot.t - 0.5 * on_time, on_time)
+            if free is not None:
+                ready = max(free, ready + 0.25 * self.turn)
+                continue
+            found.append(shot)
+            ready = shot.t + 0.5 * on_time + gap
+            if not firsts:
+                ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
+        return found
+
+    def _ahead(self, here: Spacecraft) -> Vector:
+        return pointing.course(here.momentum, here.target_axis, self.sun)[0]
+
+    def _first(self, channel: Channel) -> float:
+        return _aligned(self.here, channel, self._ahead(self.here), self.here.limits.earliest)
+
+    def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
+        """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
+        ahead, way = pointing.course(here.momentum, here.target_axis, self.sun)
+        windows, limits = Windows(here), here.limits
+        share = self.h * way / remaining
+        on_time = 0.0
+        if not math.isinf(self.torque):
+            least, most = max(attempt.bounds[0], self.shortest), min(attempt.bounds[1], self.longest)
+            wanted = attempt.on_time
+            if remaining <= LAST:
+                wanted = float(pointing.on_times_to_turn(np.array([share]), self.torque, here.spin)[0])
+            on_time = windows.on_time(wanted if math.isfinite(wanted) else most, least, most)
+        ready, turn = limits.earliest, self.turn / self.options.per_turn
+        begun = here is not self.here
+        if self.channels:  # no two in the same passage of the phase
+            return self._passing(here, windows, ahead, on_time, max(ready, 0.5 * turn - on_time) if begun else ready)
+        if begun:
+            ready = max(ready, turn - on_time)
+        start = windows.earliest_start(on_time, ready)
+        if start is None:
+            return None
+        centre = start + 0.5 * on_time
+        body = self._body(Arc(here.inertia.A, here.inertia.C, 0.0, here.initial), Shot(centre, None), ahead)
+        assert here.torquer is not None
+        given = {"impulse": share} if here.torquer.torque is None else {"on_time": on_time}
+        return steerable_pulse(here.torquer, centre, cmath.phase(body), **given)
+
+    def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
+        """The first firing of a channel as it passes the phase that the limits allow."""
+        for _ in range(MOST_PULSES):
+            moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
+            t, channel = min(moments, key=lambda one: one[0])
+            start = windows.nearest_tick(t - 0.5 * on_time)
+            free = windows.blocked_until(start, on_time)
+            if start + on_time > windows.horizon + 1e-9:
+                return None
+            if free is None and start >= here.limits.earliest - 1e-9:
+                return channel_pulse(channel, start + 0.5 * on_time, on_time)
+            ready = max(free or 0.0, start + 0.25 * self.turn)
+        return None
+
+    def _too_few(self, needed: int, moments: int) -> str:
+        most = self.here.limits.max_pulses
+        if most is not None and most < needed:
+            return f"a train to the target takes {needed} pulses at least, and limits.max_pulses allows {most}"
+        if needed <= moments:
+            return "the shortest pulses turn H beyond the target in so many; lower min_on_time, or take two-pulse"
+        turns = needed / self.options.per_turn * self.turn
+        return (
+            f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the limits leave moments for "
+            f"{moments}; a longer horizon, longer pulses or more of them a turn help"
+        )
+
+    def _in_phase(self, fewest: int, most: int, left: float) -> str:
+        inertia, per_turn = self.here.inertia, self.options.per_turn
+        ratio = inertia.C / (inertia.A * per_turn)
+        off = abs(ratio - round(ratio))
+        least = math.degrees(left * self.way / most)
+        if off * most >= 1.0:
+            return (
+                f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
+                f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+            )
+        return (
+            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
+            f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
+            f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
+        )
+
+
+def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
+    """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead`` (3,), inertial."""
+    direction = channel.transverse / abs(channel.transverse)
+    arc, turn = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial), 2.0 * math.pi / abs(here.spin)
+    t = ready
+    for step in range(12):
+        _, quaternions = arc.motion(np.array([t]))
+        body = attitude.matrix(quaternions[0]).T @ ahead
+        off = cmath.phase(direction * complex(body[0], -body[1]))  # the torque is so far ahead of it
+        change = -off / here.spin
+        if step == 0:
+            change %= turn
+        t += change
+        if abs(change) < 1e-12 * turn:
+            break
+    return t if t >= ready - 1e-9 else t + turn
+
+
+def _spread(channels: list[Channel], count: int) -> list[Channel]:
+    """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
+    if not channels:
+        raise Infeasible("once the nutation is taken out no time is left for the turn")
+    chosen = [min(channels, key=lambda one: (one.price, -abs(one.transverse)))]
+    while len(chosen) < count:
+
+        def apart(channel: Channel) -> float:
+            return min(abs(cmath.phase(channel.transverse * one.transverse.conjugate())) for one in chosen)
+
+        farthest = max(channels, key=apart)
+        if apart(farthest) < 0.2:
+            raise Infeasible(
+                f"{count} pulses a spin turn ask for {count} channels of different directions, for each passes the "
+                f"phase once a turn; there are {len(chosen)}"
+            )
+        chosen.append(farthest)
+    return chosen
+
+
+def _too_long(turn: float) -> str:
+    return f"is more than half a spin turn ({0.5 * turn:.4g} s), after which a torque fixed in the body undoes its work"
+
+
+def _ratio(whole: float, part: float) -> float:
+    """How often ``part`` goes into ``whole``; a billion times at most."""
+    return whole / part if whole < 1e9 * part else 1e9

@@ -1,0 +1,77 @@
+"""Why a scheme cannot work, and what it leaves, in words."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
+from nutdamp.spacecraft import Channel, Spacecraft
+
+FADED = 1e-6
+"""Share of the nutation below which there is nothing left for pulses to do: dissipation has taken it out before."""
+
+
+def no_channels(spacecraft: Spacecraft) -> str:
+    """No body-fixed channel can damp."""
+    if any(channel.damps for channel in spacecraft.channels):
+        ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
+        time = spacecraft.horizon - spacecraft.limits.earliest
+        return (
+            f"no channel can be on for as long as its min_on_time asks{ticks}, at most for its max_on_time, within the "
+            f"{time:.4g} s from limits.earliest to limits.horizon"
+        )
+    if spacecraft.channels:
+        return "no channel has a torque more transverse than axial, so none can damp a nutation"
+    return "the file names no thrusters, and this scheme fires body-fixed ones"
+
+
+def bounded_by(spacecraft: Spacecraft) -> str:
+    """The limits that a schedule of its channels has to keep, by name: the horizon, and those that the file sets."""
+    limits, channels = spacecraft.limits, spacecraft.channels
+    there = {
+        "on-times": any(one.min_on_time > 0.0 or math.isfinite(one.max_on_time) for one in channels),
+        "gap": limits.gap > 0.0,
+        "ticks": limits.tick is not None,
+        "blackout windows": bool(limits.blackout),
+    }
+    names = [f"the horizon of {spacecraft.horizon:.4g} s", *(name for name in there if there[name])]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def no_target() -> str:
+    """The scheme only turns the spin axis to a target, and there is none."""
+    return "needs a target axis: --target, or goal in the file"
+
+
+def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
+    """No channel can be fired against ω within the limits; names the cure."""
+    omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    if spacecraft.inertia.a == 0.0:
+        off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
+        nearest = min(off, key=lambda name: off[name])
+        return (
+            "in a sphere (a = 0) ω stands still in the body, so waiting brings no channel to oppose it; "
+            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
+        )
+    builder = ImpulseBuilder(spacecraft, endless=True)
+    pulses = [builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period)) for channel in channels]
+    there = [pulse for pulse in pulses if pulse is not None]
+    if not there:
+        return "no channel ever opposes the nutation" + (
+            ": dissipation brings the body into flat spin before, where ω stands still in it" if builder.growing else ""
+        )
+    ends = [pulse.end for pulse in there if builder.helps(pulse)]
+    if not ends:
+        best = min(there, key=builder.left_after)
+        left = builder.A * abs(builder.omega_at(best.t))
+        if left < FADED * builder.left:
+            return f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
+        return (
+            f"every channel's shortest pulse is too strong: {left:.4g} N m s are to be taken out, "
+            f"and firing would leave {builder.left_after(best):.4g} N m s; lower min_on_time"
+        )
+    return (
+        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
+        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that"
+    )

@@ -1,0 +1,122 @@
+"""When a pulse may be on: earliest start, horizon, gap, blackout windows, ticks."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from builders import fan, spinner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nutdamp.limits import SLACK, Windows, for_pairs
+from nutdamp.spacecraft import Limits
+
+
+def windows(**limits: object) -> Windows:
+    return Windows(spinner(limits=Limits(**{"horizon": 100.0, **limits})))  # type: ignore[arg-type]
+
+
+def test_without_limits_a_pulse_may_start_at_once_and_end_at_the_horizon() -> None:
+    free = windows()
+    assert free.earliest_start(1.0, 0.0) == 0.0
+    assert free.allows(99.0, 1.0, 0.0)
+    assert not free.allows(99.01, 1.0, 0.0)
+    assert free.earliest_start(1.0, 99.5) is None
+
+
+def test_not_before_the_actuators_are_ready() -> None:
+    assert windows().allows(5.0, 1.0, 5.0)
+    assert not windows().allows(5.0, 1.0, 5.01)
+
+
+def test_blackouts_cover_whole_pulses() -> None:
+    """A pulse may end as a window begins and start as it ends, and touch it nowhere else."""
+    dark = windows(blackout=((10.0, 20.0),))
+    assert dark.allows(9.0, 1.0, 0.0)
+    assert dark.allows(20.0, 1.0, 0.0)
+    for start in (9.5, 10.0, 15.0, 19.9):
+        assert not dark.allows(start, 1.0, 0.0)
+        assert dark.blocked_until(start, 1.0) == 20.0
+    assert not dark.allows(9.0, 12.0, 0.0)  # a pulse longer than the window
+    assert dark.allows(9.5, 0.0, 0.0)  # an ideal impulse
+    assert not dark.allows(12.0, 0.0, 0.0)
+
+
+def test_earliest_start_jumps_over_one_blackout_into_no_other() -> None:
+    """Overlapping, out of order, and with a hole too short for the pulse."""
+    dark = windows(blackout=((8.0, 12.0), (1.0, 5.0), (4.0, 7.5)))
+    assert dark.earliest_start(0.5, 0.0) == 0.0
+    assert dark.earliest_start(0.5, 0.8) == 7.5
+    assert dark.earliest_start(1.0, 0.8) == 12.0
+
+
+def test_a_blackout_to_the_horizon_leaves_no_start() -> None:
+    assert windows(blackout=((1.0, 100.0),)).earliest_start(0.5, 2.0) is None
+
+
+def test_starts_lie_on_ticks() -> None:
+    ticking = windows(tick=0.25, blackout=((1.1, 2.1),))
+    assert ticking.earliest_start(0.25, 0.3) == 0.5
+    assert ticking.earliest_start(0.25, 1.0) == 2.25
+    assert ticking.nearest_tick(0.62) == 0.5
+    assert ticking.tick_after(0.51) == 0.75
+    assert ticking.tick_after(0.5) == 0.5
+
+
+def test_on_times_lie_on_ticks_within_the_bounds_and_are_never_nothing() -> None:
+    ticking = windows(tick=0.1)
+    assert ticking.on_time(0.34, 0.0, math.inf) == pytest.approx(0.3, rel=1e-15)
+    assert ticking.on_time(0.01, 0.0, math.inf) == pytest.approx(0.1, rel=1e-15)
+    assert ticking.on_time(0.34, 0.38, math.inf) == pytest.approx(0.4, rel=1e-15)
+    assert ticking.on_time(0.9, 0.0, 0.57) == pytest.approx(0.5, rel=1e-15)
+    # Bounds that are multiples themselves, but for rounding: 3 × 0.1 > 0.3.
+    assert ticking.on_time(0.9, 0.0, 0.3) == pytest.approx(0.3, rel=1e-15)
+    assert ticking.on_time(0.1, 0.3, 5.0) == pytest.approx(0.3, rel=1e-15)
+
+
+def test_without_ticks_on_times_are_as_wanted_within_the_bounds() -> None:
+    free = windows()
+    assert free.on_time(0.3456, 0.0, math.inf) == 0.3456
+    assert free.on_time(0.3, 0.5, 2.0) == 0.5
+    assert free.on_time(3.0, 0.5, 2.0) == 2.0
+
+
+def test_endless_windows_have_no_horizon_but_all_other_limits() -> None:
+    endless = Windows(spinner(limits=Limits(horizon=10.0, blackout=((20.0, 30.0),))), endless=True)
+    assert endless.allows(1e9, 5.0, 0.0)
+    assert not endless.allows(25.0, 5.0, 0.0)
+
+
+@given(
+    st.floats(0.0, 50.0),
+    st.floats(0.0, 5.0),
+    st.sampled_from([None, 1e-3, 0.1, 0.25, 1.7]),
+    st.lists(st.tuples(st.floats(0.0, 60.0), st.floats(0.0, 10.0)), max_size=5),
+)
+def test_earliest_start_is_allowed_and_nothing_before_it_is(
+    ready: float, on_time: float, tick: float | None, holes: list[tuple[float, float]]
+) -> None:
+    dark = windows(tick=tick, blackout=tuple((begin, begin + length) for begin, length in holes))
+    start = dark.earliest_start(on_time, ready)
+    last = 100.0 - on_time if start is None else start
+    if start is not None:
+        assert start >= ready - SLACK
+        assert dark.allows(start, on_time, ready)
+        assert tick is None or abs(start / tick - round(start / tick)) < 1e-9
+    step = tick or 0.05
+    for index in range(math.ceil(ready / step), math.floor(last / step)):
+        earlier = index * step
+        if ready <= earlier < last - 10 * SLACK:
+            assert not dark.allows(earlier, on_time, ready)
+
+
+def test_of_very_many_channels_pairs_are_made_of_the_cheapest_about_each_direction() -> None:
+    some = for_pairs(spinner(channels=fan(200, 5.0)))
+    assert len(some) == 24
+    turns = sorted(cmath.phase(channel.transverse) for channel in some)
+    assert max(np.diff(turns)) < 2 * math.tau / 24
+    few = spinner(channels=fan(9, 5.0))
+    assert for_pairs(few) == list(few.channels)
