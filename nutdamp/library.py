@@ -28,6 +28,7 @@ from nutdamp import flight as flights
 from nutdamp import spacecraft as craft
 from nutdamp.errors import BadRequest, Fault, Infeasible, printable
 from nutdamp.flight import Residual
+from nutdamp.limits import broken_limits
 from nutdamp.outcome import seen_at
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Options
@@ -431,7 +432,7 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
 
     core, name = _core(spacecraft), arguments.path("path", path)
     schedule, remarks = read_pulses(name, core)
-    for remark in (*remarks, *planning.broken_limits(core, schedule)):
+    for remark in (*remarks, *broken_limits(core, schedule)):
         warnings.warn(remark, stacklevel=2)
     return Plan(planning.Plan(core, printable(name), schedule))
 

@@ -1,13 +1,20 @@
-"""When a pulse may be on: earliest start, gap, blackout windows, horizon, and the resolution of commands."""
+"""All that a schedule must keep: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
+
+`Windows` says when a pulse may be on; `keeps_limits` and `broken_limits` judge whole schedules, for the schemes and for
+the reader.
+"""
 
 from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 SLACK = 1e-9
@@ -103,6 +110,40 @@ class Windows:
         return float(min(max(round(wanted / tick), least), most)) * tick
 
 
+def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[tuple[float, float]]:
+    """When pulses may be on, (begin, end) s in order: from the earliest start to the horizon, blackout left out.
+
+    ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a moment free between
+    them.
+    """
+    limits, until = spacecraft.limits, spacecraft.horizon if horizon is None else horizon
+    now = limits.earliest
+    free: list[tuple[float, float]] = []
+    for dark, light in sorted(limits.blackout):
+        if now >= until:
+            return free
+        if dark >= now:
+            free.append((now, min(dark, until)))
+        now = max(now, light)
+    return [*free, (now, max(now, until))] if now < until or not limits.blackout else free
+
+
+def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:
+    """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two is halved."""
+    limits, ready, bounds = spacecraft.limits, spacecraft.limits.earliest, []
+    for pulse in pulses:
+        latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - SLACK)])
+        begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + SLACK)])
+        bounds.append([begun, latest])
+        ready = pulse.end + limits.gap
+    for index in range(len(bounds) - 1):
+        off, on = pulses[index].end, pulses[index + 1].start
+        half = 0.5 * max(on - off - limits.gap, 0.0)
+        bounds[index][1] = min(bounds[index][1], off + half)
+        bounds[index + 1][0] = max(bounds[index + 1][0], on - half)
+    return [(begun, latest) for begun, latest in bounds]
+
+
 def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time."""
     tick, time = spacecraft.limits.tick, spacecraft.horizon - spacecraft.limits.earliest
@@ -137,3 +178,67 @@ def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
 def _about(channel: Channel) -> int:
     """Number of the direction that a channel is about."""
     return round(cmath.phase(channel.transverse) / (2.0 * math.pi) * PAIRED) % PAIRED
+
+
+def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
+    """The channel that fires the pulse; None for a steerable torquer."""
+    return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
+
+
+def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
+    """The pulse with start and on-time on the ticks of the commands."""
+    if spacecraft.limits.tick is None:
+        return pulse
+    windows, channel = Windows(spacecraft), channel_of(spacecraft, pulse)
+    bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+    on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
+    t = windows.nearest_tick(pulse.start) + 0.5 * on_time
+    if channel is not None:
+        return channel_pulse(channel, t, on_time)
+    scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
+    propellant = None if pulse.propellant is None else pulse.propellant * scale
+    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
+
+
+def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
+    """Whether the pulses, in order, keep every limit on their times."""
+    windows = Windows(spacecraft)
+    ready = windows.limits.earliest
+    for pulse in pulses:
+        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
+            return False
+        ready = pulse.end + windows.limits.gap
+    return True
+
+
+def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
+    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all."""
+    limits, horizon = spacecraft.limits, spacecraft.horizon
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    broken: list[str] = []
+    previous_end = -math.inf
+    for number, pulse in enumerate(made, start=1):
+        slack = touching(pulse.end)
+        name = f"pulse {number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s)"
+        if not pulse.resolved:
+            broken.append(f"{name} is too short for its time, where times are {math.ulp(pulse.end):.2g} s apart")
+        if pulse.start < min(limits.earliest, 0.0) - slack or pulse.start < limits.earliest - slack:
+            broken.append(f"{name} starts before {limits.earliest:.6g} s")
+        if pulse.end > horizon + slack:
+            broken.append(f"{name} ends after the horizon of {horizon:.6g} s")
+        if pulse.start < previous_end + limits.gap - slack:
+            broken.append(f"{name} comes less than {limits.gap:.6g} s after the one before")
+        for begins, ends in limits.blackout:
+            if pulse.start < ends - slack and pulse.end > begins + slack:
+                broken.append(f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s")
+        channel = channels.get(pulse.channel)
+        if channel is not None and not (channel.min_on_time - slack <= pulse.on_time <= channel.max_on_time + slack):
+            broken.append(f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows")
+        if limits.tick is not None:
+            for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
+                if abs(value - round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick:
+                    broken.append(f"{name} {what} off the ticks of {limits.tick:.6g} s")
+        previous_end = max(previous_end, pulse.end)
+    if limits.max_pulses is not None and len(made) > limits.max_pulses:
+        broken.append(f"{len(made)} pulses are more than {limits.max_pulses}")
+    return broken

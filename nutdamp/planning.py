@@ -12,9 +12,10 @@ from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
 from nutdamp.hindrance import Hindrance, Obstacle
+from nutdamp.limits import broken_limits
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
-from nutdamp.schedule import Schedule, touching
+from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 
 NO_NUTATION = 1e-12
@@ -285,39 +286,6 @@ def unrounded(plan_: Plan) -> Schedule | None:
         return None
     smooth = plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options)
     return smooth.schedule
-
-
-def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
-    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all."""
-    limits, horizon = spacecraft.limits, spacecraft.horizon
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    broken: list[str] = []
-    previous_end = -math.inf
-    for number, pulse in enumerate(made, start=1):
-        slack = touching(pulse.end)
-        name = f"pulse {number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s)"
-        if not pulse.resolved:
-            broken.append(f"{name} is too short for its time, where times are {math.ulp(pulse.end):.2g} s apart")
-        if pulse.start < min(limits.earliest, 0.0) - slack or pulse.start < limits.earliest - slack:
-            broken.append(f"{name} starts before {limits.earliest:.6g} s")
-        if pulse.end > horizon + slack:
-            broken.append(f"{name} ends after the horizon of {horizon:.6g} s")
-        if pulse.start < previous_end + limits.gap - slack:
-            broken.append(f"{name} comes less than {limits.gap:.6g} s after the one before")
-        for begins, ends in limits.blackout:
-            if pulse.start < ends - slack and pulse.end > begins + slack:
-                broken.append(f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s")
-        channel = channels.get(pulse.channel)
-        if channel is not None and not (channel.min_on_time - slack <= pulse.on_time <= channel.max_on_time + slack):
-            broken.append(f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows")
-        if limits.tick is not None:
-            for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
-                if abs(value - round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick:
-                    broken.append(f"{name} {what} off the ticks of {limits.tick:.6g} s")
-        previous_end = max(previous_end, pulse.end)
-    if limits.max_pulses is not None and len(made) > limits.max_pulses:
-        broken.append(f"{len(made)} pulses are more than {limits.max_pulses}")
-    return broken
 
 
 @dataclass(frozen=True, eq=False)

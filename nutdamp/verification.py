@@ -10,10 +10,10 @@ import numpy as np
 from nutdamp import basilisk, flight
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import Flight, Residual
+from nutdamp.limits import commandable
 from nutdamp.physics import attitude, rates
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes.tools import least_squares
 from nutdamp.spacecraft import Spacecraft, Vector
 
 SAMPLES = 201
@@ -337,7 +337,7 @@ def _budget(
     sharp = _sharp(ideal, exact)
     rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, exact)]
     if spacecraft.limits.tick is not None:
-        rounded = Schedule(tuple(least_squares.commandable(spacecraft, pulse) for pulse in exact))
+        rounded = Schedule(tuple(commandable(spacecraft, pulse) for pulse in exact))
         rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
     if spacecraft.disturbances and not expected:
         rows.append(("disturbances", spacecraft, sharp))

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.planning import broken_limits, compare
+from nutdamp.limits import broken_limits
+from nutdamp.planning import compare
 from nutdamp.schemes import CLASSIC
 
 FILES = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))

@@ -12,9 +12,10 @@ import reference
 from builders import channel, cross, events, judged, spinner
 from scipy.integrate import simpson
 
-from nutdamp import planning, schemes
+from nutdamp import schemes
 from nutdamp.actuators import STANDARD_GRAVITY
-from nutdamp.planning import Plan, broken_limits, compare, plan
+from nutdamp.limits import broken_limits
+from nutdamp.planning import Plan, compare, plan
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
 from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft, Steerable, Vector
@@ -307,4 +308,4 @@ def test_a_schedule_is_in_the_order_of_its_centres() -> None:
     made = Schedule((late, early))
     assert [pulse.t for pulse in made] == [8.0, 9.0]
     assert made.end == 11.0
-    assert planning.broken_limits(spinner(channels=JETS), made)  # they overlap
+    assert broken_limits(spinner(channels=JETS), made)  # they overlap

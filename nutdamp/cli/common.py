@@ -327,9 +327,10 @@ def plan_or_read(
     tell_unread(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
         from nutdamp.files.schedule_file import read_pulses
+        from nutdamp.limits import broken_limits
 
         pulses, warnings = read_pulses(schedule, body)
-        for warning in (*warnings, *planning.broken_limits(body, pulses)):
+        for warning in (*warnings, *broken_limits(body, pulses)):
             remark(f"warning: {warning}")
         return planning.Plan(body, printable(schedule), pulses)
     with working("planning", quiet=quiet):

@@ -16,11 +16,11 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Arc
-from nutdamp.limits import Windows, usable
+from nutdamp.limits import Windows, commandable, usable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import Options
-from nutdamp.schemes.tools import least_squares, pair_search, predamping
+from nutdamp.schemes.tools import pair_search, predamping
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.schemes.tools.reasons import no_channels, no_target
 from nutdamp.schemes.tools.steerable_pair import SteerablePair
@@ -203,7 +203,7 @@ def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
             f"none of the channels ({names}) is in phase for a cone with {cones} to go within the {span:.4g} s that "
             "the horizon leaves it, on-times and blackout windows kept; another number of cones or rhumb-line can help"
         )
-    return least_squares.commandable(here, best[2])
+    return commandable(here, best[2])
 
 
 def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import Windows, for_pairs
+from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes import Options
@@ -115,7 +115,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Sc
             _pair(spacecraft, torquer, halves, start, wait, on_times)
             for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
         )
-        best = next((pulses for pulses in placed if least_squares.keeps_limits(spacecraft, pulses)), None)
+        best = next((pulses for pulses in placed if keeps_limits(spacecraft, pulses)), None)
         if best is not None:
             break
     if best is None:
@@ -230,14 +230,14 @@ def _shortlist(spacecraft: Spacecraft, channels: list[Channel], options: Options
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
         made, left = _trimmed(spacecraft, candidate, options.literal)
-        if least_squares.keeps_limits(spacecraft, made.pulses):
+        if keeps_limits(spacecraft, made.pulses):
             yield made, left
 
 
 def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, trimmed on the real widths and made commandable, and its flown residual in rad."""
     pulses = tuple(
-        least_squares.commandable(spacecraft, channel_pulse(channel, t, on_time))
+        commandable(spacecraft, channel_pulse(channel, t, on_time))
         for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
     )
     made = Schedule(pulses)

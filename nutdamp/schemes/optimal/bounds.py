@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.limits import SLACK, usable
+from nutdamp.limits import SLACK, free_windows, usable
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -102,7 +102,7 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     low, wide = _arcs(
         [
             (min(phases) - wider, max(phases) + wider)
-            for begins, ends in free_times(spacecraft, spacecraft.horizon)
+            for begins, ends in _slackened(free_windows(spacecraft))
             for phases in [(inertia.a * spacecraft.spin * begins, inertia.a * spacecraft.spin * ends)]
             for wider in [abs(inertia.a) * faster * max(ends - limits.earliest, 0.0)]
         ]
@@ -150,17 +150,9 @@ def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) ->
     return spacecraft.inertia.C * abs(spacecraft.spin) * way / dearest * (1.0 - ROUNDING)
 
 
-def free_times(spacecraft: Spacecraft, horizon: float) -> list[tuple[float, float]]:
-    """When pulses may be on, (begin, end) s in order: from the earliest start to ``horizon`` s, blackout left out."""
-    limits = spacecraft.limits
-    begins, free = limits.earliest - SLACK, []
-    for dark, light in sorted(limits.blackout):
-        if dark + SLACK > begins:
-            free.append((begins, min(dark, horizon) + SLACK))
-        begins = max(begins, light - SLACK)
-        if begins >= horizon:
-            return free
-    return [*free, (begins, max(horizon, begins) + SLACK)]
+def _slackened(windows: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The windows with what rounding may overstep."""
+    return [(begin - SLACK, end + SLACK) for begin, end in windows]
 
 
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:
@@ -217,7 +209,7 @@ class _Gains:
     def __init__(self, program: Program, prices: Vector) -> None:
         self.program, self.prices = program, prices
         self.torques = np.array([channel.torque for channel in program.channels])
-        spans = free_times(program.spacecraft, program.end)
+        spans = _slackened(free_windows(program.spacecraft, program.end))
         edges = [
             np.linspace(begins, ends, max(math.ceil((ends - begins) / program.width), 1) + 1) for begins, ends in spans
         ]

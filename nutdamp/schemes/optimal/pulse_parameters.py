@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nutdamp import flight
-from nutdamp.limits import longest_on_time
+from nutdamp.limits import longest_on_time, rooms
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes.optimal import residual_equations
 from nutdamp.schemes.optimal.residual_equations import Equations
@@ -16,27 +16,16 @@ class PulseParameters:
     """Centre and on-time of each pulse, as one vector: (c1, τ1, c2, τ2 …) s, its scale, and how far each may go."""
 
     def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
-        limits, names = spacecraft.limits, {channel.name: channel for channel in spacecraft.channels}
+        names = {channel.name: channel for channel in spacecraft.channels}
         self.channels = [names[pulse.channel] for pulse in made]
         self.made = made
         pace = 1.0 / abs(spacecraft.spin)
-        ready, bounds = limits.earliest, []
-        for pulse in made:
-            latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - 1e-9)])
-            begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + 1e-9)])
-            bounds.append([begun, latest])
-            ready = pulse.end + limits.gap
-        for index in range(len(bounds) - 1):
-            off, on = made.pulses[index].end, made.pulses[index + 1].start
-            half = 0.5 * max(on - off - limits.gap, 0.0)
-            bounds[index][1] = min(bounds[index][1], off + half)
-            bounds[index + 1][0] = max(bounds[index + 1][0], on - half)
-        self.room = bounds
+        self.room = rooms(spacecraft, made.pulses)
         start: list[float] = []
         scale: list[float] = []
         lower: list[float] = []
         upper: list[float] = []
-        for pulse, channel, (begun, latest) in zip(made, self.channels, bounds, strict=True):
+        for pulse, channel, (begun, latest) in zip(made, self.channels, self.room, strict=True):
             before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
             start += [pulse.t, pulse.on_time]
             scale += [pace, min(pulse.on_time, pace)]

@@ -17,6 +17,7 @@ import numpy as np
 
 from nutdamp import flight
 from nutdamp.errors import Infeasible
+from nutdamp.limits import keeps_limits
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
@@ -25,7 +26,6 @@ from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, Problem
 from nutdamp.schemes.optimal.refine import refine
 from nutdamp.schemes.optimal.repair import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
-from nutdamp.schemes.tools.least_squares import keeps_limits
 from nutdamp.spacecraft import Spacecraft
 
 CHOICES = 3

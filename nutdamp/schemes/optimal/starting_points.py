@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.limits import free_windows
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes.optimal.descent import Descent, Sequences, Task
 from nutdamp.spacecraft import Vector
@@ -155,12 +156,8 @@ def laid_out(task: Task, moments: Moments, shortest: Vector | None = None) -> St
 
 def _windows(task: Task, t: Vector) -> tuple[Vector, Vector]:
     """Begin and end, s, of the windows without blackout in which moments ``t`` lie, or of the nearest."""
-    limits, now = task.body.limits, task.body.limits.earliest
-    free: list[tuple[float, float]] = []
-    for begin, end in (*sorted(limits.blackout), (task.body.horizon, np.inf)):
-        if now < min(begin, task.body.horizon):
-            free.append((now, min(begin, task.body.horizon)))
-        now = max(now, end)
+    limits = task.body.limits
+    free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
     if not free:
         return np.full(t.shape, limits.earliest), np.full(t.shape, limits.earliest)
     begins, ends = np.array(free).T

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from nutdamp import flight
-from nutdamp.limits import Windows, longest_on_time
+from nutdamp.limits import channel_of, commandable, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.tools.symmetric_model import steady_omega
-from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.spacecraft import Spacecraft, Vector
 
 CONVERGED = 1e-14
 """rad; a few roundings of the integration."""
@@ -120,7 +119,7 @@ class _Movable:
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, on_times: tuple[float, float]) -> None:
         pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
         latest = max(spacecraft.horizon - pulse.on_time, pulse.start)
-        self.channel = _channel(spacecraft, pulse)
+        self.channel = channel_of(spacecraft, pulse)
         self.torquer = spacecraft.torquer
         if self.channel is not None:
             self.start = np.array([pulse.start, pulse.on_time])
@@ -144,37 +143,6 @@ class _Movable:
         torque = self.torquer.torque
         on_time = 0.0 if torque is None else x[1] / torque
         return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[2]), impulse=float(x[1]))
-
-
-def _channel(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
-    """The channel that fires the pulse; None for a steerable torquer."""
-    return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
-
-
-def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
-    """The pulse with start and on-time on the ticks of the commands."""
-    if spacecraft.limits.tick is None:
-        return pulse
-    windows, channel = Windows(spacecraft), _channel(spacecraft, pulse)
-    bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
-    on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
-    t = windows.nearest_tick(pulse.start) + 0.5 * on_time
-    if channel is not None:
-        return channel_pulse(channel, t, on_time)
-    scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
-    propellant = None if pulse.propellant is None else pulse.propellant * scale
-    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
-
-
-def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
-    """Whether the pulses, in order, keep every limit on their times."""
-    windows = Windows(spacecraft)
-    ready = windows.limits.earliest
-    for pulse in pulses:
-        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
-            return False
-        ready = pulse.end + windows.limits.gap
-    return True
 
 
 def solve(

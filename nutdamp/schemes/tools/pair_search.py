@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Arc
-from nutdamp.limits import Windows, for_pairs
+from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.tools import least_squares
@@ -67,7 +67,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         made = Schedule(SteerablePair(spacecraft, torquer).two(straight))
-        if spacecraft.limits.tick is not None and not least_squares.keeps_limits(spacecraft, made.pulses):
+        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
             raise Infeasible(_off_limits())
         if torquer.torque is not None or not model_of(spacecraft).exact:
             made = least_squares.refine(spacecraft, made, chosen=range(len(made)), momentum=True)
@@ -80,7 +80,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 
 def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:
     """The schedule, if it keeps the limits and comes near the target."""
-    if not least_squares.keeps_limits(spacecraft, made.pulses):
+    if not keeps_limits(spacecraft, made.pulses):
         raise Infeasible(_off_limits())
     if not _left(spacecraft, made) <= tolerable(spacecraft):
         raise Infeasible(_too_wide(spacecraft, made.pulses))
@@ -130,15 +130,15 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     for candidate in [*near[: SHORTLIST // 2], *others][:SHORTLIST]:
         made = Schedule(
             tuple(
-                least_squares.commandable(spacecraft, channel_pulse(channel, t, on_time))
+                commandable(spacecraft, channel_pulse(channel, t, on_time))
                 for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
             )
         )
-        if spacecraft.limits.tick is not None and not least_squares.keeps_limits(spacecraft, made.pulses):
+        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
             continue
         made = least_squares.refine(spacecraft, made, chosen=(0, 1), momentum=True)
         left = _left(spacecraft, made)
-        if least_squares.keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
+        if keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
             best = left, made
             if left <= EXACT:
                 break

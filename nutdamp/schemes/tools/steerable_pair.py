@@ -14,10 +14,9 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Arc
-from nutdamp.limits import Windows
+from nutdamp.limits import Windows, commandable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, steerable_pulse
-from nutdamp.schemes.tools import least_squares
 from nutdamp.spacecraft import Spacecraft, SpinState, Steerable, Vector
 
 SAMPLES = 256
@@ -106,7 +105,7 @@ class SteerablePair:
                 asked = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
                 pulse = steerable_pulse(self.torquer, moment, angle, **asked)
-                made.append(least_squares.commandable(self.spacecraft, pulse))
+                made.append(commandable(self.spacecraft, pulse))
             state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
             now, momentum = moment, after
         return tuple(made)

@@ -13,6 +13,7 @@ from scipy.optimize import linprog, minimize
 
 from nutdamp import flight, planning
 from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.limits import free_windows
 from nutdamp.planning import Plan, plan
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
 from nutdamp.schemes import Options
@@ -83,7 +84,7 @@ def test_the_bound_is_the_optimum_of_a_dense_grid_and_never_above_it(first: int)
     solved = 0
     for seed in range(first, first + 40):
         body = layout(np.random.default_rng(seed))
-        optimum = grid_optimum(body, 1200, bounds.free_times(body, body.horizon))
+        optimum = grid_optimum(body, 1200, free_windows(body))
         if not math.isfinite(optimum):  # no phase at which the channels can take it out: no schedule to bound
             continue
         solved += 1
@@ -282,7 +283,7 @@ def small_angle_optimum(spacecraft: Spacecraft, points: int, *, lasting: bool) -
     ``lasting``: each channel is on for at most the time from one moment to the next, as the torque there is.
     """
     inertia, omega = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    spans = bounds.free_times(spacecraft, spacecraft.horizon)
+    spans = free_windows(spacecraft)
     total = sum(end - begin for begin, end in spans)
     parts = [np.linspace(b, e, max(int(points * (e - b) / total), 2) + 1) for b, e in spans]
     step = np.concatenate([np.diff(part) for part in parts])

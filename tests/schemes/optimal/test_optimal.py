@@ -13,7 +13,8 @@ from checker import violations
 from scipy.optimize import least_squares, linprog
 from scipy.spatial.transform import Rotation
 
-from nutdamp.planning import broken_limits, plan
+from nutdamp.limits import broken_limits
+from nutdamp.planning import plan
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.residual_equations import Equations, small_angles
