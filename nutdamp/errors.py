@@ -82,6 +82,17 @@ class Unsuitable(BadRequest):
         return f"{'.'.join(self.where)}: {self.problem}"
 
 
+class SenselessOption(BadRequest):
+    """An option of a scheme whose value makes no sense: its ``name``, the value as ``shown``, and the ``problem``."""
+
+    def __init__(self, name: str, shown: str, problem: str) -> None:
+        super().__init__(name, shown, problem)
+        self.name, self.shown, self.problem = name, shown, problem
+
+    def __str__(self) -> str:
+        return f"{self.name} = {self.shown}: {self.problem}"
+
+
 class CannotRead(NutdampError):
     """A file that could not be read."""
 

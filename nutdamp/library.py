@@ -31,7 +31,8 @@ from nutdamp.flight import Residual
 from nutdamp.limits import broken_limits
 from nutdamp.outcome import seen_at
 from nutdamp.report.text import degrees
-from nutdamp.schemes import Options
+from nutdamp.schemes import Choice, Options
+from nutdamp.schemes.options import FourPulseOptions, HalfConeOptions, OptimalOptions, RhumbLineOptions, TwoPulseOptions
 from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track, in_file_axes, in_pieces
 
@@ -43,11 +44,16 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "Flight",
+    "FourPulseOptions",
+    "HalfConeOptions",
+    "OptimalOptions",
     "Options",
     "Plan",
     "Residual",
+    "RhumbLineOptions",
     "Spacecraft",
     "Track",
+    "TwoPulseOptions",
     "compare",
     "example",
     "load",
@@ -404,7 +410,7 @@ def example() -> Spacecraft:
     return read(built_in_example_text(), "example.yaml")
 
 
-def plan(spacecraft: Spacecraft, scheme: str, options: Options | None = None) -> Plan:
+def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
     """Plan one scheme and judge it by flying it; an infeasible plan says why.
 
     Raises BadRequest for a scheme that there is not, or an option that makes no sense.
@@ -413,7 +419,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Options | None = None) ->
     return Plan(planning.plan(_core(spacecraft), name, arguments.options(options)))
 
 
-def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Options | None = None) -> Comparison:
+def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice = None) -> Comparison:
     """Plan the schemes named and recommend one; raises as `plan` does.
 
     Default: the classic three, or those that point where the file has a target axis.

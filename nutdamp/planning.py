@@ -39,7 +39,7 @@ class Plan:
     scheme: str
     schedule: Schedule | None
     why: str | None = None
-    options: schemes.Options = field(default_factory=schemes.Options)
+    options: schemes.SchemeOptions = field(default_factory=schemes.SchemeOptions)
     failure: Exception | None = None
 
     @property
@@ -160,7 +160,7 @@ class Plan:
     def _remainder(self) -> tuple[str, ...]:
         """Why nutation is left."""
         left = self.flight.residual.nutation
-        if left < TELLING or self.options.coarse or self.options.literal:
+        if left < TELLING or self.options.uncorrected:
             return ()
         found = self.hindrance
         reason = {
@@ -202,7 +202,7 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"
 
 
-def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> Plan:
+def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) -> Plan:
     """Plan one scheme and judge it; an infeasible plan says why.
 
     Raises KeyError for a name not in `schemes.NAMES`.
@@ -216,9 +216,9 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = 
         able = " and ".join(schemes.SPINNING)
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
-    options = options or schemes.Options()
+    chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
     try:
-        return judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, options), options), options)
+        return judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, chosen), chosen), chosen)
     except Infeasible as reason:
         return Plan(spacecraft, scheme, None, str(reason))
 
@@ -229,21 +229,21 @@ def _spun(spacecraft: Spacecraft) -> bool:
     return goal is None or abs(spacecraft.spin - goal) <= compliance.SPIN_TOLERANCE * abs(goal)
 
 
-def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None = None) -> tuple[Plan, ...]:
+def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) -> tuple[Plan, ...]:
     """Feasible plans by schedules that the scheme weighs against the one that `plan` gives; it may be among them.
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
-    options = options or schemes.Options()
+    chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
     try:
-        made = schemes.alternatives(scheme, known(spacecraft, options), options)
-        plans = [judged(spacecraft, scheme, schedule, options) for schedule in made]
+        made = schemes.alternatives(scheme, known(spacecraft, chosen), chosen)
+        plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in made]
     except Infeasible:
         return ()
     return tuple(one for one in plans if one.feasible)
 
 
-def known(spacecraft: Spacecraft, options: schemes.Options) -> Spacecraft:
+def known(spacecraft: Spacecraft, options: schemes.SchemeOptions) -> Spacecraft:
     """The spacecraft as the schemes are to know it: with its disturbances only where they are asked for.
 
     A spin that nothing can change, and that is the one of the goal, is no goal for them.
@@ -254,7 +254,7 @@ def known(spacecraft: Spacecraft, options: schemes.Options) -> Spacecraft:
     return replace(body, goal=replace(body.goal, spin=None))
 
 
-def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes.Options) -> Plan:
+def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes.SchemeOptions) -> Plan:
     """The plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
     if spacecraft.disturbances:  # which the scheme need not have known
         made = made.without_proof
@@ -311,12 +311,13 @@ class Comparison:
 
         None where that is the case already, and where it is not looked at: of optimal, which takes long.
         """
-        names = [one.scheme for one in self.plans if one.scheme not in schemes.SPINNING]
+        quick = [one for one in self.plans if one.scheme not in schemes.SPINNING]
         chosen, body = self.recommended, self.spacecraft
-        if chosen is None or not names or not body.disturbances or chosen.options.with_disturbances:
+        if chosen is None or not quick or not body.disturbances or chosen.options.with_disturbances:
             return None
         try:
-            return compare(body, names, chosen.options._replace(with_disturbances=True)).recommended
+            others = (attempt(body, one.scheme, replace(one.options, with_disturbances=True)) for one in quick)
+            return Comparison(body, tuple(others)).recommended
         except NutdampError:
             return None
 
@@ -335,7 +336,7 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     return names if _spun(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 
-def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Options | None = None) -> Comparison:
+def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Choice = None) -> Comparison:
     """Plan the schemes named and recommend one; one that has a bug does not take the others down.
 
     Raises NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
@@ -346,7 +347,7 @@ def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Optio
     return Comparison(spacecraft, tuple(attempt(spacecraft, name, options) for name in names))
 
 
-def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Options | None) -> Plan:
+def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Choice) -> Plan:
     """The plan of a scheme, or one that carries the exception which nobody expected."""
     try:
         made = plan(spacecraft, scheme, options)

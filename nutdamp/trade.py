@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp import schemes
 from nutdamp.planning import Plan, plan
 from nutdamp.schedule import Bounds
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Spacecraft
 
 SAVES = 1e-3
@@ -57,7 +57,7 @@ class Front:
 
 def fronts(
     spacecraft: Spacecraft,
-    options: schemes.Options,
+    options: OptimalOptions,
     *,
     count: int,
     shifts: Sequence[float],
@@ -92,16 +92,16 @@ def _told(progress: Callable[[int], None], before: int, done: int) -> None:
     progress(before + done)
 
 
-def _allowing(options: schemes.Options, shift: float) -> schemes.Options:
+def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
     anywhere = math.isinf(shift)
-    return options._replace(free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+    return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
 
 
 def _front(
-    spacecraft: Spacecraft, options: schemes.Options, count: int, shift: float, progress: Callable[[int], None]
+    spacecraft: Spacecraft, options: OptimalOptions, count: int, shift: float, progress: Callable[[int], None]
 ) -> Front:
     """The fastest schedule, then horizons from its end to that of the file, evenly by their ratios."""
-    fastest = plan(spacecraft, "optimal", options._replace(least="time"))
+    fastest = plan(spacecraft, "optimal", replace(options, least="time"))
     progress(1)
     if fastest.schedule is None or fastest.schedule.bounds is None:
         return Front(shift, (), fastest.why or "there is nothing to do")

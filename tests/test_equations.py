@@ -16,7 +16,7 @@ from nutdamp.guide import EQUATIONS
 from nutdamp.guide.equation import Equation
 from nutdamp.physics import attitude, cones, damping, forced, inertia, rates, stability
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes import Options
+from nutdamp.schemes import SchemeOptions
 from nutdamp.schemes.one_pulse import schedule as one_pulse
 from nutdamp.spacecraft import Inertia, Spacecraft
 
@@ -154,7 +154,7 @@ def test_cones_18_19_20(A: float, C: float, spin: float) -> None:
 def test_one_pulse_21() -> None:
     for A, C, spin in BODIES:
         body = Spacecraft("x", Inertia((A, A, C)), np.array([0.3, -0.4, spin]))
-        made = one_pulse(body, Options())
+        made = one_pulse(body, SchemeOptions())
         assert made.total_impulse == pytest.approx(A * 0.5, rel=1e-14)
         left = flight.by_impulses(body, made).residual
         assert left.nutation < 1e-14

@@ -22,6 +22,7 @@ FAULTS = [Fault("b.yaml", 3, 1, "mass", "zero"), Fault("a.yaml", 0, 0, "", "empt
         errors.FaultyFile(FAULTS),
         errors.BadRequest("no such scheme"),
         errors.Unsuitable(("attitude", "epoch"), "before 1972"),
+        errors.SenselessOption("per_turn", "0", "expected a whole number of at least 1"),
         errors.CannotRead("in.yaml", "no such file"),
         errors.CannotWrite("out.csv", "permission denied"),
         errors.MissingExtra("plot", "a picture"),

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 import nutdamp
 from nutdamp import errors, planning
 from nutdamp.files import pulses_csv, track_csv
+from nutdamp.schemes.options import OptimalOptions
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = Path(__file__).with_name("library_example.py")
@@ -207,12 +208,20 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
         "on_time = nan: expected a time above zero, in s",
     ),
     "a time as text": (
-        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time="3 s")),  # type: ignore[arg-type]
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(on_time="3 s")),
         "on_time = '3 s': expected a time above zero, in s",
     ),
     "a flag as number": (
-        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(coarse=1)),  # type: ignore[arg-type]
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(coarse=1)),
         "coarse = 1: expected True or False",
+    ),
+    "an option of no scheme": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", nutdamp.Options(length=0.2)),
+        "options: no scheme has 'length'; there are with_disturbances, on_time",
+    ),
+    "options of another scheme": (
+        lambda craft, _: nutdamp.plan(craft, "four-pulse", OptimalOptions(least="time")),
+        "options of four-pulse: expected FourPulseOptions(…), got a nutdamp.schemes.options.OptimalOptions",
     ),
     "options as mapping": (
         lambda craft, _: nutdamp.plan(craft, "four-pulse", {"on_time": 3}),  # type: ignore[arg-type]
@@ -264,7 +273,7 @@ def test_a_wrong_argument_is_told_with_what_was_expected(
 
 
 def test_numbers_of_numpy_are_numbers(craft: nutdamp.Spacecraft) -> None:
-    options = nutdamp.Options(on_time=np.float64(0.5), per_turn=np.int64(2))  # type: ignore[arg-type]
+    options = nutdamp.Options(on_time=np.float64(0.5), per_turn=np.int64(2))
     plan = nutdamp.plan(craft, "four-pulse", options)
     assert max(plan.to_numpy()["on_time_s"]) == 0.5
     flight = plan.fly(until=np.float64(3.0), samples=np.int64(5))  # type: ignore[arg-type]

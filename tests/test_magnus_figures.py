@@ -13,8 +13,8 @@ from nutdamp import flight
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
 from nutdamp.schemes.four_pulse import schedule as four_pulse
+from nutdamp.schemes.options import FourPulseOptions, TwoPulseOptions
 from nutdamp.schemes.two_pulse import schedule as two_pulse
 from nutdamp.spacecraft import Inertia, Spacecraft
 
@@ -25,7 +25,7 @@ BODIES = {"a = 0.9": NEEDLE, "a = 0.3": BLUNT, "oblate": OBLATE}
 
 def coarse(spacecraft: Spacecraft, on_time: float = 0.05) -> Schedule:
     """The four-pulse scheme as in fig. 5: equal pulses, short against the nutation."""
-    return four_pulse(spacecraft, Options(on_time=on_time, coarse=True))
+    return four_pulse(spacecraft, FourPulseOptions(on_time=on_time, coarse=True))
 
 
 def unbounded(spacecraft: Spacecraft) -> Spacecraft:
@@ -127,7 +127,7 @@ def test_damping_is_the_faster_the_farther_a_is_from_zero() -> None:
 @pytest.mark.parametrize("spacecraft", BODIES.values(), ids=BODIES)
 def test_fig_8_two_pulses_stop_the_axis_where_h_was(spacecraft: Spacecraft) -> None:
     """D0 -> D1 at half the cone, half a turn on the smaller circle, and back to D0 with no nutation left."""
-    made = two_pulse(spacecraft, Options())
+    made = two_pulse(spacecraft, TwoPulseOptions())
     flown = flight.by_impulses(spacecraft, made)
     before, after = flown.around_pulses()
     start = spacecraft.nutation

@@ -16,7 +16,7 @@ from checker import violations
 from process import Run
 
 from nutdamp import trade
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Spacecraft
 
 HALF_DEGREE = math.radians(0.5)
@@ -29,7 +29,7 @@ def body() -> Spacecraft:
 
 @pytest.fixture(scope="module")
 def found(body: Spacecraft) -> tuple[trade.Front, ...]:
-    return trade.fronts(body, Options(), count=4, shifts=(trade.EVERYWHERE, 0.0, HALF_DEGREE))
+    return trade.fronts(body, OptimalOptions(), count=4, shifts=(trade.EVERYWHERE, 0.0, HALF_DEGREE))
 
 
 def test_fronts_go_from_strict_to_free(found: tuple[trade.Front, ...]) -> None:
@@ -64,8 +64,8 @@ def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: 
             for one in body.channels
         ),
     )
-    (front,) = trade.fronts(fuelled, Options(least="impulse"), count=3, shifts=(0.0,))
-    (known,) = trade.fronts(fuelled, Options(), count=3, shifts=(0.0,))
+    (front,) = trade.fronts(fuelled, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
+    (known,) = trade.fronts(fuelled, OptimalOptions(), count=3, shifts=(0.0,))
     assert {point.bounds.unit for point in front.points} == {"N m s"}
     assert {point.bounds.unit for point in known.points} == {"kg"}
     assert len(front.points) == len(known.points) >= 2
@@ -82,7 +82,7 @@ def test_what_is_allowed_more_costs_no_more(found: tuple[trade.Front, ...]) -> N
 
 def test_no_schedule_within_the_horizon_is_said_with_its_reason() -> None:
     body = spinner(channels=cross(8.0)[:1], limits=Limits(horizon=0.2))
-    front = trade.fronts(body, Options(), count=3, shifts=(0.0,))[0]
+    front = trade.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))[0]
     assert front.points == ()
     assert front.why is not None
     assert "horizon" in front.why

@@ -5,7 +5,6 @@ from __future__ import annotations
 import click
 
 from nutdamp.cli.common import (
-    Aim,
     Input,
     deliver,
     expect_places,
@@ -13,20 +12,20 @@ from nutdamp.cli.common import (
     plan_or_read,
     quiet_option,
     remarks,
-    scheme_options,
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import progress
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.schemes import NAMES, Options
 
 
-@click.command("animate")
+@click.command("animate", cls=PlanningCommand)
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to show; default the recommended one.")
 @click.option("--schedule", type=FILE, help="Show the pulses of a CSV file: start_s, on_time_s, channel.")
-@scheme_options
+@goal_options
 @click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")

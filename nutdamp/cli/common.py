@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Sequence
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
-from nutdamp.cli.failures import debug_option, show_failures
-from nutdamp.cli.parameters import FILE, Angles, Direction, FinalSpin, Quantity
+from nutdamp.cli.failures import show_failures
+from nutdamp.cli.parameters import FILE
+from nutdamp.cli.scheme_options import Aim, expect_read
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
-from nutdamp.schemes import AIMED, LEAST, SUNLIT, Options
+from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nutdamp.errors import CannotWrite, Fault
     from nutdamp.files.settings import Setting
     from nutdamp.planning import Plan
-    from nutdamp.spacecraft import Spacecraft, Vector
+    from nutdamp.spacecraft import Spacecraft
 
 DEFAULT_FILE = "spacecraft.yaml"
 
@@ -100,163 +100,13 @@ def placed(wrong: Unsuitable, given: Input) -> NutdampError:
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
-class Aim(NamedTuple):
-    """A goal as the command line gives it, in place of the one in the file.
-
-    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
-    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
-    """
-
-    target: Angles | None = None
-    spin: float | str | None = None
-    sun: Angles | None = None
-
-    def applied(self, spacecraft: Spacecraft, remark: Callable[[str], None]) -> Spacecraft:
-        """The spacecraft with this goal; a usage error where it cannot be one, a remark where it is hardly meant."""
-        from dataclasses import replace
-
-        goal = spacecraft.goal
-        if self.target is not None:
-            goal = replace(goal, axis=_direction(spacecraft, self.target, "--target"))
-        if self.sun is not None:
-            goal = replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
-        if self.spin is not None:
-            spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
-            if spin * spacecraft.spin <= 0.0:
-                raise click.BadParameter(
-                    f"a rate of the sign of the spin ({spacecraft.spin:.4g} rad/s) is wanted", param_hint="--spin"
-                )
-            goal = replace(goal, spin=spin)
-        for option, angles in (("--target", self.target), ("--sun", self.sun)):
-            for reading in () if angles is None else angles.readings:
-                remark(f"{option}: warning: {reading}")
-        return replace(spacecraft, goal=goal)
-
-
-def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
-    """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
-    from nutdamp.physics.attitude import on_sphere
-
-    if spacecraft.attitude is not None:
-        if abs(angles.second) > 0.5 * math.pi:
-            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
-        return on_sphere(angles.first, angles.second)
-    if not 0.0 <= angles.first < math.pi:
-        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
-    return spacecraft.direction_in_n(angles.first, angles.second)
-
-
-def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
-    return click.BadParameter("; ".join((f"{expected} is wanted", *angles.readings)), param_hint=option)
-
-
-READ_BY = {
-    "on_time": ("four-pulse", "rhumb-line"),
-    "coarse": ("four-pulse",),
-    "literal": ("two-pulse",),
-    "least": ("optimal",),
-    "free_axis": ("optimal",),
-    "shift": ("optimal",),
-    "cones": ("half-cone",),
-    "per_turn": ("rhumb-line",),
-}
-"""Options of planning that only some schemes read; the others are for all."""
-
-
-def tell_unread(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
-    """Say what was asked for that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
-    for option, readers in READ_BY.items():
-        if getattr(options, option) != Options._field_defaults[option] and not set(readers) & set(names):
-            remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
-    if body.goal.sun is not None:
-        deaf = [name for name in names if name not in SUNLIT]
-        if len(deaf) == len(names):
-            raise click.UsageError(f"--sun is for {' and '.join(SUNLIT)}, which is not planned here")
-        if deaf:
-            remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(deaf)} plan without it")
-    if names and body.goal.axis is None and set(names) <= set(AIMED):
-        turns, needs = ("turns", "needs") if len(names) == 1 else ("turn", "need")
-        problem = f"{turns} the spin axis to a target and {needs} one: --target, or goal in the file"
-        raise click.UsageError(f"{' and '.join(names)} {problem}")
-
-
-def scheme_options(command: Command) -> Command:
-    """Options of planning, gathered into ``options`` for the schemes (`schemes.Options`) and the ``aim`` for `load`."""
-
-    @functools.wraps(command)
-    def gathered(*args: Any, **parameters: Any) -> Any:
-        chosen = Options(**{name: parameters.pop(name) for name in Options._fields})
-        for name, problem in chosen.faults():
-            raise click.BadParameter(problem, param_hint=f"--{name.replace('_', '-')}")
-        aim = Aim(*(parameters.pop(name) for name in Aim._fields))
-        return command(*args, options=chosen, aim=aim, **parameters)
-
-    wrapped: Any = gathered
-    for option in (
-        debug_option,
-        click.option(
-            "--spin",
-            type=FinalSpin("rate"),
-            metavar="RATE|keep",
-            help="optimal: spin rate at the end, such as 30rpm, by channels with a torque about axis 3.",
-        ),
-        click.option(
-            "--target",
-            type=Direction(),
-            metavar="ANGLE,ANGLE",
-            help="Where the spin axis is to end: right ascension and declination where the file has an attitude, else "
-            "tilt from H and azimuth about it, such as 10deg,45deg.",
-        ),
-        click.option(
-            "--sun",
-            type=Direction(),
-            metavar="ANGLE,ANGLE",
-            help="rhumb-line: the Sun, given as --target is, to which the pulses keep their phase; default: the "
-            "phase of the great circle to the target.",
-        ),
-        click.option(
-            "--per-turn",
-            type=click.IntRange(1),
-            default=1,
-            show_default=True,
-            help="rhumb-line: pulses in each spin turn.",
-        ),
-        click.option(
-            "--cones",
-            type=click.IntRange(1),
-            help="half-cone: how many half cones; default: the fewest of which one more would save less than 1 %.",
-        ),
-        click.option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
-        click.option(
-            "--shift",
-            type=Quantity("angle"),
-            help="optimal: how far from its target the angular momentum may end, such as 0.2deg.",
-        ),
-        click.option("--free-axis", is_flag=True, help="optimal: let the angular momentum end where it likes."),
-        click.option(
-            "--least",
-            type=click.Choice(LEAST),
-            default=LEAST[0],
-            show_default=True,
-            help="optimal: what to save; impulse stands in where propellant is unknown.",
-        ),
-        click.option("--literal", is_flag=True, help="two-pulse as printed by Magnus: equal halves, small-angle wait."),
-        click.option("--coarse", is_flag=True, help="four-pulse with full pulses only, no shorter one at the end."),
-        click.option(
-            "--on-time", type=Quantity("time"), help="Pulse length of four-pulse and rhumb-line, such as 200ms."
-        ),
-    ):
-        wrapped = option(wrapped)
-    return cast(Command, wrapped)
-
-
 def plot_options(command: Command) -> Command:
     """``--plot FILE`` and which picture it is to be."""
     for option in (
         click.option(
             "--figure", type=click.Choice(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."
         ),
-        click.option("--plot", type=FILE, help="Draw the motion (.png, .svg, .pdf; needs the extra plot)."),
+        click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs the extra plot)."),
     ):
         command = option(command)
     return command
@@ -324,7 +174,7 @@ def plan_or_read(
     from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible, printable
 
-    tell_unread(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
+    expect_read(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
         from nutdamp.files.schedule_file import read_pulses
         from nutdamp.limits import broken_limits

@@ -12,7 +12,6 @@ import click
 
 from nutdamp.cli.boundary import REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
-    Aim,
     Input,
     Output,
     deliver,
@@ -23,12 +22,12 @@ from nutdamp.cli.common import (
     quiet_option,
     remarks,
     require_dispersions,
-    scheme_options,
     spacecraft_argument,
 )
 from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import NAMES, Options
 
@@ -46,11 +45,11 @@ SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
 
 
-@click.command("disperse")
+@click.command("disperse", cls=PlanningCommand)
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to disperse; default the recommended one.")
 @click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file: start_s, on_time_s, channel.")
-@scheme_options
+@goal_options
 @click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
 @click.option(
     "--seed", type=click.IntRange(0, 2**64 - 1), default=1, show_default=True, help="Same seed, same draws, always."

@@ -9,7 +9,6 @@ import click
 
 from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
-    Aim,
     Input,
     deliver,
     expect_places,
@@ -17,16 +16,16 @@ from nutdamp.cli.common import (
     plan_or_read,
     quiet_option,
     remarks,
-    scheme_options,
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
 from nutdamp.schemes import NAMES, Options
 
 
-@click.command("export", context_settings={"allow_extra_args": True})
+@click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
 @spacecraft_argument
 @click.option(
     "--format",
@@ -38,7 +37,7 @@ from nutdamp.schemes import NAMES, Options
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
 @click.option("--schedule", type=FILE, help="Export the pulses of a CSV file: start_s, on_time_s, channel.")
-@scheme_options
+@goal_options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
 @quiet_option

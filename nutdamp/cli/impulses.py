@@ -17,8 +17,8 @@ def impulse_options(command: Command) -> Command:
         click.option(
             "--impulses",
             is_flag=True,
-            help="Fly dispersed cases by the impulse sum (17), which is faster than real widths; refused where it errs "
-            "by more than a tenth of the requirement.",
+            help="Fly dispersed cases by the impulse sum (17): faster; refused where it errs by over a tenth of the "
+            "requirement.",
         ),
     ):
         command = option(command)

@@ -9,7 +9,6 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
-    Aim,
     Input,
     Output,
     deliver,
@@ -20,14 +19,13 @@ from nutdamp.cli.common import (
     quiet_option,
     remarks,
     require_dispersions,
-    scheme_options,
     spacecraft_argument,
-    tell_unread,
 )
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import PLANNED, Options
 
@@ -38,16 +36,15 @@ if TYPE_CHECKING:
     from nutdamp.robust import RobustComparison
 
 
-@click.command("plan")
+@click.command("plan", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan this one only; repeatable.")
+@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan it alone; repeatable.")
 @scheme_options
-@click.option(
-    "--robust", is_flag=True, help="Pick among the schemes and their variants by how many dispersed cases comply."
-)
+@goal_options
+@click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")
 @impulse_options
-@click.option("--csv", type=FILE, help="Write the pulses of the recommended plan, or the one named.")
-@click.option("--json", type=FILE, help="Write all plans with their residuals.")
+@click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
+@click.option("--json", type=FILE, help="Write all plans and residuals.")
 @plot_options
 @quiet_option
 def command(
@@ -66,8 +63,8 @@ def command(
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
-    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
-    example. A FILE of - is standard output.
+    SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
+    A FILE of - is standard output.
     """
     names = tuple(dict.fromkeys(names))
     expect_impulses(impulses, force, robust, "--robust")
@@ -87,7 +84,7 @@ def command(
     from nutdamp.planning import compare, usual
 
     names = names or usual(body)
-    tell_unread(names, options, body, remark)
+    expect_read(names, options, body, remark)
     with working("planning", quiet=quiet):
         compared = compare(body, names, options)
     dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None

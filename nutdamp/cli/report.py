@@ -10,17 +10,14 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
-    Aim,
     Input,
     deliver,
     expect_places,
     quiet_option,
     remarks,
     require_dispersions,
-    scheme_options,
     source,
     spacecraft_argument,
-    tell_unread,
 )
 from nutdamp.cli.disperse import SAMPLES, fly
 from nutdamp.cli.failures import show_failures
@@ -28,6 +25,7 @@ from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count, is_count
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
@@ -35,7 +33,7 @@ if TYPE_CHECKING:
     from nutdamp.planning import Plan
 
 
-class Report(click.Command):
+class Report(PlanningCommand):
     """``report``, in which ``--disperse`` may stand without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -52,7 +50,7 @@ class Report(click.Command):
 @click.command("report", cls=Report)
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Compare this one only; repeatable.")
-@scheme_options
+@goal_options
 @click.option(
     "-o",
     "--output",
@@ -105,7 +103,7 @@ def command(
     if disperse is not None:
         require_dispersions(body)
     schemes = tuple(dict.fromkeys(names)) or usual(body)
-    tell_unread(schemes, options, body, remark)
+    expect_read(schemes, options, body, remark)
     with working("planning", quiet=quiet):
         compared = compare(body, schemes, options)
     chosen = compared.recommended

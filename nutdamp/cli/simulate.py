@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.common import (
-    Aim,
     Input,
     Output,
     deliver,
@@ -18,11 +17,11 @@ from nutdamp.cli.common import (
     plot_options,
     quiet_option,
     remarks,
-    scheme_options,
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.schemes import NAMES, Options
 
 if TYPE_CHECKING:
@@ -33,11 +32,11 @@ PICTURED = 100_000
 """Rows of the track of a picture at most."""
 
 
-@click.command("simulate")
+@click.command("simulate", cls=PlanningCommand)
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
 @click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file: start_s, on_time_s, channel.")
-@scheme_options
+@goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(
     "--until",

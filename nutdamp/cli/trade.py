@@ -9,7 +9,6 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE
 from nutdamp.cli.common import (
-    Aim,
     Input,
     Output,
     deliver,
@@ -18,13 +17,12 @@ from nutdamp.cli.common import (
     load,
     quiet_option,
     remarks,
-    scheme_options,
     spacecraft_argument,
-    tell_unread,
 )
 from nutdamp.cli.parameters import FILE, FOLDER, Quantity
 from nutdamp.cli.places import expect_outputs
-from nutdamp.schemes import Options
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
+from nutdamp.schemes.options import LEAST, OptimalOptions, Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -40,7 +38,7 @@ class Allowance(Quantity):
         return float("inf") if value == "any" else super().convert(value, param, ctx)
 
 
-@click.command("trade")
+@click.command("trade", cls=PlanningCommand)
 @spacecraft_argument
 @click.option(
     "--allow",
@@ -50,7 +48,14 @@ class Allowance(Quantity):
     help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
 )
 @click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
-@scheme_options
+@click.option(
+    "--least",
+    type=click.Choice(LEAST[:2]),
+    default=LEAST[0],
+    show_default=True,
+    help="What is traded against time; impulse where propellant is unknown.",
+)
+@goal_options
 @click.option("--csv", type=FILE, help="Write the points.")
 @click.option("--json", type=FILE, help="Write the points with their pulses.")
 @click.option("--plot", type=FILE, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
@@ -60,6 +65,7 @@ def command(
     spacecraft: Input,
     allow: tuple[float, ...],
     points: int,
+    least: str,
     options: Options,
     aim: Aim,
     csv: str | None,
@@ -73,10 +79,6 @@ def command(
     Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT and FILE are as
     for `nutdamp plan`.
     """
-    if options.free_axis or options.shift is not None:
-        raise click.UsageError("--allow says how far H may end from its target; --free-axis and --shift are for plan")
-    if options.least not in ("propellant", "impulse"):
-        raise click.UsageError("time is traded against propellant or impulse: --least is one of these here")
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
     from nutdamp import trade
@@ -90,12 +92,13 @@ def command(
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
-    tell_unread(("optimal",), options, body, remark)
+    chosen = OptimalOptions(least=least, with_disturbances=options.of(OptimalOptions).with_disturbances)
+    expect_read(("optimal",), options, body, remark)
 
     from nutdamp.cli.progress import progress
 
     with progress("searching", most, quiet=quiet) as step:
-        found = trade.fronts(body, options, count=points, shifts=shifts, progress=step)
+        found = trade.fronts(body, chosen, count=points, shifts=shifts, progress=step)
     outputs: list[Output] = []
     if csv is not None or json is not None:
         from nutdamp.files.output import json_text

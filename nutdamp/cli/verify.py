@@ -9,7 +9,6 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, UNREADABLE
 from nutdamp.cli.common import (
-    Aim,
     Input,
     Output,
     deliver,
@@ -18,11 +17,11 @@ from nutdamp.cli.common import (
     plan_or_read,
     quiet_option,
     remarks,
-    scheme_options,
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import NAMES, Options
 
@@ -30,11 +29,11 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 
-@click.command("verify")
+@click.command("verify", cls=PlanningCommand)
 @spacecraft_argument
 @click.option("--scheme", type=click.Choice(NAMES), help="The scheme to verify; default the recommended one.")
 @click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file: start_s, on_time_s, channel.")
-@scheme_options
+@goal_options
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def command(

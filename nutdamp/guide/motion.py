@@ -94,8 +94,8 @@ _BLUNT = '--set "inertia={A: 100, C: 70}"'
 _OBLATE = '--set "inertia={A: 100, C: 130}"'
 
 
-def _drawn(name: str, *options: str) -> tuple[str, ...]:
-    return ("nutdamp simulate", *options, "--figure motion", f"--plot {name}.png")
+def _drawn(name: str, *options: str, command: str = "simulate") -> tuple[str, ...]:
+    return (f"nutdamp {command}", *options, "--figure motion", f"--plot {name}.png")
 
 
 FIGURES = Topic(
@@ -113,15 +113,15 @@ FIGURES = Topic(
         Part(
             "Abb. 5: pole curve of a prolate body, four pulses in the time T_ω (left); Abb. 6: axis track, a = 0.9 "
             "(right)",
-            (Commands((_drawn("abb6", _SLENDER, *_FOUR, "--on-time 25ms"),)),),
+            (Commands((_drawn("abb6", _SLENDER, *_FOUR, "--on-time 25ms", command="plan"),)),),
         ),
         Part(
             "Abb. 7: axis track for the same pole curve, a = 0.3",
             (
-                Commands((_drawn("abb7", _BLUNT, *_FOUR, "--on-time 175ms"),)),
+                Commands((_drawn("abb7", _BLUNT, *_FOUR, "--on-time 175ms", command="plan"),)),
                 "Between two pulses the axis turns about H by 210° here and by 10° in Abb. 6: the farther a is from 0, "
                 "the faster the damping. An oblate body runs through the mirror image of the pole curve:",
-                Commands((_drawn("oblate", _OBLATE, *_FOUR, "--on-time 325ms"),)),
+                Commands((_drawn("oblate", _OBLATE, *_FOUR, "--on-time 325ms", command="plan"),)),
             ),
         ),
         Part(

@@ -8,7 +8,7 @@ import math
 from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import FourPulseOptions
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.schemes.tools.reasons import no_alignment, no_channels
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -17,7 +17,7 @@ DEFAULT_SHARE = 0.125
 """Default on-time as a share of T_ω: 2.6 % of the impulse is lost to the width."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     """Fire each channel whenever it opposes ω and firing helps, until it no longer does.
 
     Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at most J_min/(2A) where
@@ -51,7 +51,9 @@ def _on_time(builder: ImpulseBuilder, channel: Channel, asked: float | None) -> 
     return asked
 
 
-def _turning(builder: ImpulseBuilder, channels: list[Channel], on_times: dict[str, float], options: Options) -> None:
+def _turning(
+    builder: ImpulseBuilder, channels: list[Channel], on_times: dict[str, float], options: FourPulseOptions
+) -> None:
     """Alignment after alignment, whichever helpful channel comes first."""
     while not builder.full and not builder.settled:
         pulses = [_next(builder, channel, on_times[channel.name], options.coarse) for channel in channels]
@@ -67,7 +69,7 @@ def _next(builder: ImpulseBuilder, channel: Channel, on_time: float, coarse: boo
     return builder.align(channel, on_time if just_enough is None else just_enough)
 
 
-def _standing(builder: ImpulseBuilder, channels: list[Channel], options: Options) -> None:
+def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPulseOptions) -> None:
     """A sphere: ω does not turn, so the two channels on either side of -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
     shares = _shares(channels, -builder.A * builder.omega)
     for channel, impulse in shares:

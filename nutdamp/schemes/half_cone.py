@@ -19,7 +19,7 @@ from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable, usable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import HalfConeOptions
 from nutdamp.schemes.tools import pair_search, predamping
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.schemes.tools.reasons import no_channels, no_target
@@ -54,7 +54,7 @@ LONGEST_SEARCH = 6000
 """Moments looked at for one pulse, at most."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     """``options.cones`` half cones; where that is None the fewest of which one more would save less than 1 %.
 
     Raises Infeasible with the reason.

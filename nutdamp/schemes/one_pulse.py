@@ -9,7 +9,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.schemes.tools.reasons import no_alignment, no_channels
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable
@@ -21,7 +21,7 @@ LEFT_OVER = 0.01
 """Share of A|ω0| from which a remainder counts against a channel."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:  # noqa: ARG001 - the signature of a scheme
+def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noqa: ARG001 - the signature of a scheme
     """One pulse, or a train of equal ones where on-times are too short or the torque too weak for one.
 
     A steerable torquer fires at once. A body-fixed channel waits until it opposes ω; the channel that needs

@@ -11,6 +11,7 @@ The phase is that of the great circle to the target, or fixed against the Sun: t
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,10 +19,10 @@ from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.physics import pointing
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import UNEQUAL, RhumbLineOptions
 from nutdamp.schemes.tools import least_squares, predamping
 from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
-from nutdamp.schemes.tools.pulse_train import LAST, UNEQUAL, Attempt, Train
+from nutdamp.schemes.tools.pulse_train import LAST, Attempt, Train
 from nutdamp.schemes.tools.reasons import no_channels, no_target
 from nutdamp.spacecraft import Spacecraft
 
@@ -38,10 +39,10 @@ OTHERS = 4
 """Other lengths of the pulses that are tried where the one asked for does not do."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     """The train, after one pulse (or a train against ω) where there is more nutation than it can take along.
 
-    ``options.on_time`` and ``per_turn`` as in `Options`. Raises Infeasible with the reason.
+    ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
     if spacecraft.goal.axis is None:
         raise Infeasible(no_target())
@@ -55,13 +56,7 @@ def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
         raise Infeasible(f"{why}; {_another(spacecraft, options)}") from None
 
 
-def on_times(options: Options) -> tuple[float, float]:
-    """Bounds (s) that the last pulses keep, whoever trims them: an on-time asked for is held."""
-    asked = options.on_time
-    return least_squares.ANY if asked is None else ((1.0 - UNEQUAL) * asked, (1.0 + UNEQUAL) * asked)
-
-
-def _train(spacecraft: Spacecraft, options: Options) -> Schedule:
+def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     """The train from t = 0, or else after what damps the nutation. Raises Infeasible with the reason."""
     builder, reason = FlownBuilder(spacecraft), Infeasible("")
     train = Train(builder.here, options)
@@ -78,20 +73,20 @@ def _train(spacecraft: Spacecraft, options: Options) -> Schedule:
     return _best(builder, Train(builder.here, options))
 
 
-def _another(spacecraft: Spacecraft, options: Options) -> str:
+def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     """Which pulse length would do instead of the one asked for, the nearest first, in words."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
             builder.fire(predamping.damping(builder.here))
-        lengths = Train(builder.here, options._replace(on_time=None)).lengths_near(options.on_time or 0.0)
+        lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
     for length in lengths[:OTHERS]:
         digits = 3 - math.floor(math.log10(length))
         rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
         try:
-            made = _train(spacecraft, options._replace(on_time=rounded))
+            made = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
         if float(np.linalg.norm(least_squares.misses(spacecraft, made))) > max(10.0 * EXACT, exact):

@@ -21,7 +21,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import TwoPulseOptions
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.flown_builder import tolerable
 from nutdamp.schemes.tools.impulse_builder import ALIGNED, ImpulseBuilder
@@ -51,7 +51,7 @@ EXACT = 1e-11
 """rad of flown residual below which a trimmed candidate is as good as exact (6e-10 deg)."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     """Two pulses, and a remark on what fixed channels cost or leave.
 
     ``options.literal``: equal halves and the wait as printed, not trimmed, and the target left alone. Raises Infeasible
@@ -79,13 +79,13 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
     if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
         return None
     try:
-        made = _damping(spacecraft, Options())
+        made = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
     return made if float(np.linalg.norm(least_squares.misses(spacecraft, made))) <= tolerable(spacecraft) else None
 
 
-def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
+def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     """The two pulses that leave H where it was, as far as trimming goes for a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
@@ -102,7 +102,7 @@ def _damping(spacecraft: Spacecraft, options: Options) -> Schedule:
 # --- steerable torquer -----------------------------------------------------------------------------------------------
 
 
-def _steered(spacecraft: Spacecraft, torquer: Steerable, options: Options) -> Schedule:
+def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
     inertia, windows = spacecraft.inertia, Windows(spacecraft)
     form = damping.half_pulses_as_printed if options.literal else damping.half_pulses
@@ -195,14 +195,14 @@ class Candidate(NamedTuple):
     """Impulse over A|ω0|."""
 
 
-def alternatives(spacecraft: Spacecraft, options: Options) -> Iterator[Schedule]:
+def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
     """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer."""
     if spacecraft.torquer is None and (spacecraft.limits.max_pulses or 2) >= 2:
         for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
             yield made
 
 
-def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) -> Schedule:
+def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
     """The smallest flown residual of the most promising candidates wins, exact ones in order."""
     best: tuple[float, Schedule] | None = None
     for made, left in _shortlist(spacecraft, channels, options):
@@ -215,7 +215,9 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: Options) ->
     return best[1]
 
 
-def _shortlist(spacecraft: Spacecraft, channels: list[Channel], options: Options) -> Iterator[tuple[Schedule, float]]:
+def _shortlist(
+    spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
+) -> Iterator[tuple[Schedule, float]]:
     """The most promising candidates, trimmed, with the residual (rad) that each leaves when flown."""
     candidates = sorted(
         (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),

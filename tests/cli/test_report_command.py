@@ -31,10 +31,10 @@ def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) 
 
 def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
-    assert run("report", "my craft.yaml", "-q", "--coarse", "-o", "a.md").returncode == 0
+    assert run("report", "my craft.yaml", "-q", "--with-disturbances", "-o", "a.md").returncode == 0
     first = (tmp_path / "a.md").read_text(encoding="utf-8")
     command, file = re.findall(r"```(?:console|yaml)\n(.*?)\n```", first, re.DOTALL)
-    assert command == "nutdamp report 'my craft.yaml' -q --coarse -o a.md"
+    assert command == "nutdamp report 'my craft.yaml' -q --with-disturbances -o a.md"
     (tmp_path / "my craft.yaml").write_text(file + "\n")
     assert run(*shlex.split(command)[1:]).returncode == 0
     assert (tmp_path / "a.md").read_text(encoding="utf-8") == first
@@ -87,7 +87,7 @@ def test_the_page_is_written_whatever_the_verdict(
         (("-o", "no/report.md"), 1, "cannot write no/report.md"),
         (("missing.yaml",), 1, "cannot read missing.yaml"),
         (("--scheme", "three-pulse"), 2, "three-pulse"),
-        (("--on-time", "0"), 2, "above zero"),
+        (("--target", "10deg"), 2, "is not two angles"),
         (("--disperse", "-1"), 2, "number of cases"),
     ],
 )

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from process import Run
 
+from nutdamp.cli.root import COMMANDS
+
 
 @pytest.mark.parametrize(
     ("command", "option", "reader"),
@@ -15,10 +17,7 @@ from process import Run
         ("plan --scheme two-pulse --on-time 200ms", "--on-time", "four-pulse"),
         ("plan --scheme four-pulse --literal", "--literal", "two-pulse"),
         ("plan --shift 0.2deg", "--shift", "optimal"),
-        ("simulate --scheme none --coarse", "--coarse", "four-pulse"),
-        ("verify --scheme two-pulse --free-axis", "--free-axis", "optimal"),
-        ("trade --points 1 --allow any --on-time 1s", "--on-time", "four-pulse"),
-        ("report -o x.md --scheme one-pulse --coarse", "--coarse", "four-pulse"),
+        ("plan --scheme half-cone --target 10deg,45deg --per-turn 2", "--per-turn", "rhumb-line"),
     ],
 )
 def test_an_option_that_no_scheme_planned_reads_is_told(run: Run, command: str, option: str, reader: str) -> None:
@@ -38,9 +37,35 @@ def test_an_option_that_one_scheme_reads_is_no_matter(run: Run, command: str) ->
 
 def test_an_option_beside_a_schedule_is_told(run: Run, tmp_path: Path) -> None:
     run("plan", "--csv", "pulses.csv")
-    done = run("simulate", "--schedule", "pulses.csv", "--coarse")
+    done = run("simulate", "--schedule", "pulses.csv", "--with-disturbances")
     assert done.returncode == 0
-    assert "--coarse does nothing here" in done.stderr
+    assert "--with-disturbances does nothing here: the pulses are those of the schedule" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "schedule"),
+    [
+        ("simulate --scheme four-pulse --coarse", "--coarse is for four-pulse, an option of `nutdamp plan`", True),
+        ("verify --on-time 200ms", "--on-time is for four-pulse and rhumb-line, an option of `nutdamp plan`", True),
+        ("disperse --literal", "--literal is for two-pulse, an option of `nutdamp plan`", True),
+        ("animate -o x.gif --cones 3", "--cones is for half-cone, an option of `nutdamp plan`", True),
+        ("export --format json --free-axis", "--free-axis is for optimal, an option of `nutdamp plan`", True),
+        ("report -o x.md --per-turn 2", "--per-turn is for rhumb-line, an option of `nutdamp plan`", False),
+        ("trade --shift 1deg", "--shift is for optimal, an option of `nutdamp plan`", False),
+    ],
+)
+def test_an_option_of_a_scheme_is_given_to_plan(run: Run, command: str, option: str, schedule: bool) -> None:
+    done = run(*command.split())
+    assert (done.returncode, done.stdout) == (2, "")
+    assert option in done.stderr
+    assert ("save its pulses with --csv FILE, and name them here with --schedule FILE" in done.stderr) == schedule
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_help_page_fits_the_screen_of_a_terminal(run: Run, command: str) -> None:
+    lines = run(command, "--help").stdout.splitlines()
+    assert len(lines) <= 60
+    assert max(map(len, lines)) <= 80
 
 
 def test_a_scheme_that_cannot_set_the_spin_is_infeasible(run: Run) -> None:

@@ -17,11 +17,12 @@ from checker import violations
 from nutdamp import planning
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import pointing
-from nutdamp.schemes import Options
+from nutdamp.schemes import Choice, Options
+from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
 
-def train(spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
+def train(spacecraft: Spacecraft, options: Choice = None) -> planning.Plan:
     plan = planning.plan(spacecraft, "rhumb-line", options)
     assert plan.feasible, plan.why
     assert violations(spacecraft, plan.pulses) == []
@@ -59,7 +60,7 @@ def test_arc_efficiency(torque: float, on_time: float) -> None:
     assert 1.0 - 1e-3 < turned / spacecraft.turning_impulse < 1.0 + 1.0 / len(made)
 
 
-def asked_for(seed: int) -> tuple[Spacecraft, Options]:
+def asked_for(seed: int) -> tuple[Spacecraft, RhumbLineOptions]:
     """A turn by some tens of pulses of a length that is asked for."""
     rng = np.random.default_rng(seed)
     A, spin = 100.0, float(rng.choice([3.0, -3.0]))
@@ -71,7 +72,7 @@ def asked_for(seed: int) -> tuple[Spacecraft, Options]:
         channels=cross(float(rng.uniform(5.0, 20.0)), max_on_time=1.0),
         limits=Limits(horizon=400.0),
     )
-    options = Options(on_time=float(rng.uniform(0.05, 0.6)), per_turn=int(rng.integers(1, 3)))
+    options = RhumbLineOptions(on_time=float(rng.uniform(0.05, 0.6)), per_turn=int(rng.integers(1, 3)))
     return aimed(body, float(rng.uniform(5.0, 40.0)), float(rng.uniform(-180.0, 180.0))), options
 
 
@@ -91,7 +92,7 @@ def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
             found = re.search(r"--on-time ([0-9.]+)s works, with ([0-9]+) pulses in all$", plan.why or "")
             assert found or (plan.why or "").endswith("no other length was found that works"), plan.why
             if found:
-                plan = train(spacecraft, options._replace(on_time=float(found[1])))
+                plan = train(spacecraft, replace(options, on_time=float(found[1])))
                 assert len(plan.pulses) == int(found[2])
                 closes(plan)
                 named += 1

@@ -9,7 +9,7 @@ from functools import partial
 from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.spacecraft import Spacecraft
 
 TRAINS = ((1, 12), (2, 24), (1, 24), (2, 12), (1, 48), (2, 48))
@@ -19,7 +19,7 @@ CONES = (12, 6, 3)
 """Half cones in a row that are tried beside the number that the scheme takes."""
 
 
-def by_other_schemes(spacecraft: Spacecraft, options: Options, *, shift: bool) -> Iterator[Schedule]:
+def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
     """Schedules by the channels of the ``spacecraft`` for the same goal, one after the other; ``shift``: H counts.
 
     The later ones take longer to plan, and are rarely better.
@@ -28,16 +28,15 @@ def by_other_schemes(spacecraft: Spacecraft, options: Options, *, shift: bool) -
 
     # The Sun keeps the phase of trains alone.
     body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
-    plain = options._replace(on_time=None, per_turn=1, cones=None)
     plans: list[Callable[[], Schedule | Iterable[Schedule]]] = []
     if not shift:
-        plans.append(partial(one_pulse.schedule, body, plain))
+        plans.append(partial(one_pulse.schedule, body, SchemeOptions()))
     elif body.goal.axis is None:
-        plans.append(partial(two_pulse.alternatives, body, plain))
+        plans.append(partial(two_pulse.alternatives, body, TwoPulseOptions()))
     else:
-        plans.append(partial(two_pulse.schedule, body, plain))
-        plans += [partial(rhumb_line.schedule, body, one) for one in (plain, *_trains(body, plain))]
-        plans += [partial(half_cone.schedule, body, plain._replace(cones=cones)) for cones in (None, *CONES)]
+        plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
+        plans += [partial(rhumb_line.schedule, body, one) for one in (RhumbLineOptions(), *_trains(body))]
+        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
     for plan in plans:
         try:
             made = plan()
@@ -47,7 +46,7 @@ def by_other_schemes(spacecraft: Spacecraft, options: Options, *, shift: bool) -
         yield from every
 
 
-def _trains(body: Spacecraft, plain: Options) -> Iterator[Options]:
+def _trains(body: Spacecraft) -> Iterator[RhumbLineOptions]:
     """Trains of so many pulses, as long as the channels allow."""
     channels = usable(body)
     if not channels:
@@ -59,4 +58,4 @@ def _trains(body: Spacecraft, plain: Options) -> Iterator[Options]:
         on_time = min(max(body.turning_impulse / (count * weakest), shortest), longest)
         if (per_turn, on_time) not in tried:
             tried.add((per_turn, on_time))
-            yield plain._replace(per_turn=per_turn, on_time=on_time)
+            yield RhumbLineOptions(per_turn=per_turn, on_time=on_time)

@@ -11,12 +11,12 @@ from nutdamp import flight
 from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.schedule import Bounds, Schedule
-from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import bounds, residual_equations
 from nutdamp.schemes.optimal.bounds import Left
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.repair import UNMET
 from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.schemes.tools.reasons import no_channels
 from nutdamp.spacecraft import Spacecraft
 
@@ -36,7 +36,7 @@ NAMED = 5e-3
 class Problem:
     """What stays the same while a schedule is looked for."""
 
-    def __init__(self, spacecraft: Spacecraft, options: Options) -> None:
+    def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
         self.spacecraft, self.options = spacecraft, options
         asked = spacecraft.goal.spin is not None
         self.channels = tuple(usable(spacecraft, axial=asked))

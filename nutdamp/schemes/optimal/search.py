@@ -19,13 +19,13 @@ from nutdamp import flight
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, Problem
 from nutdamp.schemes.optimal.refine import refine
 from nutdamp.schemes.optimal.repair import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
+from nutdamp.schemes.options import OptimalOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.spacecraft import Spacecraft
 
 CHOICES = 3
@@ -77,7 +77,7 @@ MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """By how much more than the program's least time a schedule may need, tried in turn."""
 
 
-def schedule(spacecraft: Spacecraft, options: Options) -> Schedule:
+def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     """The cheapest schedule found, with its bounds.
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
@@ -102,11 +102,13 @@ def _fewest(search: _Search) -> Schedule:
     """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
     from nutdamp.schemes import one_pulse, two_pulse
 
-    body, options = search.spacecraft, search.options
-    scheme = one_pulse if options.free_axis else two_pulse
+    body = search.spacecraft
     if body.torquer is None and body.goal.spin is None:
         try:
-            made = scheme.schedule(body, options)
+            if search.options.free_axis:
+                made = one_pulse.schedule(body, SchemeOptions())
+            else:
+                made = two_pulse.schedule(body, TwoPulseOptions())
         except Infeasible:
             made = Schedule()
         if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
@@ -158,7 +160,7 @@ class _Search(Problem):
         self.check_number(first)
         best = self.cheapest(first)
         if self.looser and not self.proved(best, EQUAL):
-            kept = _Search(self.spacecraft, self.options._replace(free_axis=False, shift=None))
+            kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             best = self.cheaper(best, kept.cheapest(kept.program().solve()))
         if best is None:
             raise Infeasible(self.cure() if UNMET < first.unmet < math.inf else self.not_found())
@@ -270,7 +272,7 @@ class _Search(Problem):
         names = {channel.name: channel for channel in self.channels}
         found: list[_Found] = []
         flights: list[flight.Flight] = []
-        for made in candidates.by_other_schemes(self.spacecraft, self.options, shift=self.equations.shift):
+        for made in candidates.by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(flight.flown(self.spacecraft, Schedule(made.pulses)))
             if self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR):
                 break

@@ -10,6 +10,7 @@ from dataclasses import replace
 from nutdamp import flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
+from nutdamp.schemes.options import ANY_ON_TIME
 from nutdamp.schemes.tools import least_squares
 from nutdamp.spacecraft import Attitude, Spacecraft
 
@@ -71,7 +72,7 @@ class FlownBuilder:
             self.pulses.append(timed)
             self.now = timed.end
 
-    def trim(self, last: int, on_times: tuple[float, float] = least_squares.ANY) -> None:
+    def trim(self, last: int, on_times: tuple[float, float] = ANY_ON_TIME) -> None:
         """Trim the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
 
         Their on-times stay within the bounds ``on_times`` s.

@@ -15,6 +15,7 @@ from nutdamp import flight
 from nutdamp.limits import channel_of, commandable, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.options import ANY_ON_TIME
 from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -28,9 +29,6 @@ STEPS = 30
 
 INTEGRATED = 50_000
 """Steps of integration after which a trim is left as it is: some seconds."""
-
-ANY = (0.0, math.inf)
-"""Bounds on on-times that bound nothing."""
 
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
@@ -74,7 +72,7 @@ def refine(
     chosen: Sequence[int],
     momentum: bool,
     spin: bool = False,
-    on_times: tuple[float, float] = ANY,
+    on_times: tuple[float, float] = ANY_ON_TIME,
 ) -> Schedule:
     """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
 

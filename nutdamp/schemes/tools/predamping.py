@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options, one_pulse
+from nutdamp.schemes import one_pulse
+from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.spacecraft import Spacecraft
 
@@ -37,7 +38,7 @@ def damping(here: Spacecraft) -> Schedule:
         if number > 0 and earliest > IN_REACH * here.horizon:
             break
         try:
-            made = one_pulse.schedule(replace(here, limits=replace(here.limits, earliest=earliest)), Options())
+            made = one_pulse.schedule(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
         except Infeasible as why:
             reason = why
             continue

@@ -17,7 +17,7 @@ from nutdamp.flight import Arc
 from nutdamp.limits import Windows, usable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, channel_pulse, steerable_pulse
-from nutdamp.schemes import Options
+from nutdamp.schemes.options import UNEQUAL, RhumbLineOptions
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 TURN_SHARE = 0.125
@@ -36,9 +36,6 @@ OPEN = 1.2
 """Sum of the phasors, in pulses, beyond which trimming has no hope."""
 
 MOST_PULSES = 600
-
-UNEQUAL = 0.1
-"""By how much, as a share, the last pulses may be longer or shorter than the others."""
 
 LAST = 10
 """How many of the last pulses may be trimmed, at most."""
@@ -69,7 +66,7 @@ class Attempt(NamedTuple):
 class Train:
     """What a train from the motion of ``here`` can do."""
 
-    def __init__(self, here: Spacecraft, options: Options) -> None:
+    def __init__(self, here: Spacecraft, options: RhumbLineOptions) -> None:
         self.here, self.options = here, options
         self.windows = Windows(here)
         self.turn = 2.0 * math.pi / abs(here.spin)

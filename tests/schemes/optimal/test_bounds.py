@@ -16,10 +16,10 @@ from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.limits import free_windows
 from nutdamp.planning import Plan, plan
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
-from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Left
 from nutdamp.schemes.optimal.search import _Search
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Channel, Disturbance, Goal, Limits, Spacecraft, Vector
 
 TIGHT = 1e-9
@@ -259,7 +259,7 @@ def test_no_rigorous_bound_is_told_where_none_is_known_to_hold(what: str) -> Non
 def test_optimal_with_a_free_axis_is_not_below_its_bound() -> None:
     for seed in range(4):
         body = layout(np.random.default_rng(1000 + seed), axial=0.1 * (seed % 2))
-        made = plan(body, "optimal", Options(free_axis=True))
+        made = plan(body, "optimal", OptimalOptions(free_axis=True))
         if made.pulses.bounds is not None and made.pulses.bounds.rigorous is not None:
             assert made.pulses.total_impulse >= made.pulses.bounds.rigorous * (1.0 - TIGHT)
 
@@ -311,7 +311,7 @@ def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(first: i
         body = layout(np.random.default_rng(seed), count=6)
         factor = 10.0 ** np.random.default_rng(seed).uniform(-2.5, -1.0) if lasting else 1e6
         body = replace(body, channels=tuple(channel(one.name, *(factor * one.torque)) for one in body.channels))
-        search = _Search(body, Options(least="impulse"))
+        search = _Search(body, OptimalOptions(least="impulse"))
         program = search.program()
         solution = program.solve()
         if solution.unmet > 1e-9:
@@ -330,7 +330,7 @@ def test_any_prices_give_a_bound(seed: int) -> None:
     """Not only those of the solver, which may have stopped anywhere: the dual is checked at every time."""
     rng = np.random.default_rng(seed)
     body = layout(rng, count=6)
-    program = _Search(body, Options(least="impulse")).program()
+    program = _Search(body, OptimalOptions(least="impulse")).program()
     solution = program.solve()
     if solution.unmet > 1e-9:
         pytest.skip("no solution for this layout")
@@ -356,7 +356,7 @@ def test_dissipation_is_in_the_first_order_bound() -> None:
 def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
     """Slots leave prices a little too high in each of some hundred alignments: that once added up to 8 %."""
     body = aimed(load_spacecraft(case("optimal-far-target.yaml")), 120.0, 87.29)
-    program = _Search(body, Options()).program()
+    program = _Search(body, OptimalOptions()).program()
     solution = program.solve()
     found = bounds.first_order(program, solution.prices)
     assert solution.cost * (1.0 - 2e-3) <= found <= solution.cost * (1.0 + TIGHT)

@@ -12,7 +12,8 @@ from builders import Outcome, cross, spinner
 from cases_dir import case
 
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import broken_limits, compare, plan
+from nutdamp.limits import broken_limits
+from nutdamp.planning import compare, plan
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import repair

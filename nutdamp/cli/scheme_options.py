@@ -1,0 +1,240 @@
+"""Options that plan: the goal, which every command that plans takes, and those of each scheme, of `plan` alone.
+
+The latter are made from the fields of the scheme's options; the help page shows them under a heading per scheme.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+
+import click
+
+from nutdamp.cli.failures import debug_option
+from nutdamp.cli.parameters import Angles, Direction, FinalSpin, Quantity
+from nutdamp.errors import SenselessOption
+from nutdamp.schemes.options import Kind, Options, SchemeOptions, names_of
+from nutdamp.schemes.registry import SCHEMES, SUNLIT
+
+if TYPE_CHECKING:
+    from nutdamp.spacecraft import Spacecraft, Vector
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+GOAL = "Goal and motion"
+"""Heading of the options that say what is to be reached."""
+
+COUNT_FROM_ONE = click.IntRange(1)
+
+WIDEST = 26
+"""Characters of an option that its help stands beside; below a longer one."""
+
+SHARED = names_of(SchemeOptions)
+"""Options of every scheme."""
+
+
+class Grouped(click.Option):
+    """An option under a heading of its own on the help page."""
+
+    def __init__(self, *args: Any, group: str, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.group = group
+
+
+class PlanningCommand(click.Command):
+    """A command whose help page has headings, and which says where the options of the schemes are."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options under their headings, those without one first."""
+        groups: dict[str, list[tuple[str, str]]] = {"Options": [], GOAL: []}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None and isinstance(parameter, click.Option):
+                groups.setdefault(getattr(parameter, "group", "Options"), []).append(record)
+        for heading, records in groups.items():
+            if records:
+                with formatter.section(heading):
+                    formatter.write_dl(records, col_max=WIDEST)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does; an option of a scheme that this command does not take says where to give it."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as wrong:
+            name = wrong.option_name.removeprefix("--").replace("-", "_")
+            readers = [scheme for scheme, entry in SCHEMES.items() if name in names_of(entry.options)]
+            if not readers:
+                raise
+            message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
+            if any(parameter.name == "schedule" for parameter in self.params):
+                message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
+            raise click.UsageError(message, ctx) from None
+
+
+def goal_options(command: Command) -> Command:
+    """What is to be reached: gathered into ``aim`` for `load`, and ``options`` of every scheme."""
+
+    @functools.wraps(command)
+    def gathered(*args: Any, with_disturbances: bool, **parameters: Any) -> Any:
+        own = parameters.pop("options", Options())
+        options = Options(**own.chosen, with_disturbances=with_disturbances)
+        aim = Aim(*(parameters.pop(name) for name in Aim._fields))
+        return command(*args, options=options, aim=aim, **parameters)
+
+    wrapped: Any = gathered
+    for option in (
+        debug_option,
+        click.option(
+            "--with-disturbances",
+            cls=Grouped,
+            group=GOAL,
+            is_flag=True,
+            help="Plan on the motion with the disturbances of the file.",
+        ),
+        click.option(
+            "--sun",
+            cls=Grouped,
+            group=GOAL,
+            type=Direction(),
+            metavar="ANGLE,ANGLE",
+            help="The Sun, given as --target is; rhumb-line keeps the phase of its pulses to it.",
+        ),
+        click.option(
+            "--spin",
+            cls=Grouped,
+            group=GOAL,
+            type=FinalSpin("rate"),
+            metavar="RATE|keep",
+            help="Spin rate at the end, such as 30rpm; set by optimal with channels that have a torque about axis 3.",
+        ),
+        click.option(
+            "--target",
+            cls=Grouped,
+            group=GOAL,
+            type=Direction(),
+            metavar="ANGLE,ANGLE",
+            help="Where the spin axis is to end: right ascension and declination where the file has an attitude, else "
+            "tilt from H and azimuth about it, such as 10deg,45deg.",
+        ),
+    ):
+        wrapped = option(wrapped)
+    return cast(Command, wrapped)
+
+
+def scheme_options(command: Command) -> Command:
+    """The options of all schemes, gathered into ``options``."""
+    names = [name for name, _, _ in _fields()]
+
+    @functools.wraps(command)
+    def gathered(*args: Any, **parameters: Any) -> Any:
+        given = {name: parameters.pop(name) for name in names}
+        try:
+            options = Options(**given)
+        except SenselessOption as wrong:
+            hint = f"--{wrong.name.replace('_', '-')}"
+            raise click.BadParameter(wrong.problem, param_hint=hint) from None
+        return command(*args, options=options, **parameters)
+
+    wrapped: Any = gathered
+    for name, field, schemes in reversed(list(_fields())):
+        kind: Kind = field.metadata["kind"]
+        settings: dict[str, Any] = {"is_flag": True} if kind.flag else {"type": _type(kind), "default": field.default}
+        if field.default is not None and not kind.flag:
+            settings["show_default"] = True
+        if settings.get("type") is COUNT_FROM_ONE:
+            settings["metavar"] = "N"
+        wrapped = click.option(
+            f"--{name.replace('_', '-')}",
+            cls=Grouped,
+            group=f"Scheme {' and '.join(schemes)}",
+            help=field.metadata["help"],
+            **settings,
+        )(wrapped)
+    return cast(Command, wrapped)
+
+
+def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
+    """Each option that not all schemes have: its name, its field, and the schemes that have it."""
+    found: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
+    for scheme in SCHEMES.values():
+        for field in dataclasses.fields(scheme.options):
+            if field.name not in SHARED:
+                found.setdefault(field.name, (field, []))[1].append(scheme.name)
+    for name, (field, schemes) in found.items():
+        yield name, field, schemes
+
+
+def _type(kind: Kind) -> click.ParamType[Any]:
+    if kind.names:
+        return click.Choice(kind.names)
+    return COUNT_FROM_ONE if kind.unit is None else Quantity(kind.unit)
+
+
+class Aim(NamedTuple):
+    """A goal as the command line gives it, in place of the one in the file.
+
+    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
+    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    """
+
+    target: Angles | None = None
+    spin: float | str | None = None
+    sun: Angles | None = None
+
+    def applied(self, spacecraft: Spacecraft, remark: Callable[[str], None]) -> Spacecraft:
+        """The spacecraft with this goal; a usage error where it cannot be one, a remark where it is hardly meant."""
+        goal = spacecraft.goal
+        if self.target is not None:
+            goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
+        if self.sun is not None:
+            goal = dataclasses.replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
+        if self.spin is not None:
+            spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
+            if spin * spacecraft.spin <= 0.0:
+                raise click.BadParameter(
+                    f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)", param_hint="--spin"
+                )
+            goal = dataclasses.replace(goal, spin=spin)
+        for option, angles in (("--target", self.target), ("--sun", self.sun)):
+            for reading in () if angles is None else angles.readings:
+                remark(f"{option}: warning: {reading}")
+        return dataclasses.replace(spacecraft, goal=goal)
+
+
+def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
+    """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
+    from nutdamp.physics.attitude import on_sphere
+
+    if spacecraft.attitude is not None:
+        if abs(angles.second) > 0.5 * math.pi:
+            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
+        return on_sphere(angles.first, angles.second)
+    if not 0.0 <= angles.first < math.pi:
+        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
+    return spacecraft.direction_in_n(angles.first, angles.second)
+
+
+def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
+    return click.BadParameter("; ".join((f"expected {expected}", *angles.readings)), param_hint=option)
+
+
+def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
+    """Say which options none of the schemes ``names`` reads; a usage error where that is the goal itself."""
+    planned = [SCHEMES[name] for name in names]
+    for option in options.without_effect([scheme.options for scheme in planned]):
+        readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
+        reason = f"it is for {' and '.join(readers)}" if planned else "the pulses are those of the schedule"
+        remark(f"--{option.replace('_', '-')} does nothing here: {reason}")
+    if body.goal.sun is not None:
+        without = [scheme.name for scheme in planned if not scheme.reads_sun]
+        if len(without) == len(planned):
+            raise click.UsageError(f"--sun is for {' and '.join(SUNLIT)}, which is not planned here")
+        if without:
+            remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
+    if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
+        turns, needs = ("turns", "needs") if len(names) == 1 else ("turn", "need")
+        problem = f"{turns} the spin axis to a target and {needs} one: --target, or goal in the file"
+        raise click.UsageError(f"{' and '.join(names)} {problem}")

@@ -1,0 +1,220 @@
+"""What may be chosen of each scheme: one frozen class a scheme, checked when it is made.
+
+The command line makes its options, their help and their headings from the fields.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any, TypeVar
+
+from nutdamp.errors import BadRequest, SenselessOption
+from nutdamp.units import LARGEST
+
+ANY_ON_TIME = (0.0, math.inf)
+"""Bounds on on-times, s, that bound nothing."""
+
+UNEQUAL = 0.1
+"""Share of a pulse length asked for by which the last pulses may differ from it."""
+
+LEAST = ("propellant", "impulse", "time", "pulses")
+"""What the scheme optimal can save."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What values an option takes: ``expected`` in words, and ``unit`` (a dimension of `units`) of a quantity."""
+
+    expected: str
+    unit: str | None = None
+    names: tuple[str, ...] = ()
+    least: float = 0.0
+    none: bool = True
+
+    def takes(self, value: Any) -> bool:
+        """Whether a value makes sense."""
+        if value is None:
+            return self.none
+        if self.names:
+            return isinstance(value, str) and value in self.names
+        if self.unit is not None:
+            return is_number(value) and (value > 0.0 if self.unit == "time" else value >= self.least)
+        return is_count(value) if self.least else isinstance(value, bool)
+
+    @property
+    def flag(self) -> bool:
+        """Whether it is on or off."""
+        return not (self.names or self.unit or self.least)
+
+
+FLAG = Kind("True or False", none=False)
+COUNT = Kind("a whole number of at least 1", least=1)
+TIME = Kind("a time above zero, in s", "time")
+ANGLE = Kind("an angle of at least 0, in rad", "angle")
+
+
+def _option(default: Any, kind: Kind, text: str) -> Any:
+    return dataclasses.field(default=default, metadata={"kind": kind, "help": text})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SchemeOptions:
+    """What may be chosen of every scheme. Raises SenselessOption for a value that makes no sense."""
+
+    with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value, kind = getattr(self, field.name), field.metadata["kind"]
+            if not kind.takes(value):
+                raise SenselessOption(field.name, shown(value), f"expected {kind.expected}")
+
+    @property
+    def uncorrected(self) -> bool:
+        """Whether the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
+        return False
+
+    @property
+    def frees_axis(self) -> bool:
+        """Whether H may end anywhere."""
+        return False
+
+    @property
+    def on_times(self) -> tuple[float, float]:
+        """Bounds, s, that on-times keep whoever corrects the pulses."""
+        return ANY_ON_TIME
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoPulseOptions(SchemeOptions):
+    """What may be chosen of two-pulse."""
+
+    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """As printed."""
+        return self.literal
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourPulseOptions(SchemeOptions):
+    """What may be chosen of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
+
+    on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
+    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """Only full pulses."""
+        return self.coarse
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfConeOptions(SchemeOptions):
+    """What may be chosen of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
+
+    cones: int | None = _option(
+        None, COUNT, "How many half cones; default: the fewest of which one more would save less than 1 %."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RhumbLineOptions(SchemeOptions):
+    """What may be chosen of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
+
+    on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
+    per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
+
+    @property
+    def on_times(self) -> tuple[float, float]:
+        """About the length asked for."""
+        asked = self.on_time
+        return ANY_ON_TIME if asked is None else ((1.0 - UNEQUAL) * asked, (1.0 + UNEQUAL) * asked)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimalOptions(SchemeOptions):
+    """What may be chosen of optimal; ``shift`` rad, how far from its target H may end."""
+
+    least: str = _option(
+        LEAST[0],
+        Kind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
+        "What to save; impulse where propellant is unknown.",
+    )
+    free_axis: bool = _option(False, FLAG, "Let the angular momentum end anywhere.")
+    shift: float | None = _option(None, ANGLE, "How far from its target the angular momentum may end, such as 0.2deg.")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shift is not None and self.free_axis:
+            problem = "expected none beside a free axis, where H may end anywhere"
+            raise SenselessOption("shift", shown(self.shift), problem)
+
+    @property
+    def frees_axis(self) -> bool:
+        """Whether H may end anywhere."""
+        return self.free_axis
+
+
+KINDS = (SchemeOptions, FourPulseOptions, TwoPulseOptions, HalfConeOptions, RhumbLineOptions, OptimalOptions)
+
+Chosen = TypeVar("Chosen", bound=SchemeOptions)
+
+
+class Options:
+    """Options of several schemes at once, by keyword: each scheme takes those that it has.
+
+    Raises BadRequest for one that no scheme has, or a value that makes no sense.
+    """
+
+    def __init__(self, **chosen: Any) -> None:
+        self.chosen: Mapping[str, Any] = chosen
+        unknown = next((name for name in chosen if not any(name in names_of(kind) for kind in KINDS)), None)
+        if unknown is not None:
+            known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
+            raise BadRequest(f"options: no scheme has {unknown!r}; there are {', '.join(known)}")
+        for kind in KINDS:
+            self.of(kind)
+
+    def of(self, kind: type[Chosen]) -> Chosen:
+        """Those of one scheme."""
+        names = names_of(kind)
+        return kind(**{name: value for name, value in self.chosen.items() if name in names})
+
+    def without_effect(self, kinds: list[type[SchemeOptions]]) -> Iterator[str]:
+        """Names of options that were changed, and that none of the ``kinds`` has."""
+        read = {name for kind in kinds for name in names_of(kind)}
+        defaults = {field.name: field.default for kind in KINDS for field in dataclasses.fields(kind)}
+        for name, default in defaults.items():
+            if self.chosen.get(name, default) != default and name not in read:
+                yield name
+
+    def __repr__(self) -> str:
+        return f"Options({', '.join(f'{name}={value!r}' for name, value in self.chosen.items())})"
+
+
+def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
+    """Names of the options of a scheme."""
+    return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def is_number(value: Any) -> bool:
+    """Whether Python or numpy would call it a real number, of sensible size."""
+    return issubclass(type(value), Real) and type(value) is not bool and abs(value) <= LARGEST
+
+
+def is_count(value: Any) -> bool:
+    """Whether it is a whole number of at least 1."""
+    return issubclass(type(value), Integral) and type(value) is not bool and value >= 1
+
+
+def shown(value: object) -> str:
+    """A value as a message names it: what is short as it is, anything else by its type."""
+    text = repr(value) if isinstance(value, str | Real | None) else ""
+    kind = type(value)
+    return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")

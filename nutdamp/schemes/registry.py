@@ -1,0 +1,59 @@
+"""The schemes there are, and what each can do. Loads none of them: the command line needs the names alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nutdamp.schemes.options import (
+    FourPulseOptions,
+    HalfConeOptions,
+    OptimalOptions,
+    RhumbLineOptions,
+    SchemeOptions,
+    TwoPulseOptions,
+)
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A scheme: its ``name``, the ``module`` with its function ``schedule``, and the class of its ``options``.
+
+    ``classic``: of Magnus 1970, planned when none is named. ``points``: can turn the spin axis to a target, and is
+    planned when there is one and none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps
+    its pulses at a fixed phase to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
+    function ``alternatives`` too, of schedules about as good.
+    """
+
+    name: str
+    module: str
+    options: type[SchemeOptions] = SchemeOptions
+    fires: bool = True
+    classic: bool = False
+    points: bool = False
+    only_points: bool = False
+    reads_sun: bool = False
+    sets_spin: bool = False
+    weighs_alternatives: bool = False
+
+
+ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
+TWO_PULSE = Scheme(
+    "two-pulse", "nutdamp.schemes.two_pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
+)
+FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True)
+OPTIMAL = Scheme("optimal", "nutdamp.schemes.optimal.search", OptimalOptions, points=True, sets_spin=True)
+HALF_CONE = Scheme("half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True)
+RHUMB_LINE = Scheme(
+    "rhumb-line", "nutdamp.schemes.rhumb_line", RhumbLineOptions, points=True, only_points=True, reads_sun=True
+)
+NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
+"""Free motion, for comparison."""
+
+SCHEMES = {scheme.name: scheme for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, NONE)}
+NAMES = tuple(SCHEMES)
+PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
+CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
+POINTING = (TWO_PULSE.name, HALF_CONE.name, RHUMB_LINE.name, OPTIMAL.name)
+"""In the order in which they are shown, cheapest to plan first."""
+SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
+SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
