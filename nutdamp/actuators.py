@@ -95,8 +95,12 @@ class Channel:
     @property
     def price(self) -> float:
         """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
+        return self.cost_rate(by_propellant=True) / abs(self.transverse)
+
+    def cost_rate(self, *, by_propellant: bool) -> float:
+        """Propellant, kg/s, of firing; impulse, N m, where that is not known or not what counts."""
         flow = self.mass_flow
-        return (self.strength if flow is None else flow) / abs(self.transverse)
+        return flow if by_propellant and flow is not None else self.strength
 
     @property
     def force(self) -> Vector | None:

@@ -160,6 +160,10 @@ class Schedule:
         propellant = self.propellant
         return self.total_impulse if propellant is None else propellant
 
+    def cost_in(self, unit: str) -> float:
+        """Propellant where the ``unit`` is kg and it is known, else impulse in N m s."""
+        return self.cost if unit == "kg" else self.total_impulse
+
     @property
     def end(self) -> float:
         """End of the last pulse, s; 0 without pulses."""

@@ -31,9 +31,7 @@ class Point(NamedTuple):
     @property
     def cost(self) -> float:
         """What the schedule costs, in the unit of its bounds."""
-        schedule = self.plan.pulses
-        propellant = schedule.propellant
-        return propellant if self.bounds.unit == "kg" and propellant is not None else schedule.total_impulse
+        return self.plan.pulses.cost_in(self.bounds.unit)
 
     @property
     def bounds(self) -> Bounds:

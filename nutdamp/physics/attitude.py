@@ -16,6 +16,9 @@ from nutdamp import rounding
 Array = NDArray[np.float64]
 
 
+_BACK = np.array([1.0, -1.0, -1.0, -1.0])
+
+
 def multiply(left: Array, right: Array) -> Array:
     """Product of two quaternions, (..., 4) each: the turn ``right``, then the turn ``left``."""
     w1, x1, y1, z1 = np.moveaxis(np.asarray(left), -1, 0)
@@ -40,6 +43,11 @@ def rotate(quaternion: Array, vector: Array) -> Array:
     return np.stack(
         [v1 + w * t1 + y * t3 - z * t2, v2 + w * t2 + z * t1 - x * t3, v3 + w * t3 + x * t2 - y * t1], axis=-1
     )
+
+
+def conjugate(quaternion: Array) -> Array:
+    """The rotation back, (…, 4)."""
+    return np.asarray(quaternion * _BACK)
 
 
 def matrix(quaternion: Array) -> Array:

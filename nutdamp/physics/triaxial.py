@@ -71,7 +71,7 @@ def free_attitude(moments: ArrayLike, rates0: ArrayLike, quaternion0: ArrayLike,
     # Of χ the part that swings about 2T t/|H| is split off: its factor H² - 2T I_c vanishes with the nutation.
     swing = math.copysign(polhode.about_c / size, polhode.moments[polhode.axes[0]] - polhode.moments[c])
     chi = twice_energy / size * scaled + swing * _swing(polhode, size, scaled)
-    back = _shortest(momentum, e) * np.array([1.0, -1.0, -1.0, -1.0])
+    back = attitude.conjugate(_shortest(momentum, e))
     there = _shortest(polhode.moments * _rates(polhode, scaled), e)
     result = attitude.multiply(attitude.multiply(attitude.multiply(start, back), _turn(e, chi)), there)
     return np.asarray(result / np.linalg.norm(result, axis=-1, keepdims=True), dtype=np.float64)

@@ -167,7 +167,7 @@ def body_mark(found: Cones, quaternion: Vector) -> Vector:
     """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
     if not len(found.body):
         return np.full(3, np.nan)
-    in_body = attitude.rotate(quaternion * np.array([1.0, -1.0, -1.0, -1.0]), found.body)
+    in_body = attitude.rotate(attitude.conjugate(quaternion), found.body)
     azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
     order = np.argsort(azimuth)
     return np.array([np.interp(0.0, azimuth[order], found.body[order, part]) for part in range(3)])

@@ -219,7 +219,7 @@ class _Reader:
                 block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
             elif parts is not None and forward is not None:
                 turn = euler(sequence, *map(math.radians, parts))
-        return turn if turn is None or forward else turn * np.array([1.0, -1.0, -1.0, -1.0])
+        return turn if turn is None or forward else attitude.conjugate(turn)
 
     def _rates(self, quaternion: Vector | None) -> Vector | None:
         """Rates of the body against the frame, in body axes, rad/s."""

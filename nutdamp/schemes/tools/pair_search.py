@@ -151,12 +151,6 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     return Schedule(made.pulses, (f"{note}; {made.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
 
 
-def _price(channel: Channel, known: bool) -> float:
-    """Propellant of ``channel`` per second, or where it is not ``known`` of all of them impulse."""
-    flow = channel.mass_flow
-    return flow if known and flow is not None else channel.strength
-
-
 Indices = NDArray[np.intp]
 
 
@@ -262,7 +256,8 @@ class _Search:
         ready = first + 0.5 * long + self.spacecraft.limits.gap
         allowed = self.windows.allowed(first - 0.5 * long, long, self.spacecraft.limits.earliest)
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
-        prices = [_price(channel, all(one.mass_flow is not None for one in self.channels)) for channel in (one, two)]
+        known = all(channel.mass_flow is not None for channel in self.channels)
+        prices = [channel.cost_rate(by_propellant=known) for channel in (one, two)]
         made = []
         for row in np.flatnonzero(allowed):
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
