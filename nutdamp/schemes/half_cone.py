@@ -19,6 +19,7 @@ from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable, usable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schemes import one_pulse
 from nutdamp.schemes.options import HalfConeOptions
 from nutdamp.schemes.tools import pair_search, predamping
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
@@ -65,7 +66,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         raise Infeasible(no_channels(spacecraft))
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
-        builder.fire(predamping.damping(builder.here))
+        builder.fire(predamping.damping(builder.here, one_pulse.schedule))
     if options.cones is not None:
         return _row(builder, options.cones)
     here = builder.here

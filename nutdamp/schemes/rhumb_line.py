@@ -19,6 +19,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.physics import pointing
 from nutdamp.schedule import Schedule
+from nutdamp.schemes import one_pulse
 from nutdamp.schemes.options import UNEQUAL, RhumbLineOptions
 from nutdamp.schemes.tools import least_squares, predamping
 from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
@@ -67,7 +68,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    builder.fire(predamping.damping(builder.here))
+    builder.fire(predamping.damping(builder.here, one_pulse.schedule))
     if builder.left <= ROUNDING:
         return builder.schedule("what damps the nutation brings H to the target already: no train is needed")
     return _best(builder, Train(builder.here, options))
@@ -78,7 +79,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
-            builder.fire(predamping.damping(builder.here))
+            builder.fire(predamping.damping(builder.here, one_pulse.schedule))
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from nutdamp.errors import Infeasible
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import one_pulse
 from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.spacecraft import Spacecraft
@@ -17,14 +17,17 @@ MOMENTS = 16
 INTEGRATED = 20_000
 """Steps of integration after which no more of them are tried."""
 
+Scheme = Callable[[Spacecraft, SchemeOptions], Schedule]
+
 IN_REACH = 0.5
 """Share of the horizon within which the damping begins: the rest is for the turn."""
 
 
-def damping(here: Spacecraft) -> Schedule:
-    """The one-pulse damping from which the rest of the way costs least; H then goes to the momentary spin axis.
+def damping(here: Spacecraft, scheme: Scheme) -> Schedule:
+    """The damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
 
-    Its pulses cost A|ω0| whenever they come, but the turn that is left, C|ω3| times its angle, differs by the cone.
+    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
+    C|ω3| times its angle, differs by the cone.
     Raises Infeasible where no channel can damp.
     """
     h = here.inertia.C * abs(here.spin)
@@ -38,7 +41,7 @@ def damping(here: Spacecraft) -> Schedule:
         if number > 0 and earliest > IN_REACH * here.horizon:
             break
         try:
-            made = one_pulse.schedule(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+            made = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
         except Infeasible as why:
             reason = why
             continue
