@@ -224,10 +224,9 @@ def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParame
 def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
     """Say which options none of the schemes ``names`` reads; a usage error where that is the goal itself."""
     planned = [SCHEMES[name] for name in names]
-    for option in options.without_effect([scheme.options for scheme in planned]):
+    for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
-        reason = f"it is for {' and '.join(readers)}" if planned else "the pulses are those of the schedule"
-        remark(f"--{option.replace('_', '-')} does nothing here: {reason}")
+        remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
     if body.goal.sun is not None:
         without = [scheme.name for scheme in planned if not scheme.reads_sun]
         if len(without) == len(planned):

@@ -92,7 +92,7 @@ def command(
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
-    chosen = OptimalOptions(least=least, with_disturbances=options.of(OptimalOptions).with_disturbances)
+    chosen = OptimalOptions(least=least, with_disturbances=options.with_disturbances)
     expect_read(("optimal",), options, body, remark)
 
     from nutdamp.cli.progress import progress

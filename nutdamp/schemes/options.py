@@ -186,6 +186,11 @@ class Options:
         names = names_of(kind)
         return kind(**{name: value for name, value in self.chosen.items() if name in names})
 
+    @property
+    def with_disturbances(self) -> bool:
+        """Whether all of them plan with the disturbances of the file."""
+        return self.of(SchemeOptions).with_disturbances
+
     def without_effect(self, kinds: list[type[SchemeOptions]]) -> Iterator[str]:
         """Names of options that were changed, and that none of the ``kinds`` has."""
         read = {name for kind in kinds for name in names_of(kind)}

@@ -35,13 +35,6 @@ def test_an_option_that_one_scheme_reads_is_no_matter(run: Run, command: str) ->
     assert "does nothing" not in run(*command.split()).stderr
 
 
-def test_an_option_beside_a_schedule_is_told(run: Run, tmp_path: Path) -> None:
-    run("plan", "--csv", "pulses.csv")
-    done = run("simulate", "--schedule", "pulses.csv", "--with-disturbances")
-    assert done.returncode == 0
-    assert "--with-disturbances does nothing here: the pulses are those of the schedule" in done.stderr
-
-
 @pytest.mark.parametrize(
     ("command", "option", "schedule"),
     [

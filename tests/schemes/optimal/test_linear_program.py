@@ -20,6 +20,7 @@ from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import lp_solver
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.schemes.optimal.problem import Problem
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Goal, Limits, Spacecraft
 
 MICRODEGREE = math.radians(1e-6)
@@ -164,7 +165,7 @@ def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch
     found = re.search(r"set limits.horizon to (\S+) s or later", why)
     assert found, why
     assert len(solved) < 200  # 385 before, for less
-    options, needed = Options(), float(found.group(1))
+    options, needed = OptimalOptions(), float(found.group(1))
     for share, feasible in ((1.001, True), (0.99, False)):
         program = Problem(replace(body, limits=replace(body.limits, horizon=share * needed)), options).program()
         assert (unmet_by_all_slots(program) < 1e-7) == feasible

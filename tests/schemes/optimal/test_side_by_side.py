@@ -15,10 +15,10 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.limits import broken_limits
 from nutdamp.planning import compare, plan
 from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import repair
 from nutdamp.schemes.optimal.linear_program import Burn, Program
 from nutdamp.schemes.optimal.problem import Problem
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits
 
 NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
@@ -64,7 +64,7 @@ def test_it_is_recommended_over_what_leaves_half() -> None:
 @pytest.mark.parametrize(("longest", "gap", "shortest"), [(0.3, 0.0, 0.0), (0.21, 0.1, 0.0), (0.5, 0.02, 0.13)])
 def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: float, gap: float, shortest: float) -> None:
     body = spinner(channels=cross(8.0, min_on_time=shortest, max_on_time=longest), limits=Limits(horizon=30.0, gap=gap))
-    program = Problem(body, Options()).program()
+    program = Problem(body, OptimalOptions()).program()
     channel = body.channels[1]
     long = tuple(Burn(channel, t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
     assert repair._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
