@@ -196,8 +196,11 @@ class Candidate(NamedTuple):
 
 
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
-    """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer."""
-    if spacecraft.torquer is None and (spacecraft.limits.max_pulses or 2) >= 2:
+    """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
+
+    None either where there is no nutation: these damp, and nothing else.
+    """
+    if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
         for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
             yield made
 

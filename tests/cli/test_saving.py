@@ -32,7 +32,7 @@ def limited(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("command", "result"),
     [
-        ("simulate --scheme two-pulse --csv big.csv --json small.json", "after the last pulse"),
+        ("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
         ("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
         ("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "Tolerance budget"),
         ("disperse --scheme two-pulse --samples 20000 --resume big.npz --json small.json", "Tolerance budget"),

@@ -147,7 +147,7 @@ def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_no_bound_is_claimed_under_dissipation(run: Run) -> None:
     shown = run("plan", str(case("oblate-dissipation.yaml")), "--scheme", "optimal").stdout
-    assert "no bound with dissipation" in shown
+    assert "no least impulse with dissipation" in shown
     assert "no schedule" not in shown
     data = json.loads(run("plan", str(case("oblate-dissipation.yaml")), "--scheme", "optimal", "--json", "-").stdout)
     # An oblate body damps itself: there are schedules below A|ω0|, and they are found.

@@ -292,3 +292,7 @@ def test_the_schedules_weighed_keep_the_limits_and_hold_the_one_taken() -> None:
 def test_a_steerable_torquer_leaves_nothing_to_weigh() -> None:
     assert planning.alternatives(spinner(), "two-pulse") == ()
     assert planning.alternatives(spinner(channels=cross(8.0)), "one-pulse") == ()
+
+
+def test_without_nutation_there_is_nothing_to_weigh() -> None:
+    assert planning.alternatives(spinner(degrees=0.0, channels=cross(8.0)), "two-pulse") == ()
