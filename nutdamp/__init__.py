@@ -54,7 +54,7 @@ __all__ = [
     "read",
 ]
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 if not TYPE_CHECKING:  # or else a type checker would believe in any name

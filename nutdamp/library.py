@@ -30,6 +30,7 @@ from nutdamp.errors import BadRequest, Fault, Infeasible, printable
 from nutdamp.flight import Residual
 from nutdamp.limits import broken_limits
 from nutdamp.outcome import seen_at
+from nutdamp.remarks import remarks
 from nutdamp.report.text import degrees
 from nutdamp.schemes import Choice, Options
 from nutdamp.schemes.options import FourPulseOptions, HalfConeOptions, OptimalOptions, RhumbLineOptions, TwoPulseOptions
@@ -260,7 +261,7 @@ class Plan:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader should know of it."""
-        return self.core.remarks
+        return remarks(self.core)
 
     def __len__(self) -> int:
         return len(self.core.pulses)

@@ -11,7 +11,7 @@ from nutdamp import compliance, flight, schemes
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
-from nutdamp.hindrance import Hindrance, Obstacle
+from nutdamp.hindrance import Hindrance
 from nutdamp.limits import broken_limits
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
@@ -20,9 +20,6 @@ from nutdamp.spacecraft import Spacecraft, Vector
 
 NO_NUTATION = 1e-12
 """Nutation angle in rad below which there is nothing to plan."""
-
-TELLING = math.radians(1e-6)
-"""Nutation angle in rad from which what is left is worth a remark."""
 
 BUG = "internal error, please report"
 """Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
@@ -122,84 +119,19 @@ class Plan:
         return flight.momentum_gained(self.flight) / mass
 
     @cached_property
-    def remarks(self) -> tuple[str, ...]:
-        """What a reader should know: remarks of the scheme, why nutation is left, what I1 ≠ I2 does."""
-        if self.flown is None or not len(self.pulses):
-            return self.pulses.notes
-        return (*self.pulses.notes, *self._proof(), *self._remainder(), *self._asymmetry())
-
-    def _proof(self) -> tuple[str, ...]:
-        """How much cheaper another schedule could be."""
-        bounds = self.pulses.bounds
-        if bounds is None:
-            return ()
-        spent = self.pulses.propellant if bounds.unit == "kg" else self.pulses.total_impulse
-        scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
-        if spent is None:
-            return ()
-        told = [f"{scale * spent:.4g} {unit}"]
-        if bounds.first_order is not None:
-            gap = 100.0 * (spent / bounds.first_order - 1.0) if bounds.first_order > 0.0 else math.inf
-            rest = self.flight.residual.nutation > TELLING
-            holds = "that leaves no nutation" if rest else "that holds for small angles"
-            beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: {holds}"
-            told.append(
-                f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
-            )
-        if bounds.rigorous is not None:
-            least = f"{_down(scale * bounds.rigorous):.4g} {unit}"
-            told.append(f"no schedule of the channels that leaves as little takes less than {least}")
-        return ("; ".join(told),) if len(told) > 1 else ()
+    def left_if_symmetric(self) -> float | None:
+        """Nutation, rad, that the same pulses would leave if I1 and I2 were their mean; None where they are equal."""
+        inertia = self.spacecraft.inertia
+        if inertia.symmetric or not self.feasible:
+            return None
+        mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)))
+        return flight.flown(mean, self.pulses).residual.nutation
 
     @property
     def hindrance(self) -> Hindrance:
         """What keeps the plan from leaving less nutation."""
         left = self.flight.residual.nutation
         return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
-
-    def _remainder(self) -> tuple[str, ...]:
-        """Why nutation is left."""
-        left = self.flight.residual.nutation
-        if left < TELLING or self.options.uncorrected:
-            return ()
-        found = self.hindrance
-        reason = {
-            Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
-            Obstacle.STEADY_TILT: f"{math.degrees(found.steady_tilt):.3g}° is the steady tilt under the disturbances",
-            Obstacle.MAX_PULSES: f"limits.max_pulses = {self.spacecraft.limits.max_pulses} ends it",
-            Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
-            Obstacle.LIMITS: f"{self.scheme} is held by {' and '.join(found.binding)}",
-            Obstacle.SCHEME: f"with these channels {self.scheme} takes out no more",
-        }[found.obstacle]
-        return (f"{_degrees(left)} of nutation remain: {reason}",)
-
-    def _asymmetry(self) -> tuple[str, ...]:
-        """What the same pulses would leave if I1 and I2 were their mean."""
-        inertia = self.spacecraft.inertia
-        if inertia.symmetric:
-            return ()
-        first, second, third = inertia.moments
-        mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, third)))
-        without = flight.flown(mean, self.pulses).residual.nutation
-        left = self.flight.residual.nutation
-        return (
-            f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % accounts for "
-            f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
-            f"and would leave {_degrees(without)} if both were their mean",
-        )
-
-
-def _down(value: float) -> float:
-    """The largest number of four digits that is not above ``value``: a bound must not be rounded up."""
-    if value <= 0.0 or not math.isfinite(value):
-        return value
-    step = 10.0 ** (math.floor(math.log10(value)) - 3)
-    return math.floor(value / step * (1.0 + 1e-12)) * step
-
-
-def _degrees(angle: float) -> str:
-    """An angle given in rad, as remarks tell it; what is below 1e-9 deg is rounding."""
-    return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) -> Plan:
@@ -352,7 +284,7 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Choice) -> Pla
     try:
         made = plan(spacecraft, scheme, options)
         # Judged here, where a failure is that of this scheme alone, and not when the first figure is shown.
-        _ = made.residual, made.delta_v, made.remarks
+        _ = made.residual, made.delta_v, made.left_if_symmetric
     except NutdampError:
         raise
     except Exception as failure:

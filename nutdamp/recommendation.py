@@ -173,8 +173,7 @@ def by_propellant(plans: Sequence[Plan]) -> bool:
 
 def _cost(plan: Judged, known: bool) -> float:
     """Propellant in kg where it is ``known`` for all plans compared, else impulse in N m s."""
-    propellant = plan.pulses.propellant
-    return propellant if known and propellant is not None else plan.pulses.total_impulse
+    return plan.pulses.cost_in("kg" if known else "N m s")
 
 
 def _off(plan: Judged) -> float:

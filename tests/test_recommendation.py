@@ -16,6 +16,7 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Comparison, Plan, compare
 from nutdamp.recommendation import Ground, Standing, recommend
+from nutdamp.remarks import remarks
 from nutdamp.report import verdicts
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement
@@ -282,7 +283,7 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     assert "damping takes 21 N m s" in text
     assert f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s." in text
     assert made.hindrance.binding == ("max_on_time", "limits.horizon")
-    assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in made.remarks)
+    assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in remarks(made))
 
 
 def test_pulses_that_may_not_be_shorter_are_named() -> None:
@@ -290,7 +291,7 @@ def test_pulses_that_may_not_be_shorter_are_named() -> None:
     compared = compare(body, ("two-pulse",))
     (made,) = compared.plans
     assert made.hindrance.binding == ("min_on_time",)
-    assert any("two-pulse is held by min_on_time" in remark for remark in made.remarks)
+    assert any("two-pulse is held by min_on_time" in remark for remark in remarks(made))
     assert "and min_on_time allows no shorter ones; damping takes 21 N m s." in verdicts.warnings(compared)[0]
 
 
@@ -328,7 +329,7 @@ def test_what_binds_is_named_and_nothing_else() -> None:
     single = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0))
     made = planning.plan(single, "one-pulse")
     assert made.hindrance.obstacle is Obstacle.SCHEME or made.hindrance.binding == ("limits.horizon",)
-    assert not any("max_on_time" in remark or "blackout" in remark for remark in made.remarks)
+    assert not any("max_on_time" in remark or "blackout" in remark for remark in remarks(made))
     dark = replace(single, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),)))
     assert "limits.blackout" in planning.plan(dark, "one-pulse").hindrance.binding
 

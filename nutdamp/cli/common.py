@@ -173,6 +173,7 @@ def plan_or_read(
     from nutdamp import planning
     from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible, printable
+    from nutdamp.remarks import remarks as sentences
 
     expect_read(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
@@ -198,7 +199,7 @@ def plan_or_read(
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     if plan.why is not None:
         raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
-    for text in plan.remarks:
+    for text in sentences(plan):
         remark(text)
     return plan
 

@@ -10,6 +10,7 @@ from nutdamp import __version__
 from nutdamp.compliance import Part
 from nutdamp.flight import Flight, Residual
 from nutdamp.planning import Comparison, Plan
+from nutdamp.remarks import remarks
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -72,7 +73,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "final": None if schedule is None else final_json(plan.flight),
         "target": target_json(body),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
-        "notes": list(plan.remarks),
+        "notes": list(remarks(plan)),
     }
 
 

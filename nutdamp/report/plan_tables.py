@@ -13,6 +13,7 @@ from nutdamp import compliance
 from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
+from nutdamp.remarks import remarks
 from nutdamp.report import verdicts
 from nutdamp.report.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
 from nutdamp.report.layout import columns, facts
@@ -227,7 +228,7 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
     """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
     said: dict[str, list[str]] = {}
     for plan in compared.plans:
-        for remark in (plan.why,) if plan.why is not None else plan.remarks:
+        for remark in (plan.why,) if plan.why is not None else remarks(plan):
             said.setdefault(remark, []).append(plan.scheme)
     lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in said.items()]
     return [Text(), *lines] if lines else []

@@ -23,7 +23,7 @@ from nutdamp.schemes import one_pulse
 from nutdamp.schemes.options import HalfConeOptions
 from nutdamp.schemes.tools import pair_search, predamping
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
-from nutdamp.schemes.tools.reasons import no_channels, no_target
+from nutdamp.schemes.tools.reasons import no_channels, no_target, turn_of
 from nutdamp.schemes.tools.steerable_pair import SteerablePair
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -134,8 +134,8 @@ def _no_time(spacecraft: Spacecraft) -> str:
         return f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}"
     if fewest >= MOST_CONES:
         return (
-            f"one pulse turns H by {_reach(spacecraft):.4g} N m s at most, so more than {MOST_CONES} half cones would "
-            "be needed; rhumb-line takes many small pulses"
+            f"one pulse turns H by {turn_of(spacecraft, _reach(spacecraft))} at most, so more than {MOST_CONES} half "
+            "cones would be needed; rhumb-line takes many small pulses"
         )
     return (
         f"{fewest} half cones are needed at least, each half a nutation turn long; "

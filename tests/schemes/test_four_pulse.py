@@ -11,6 +11,7 @@ from checker import violations
 
 from nutdamp import flight, planning
 from nutdamp.errors import SenselessOption
+from nutdamp.remarks import remarks
 from nutdamp.schemes import Options
 from nutdamp.schemes.options import FourPulseOptions
 from nutdamp.spacecraft import Limits, Spacecraft
@@ -81,7 +82,7 @@ def test_fine_damping_leaves_nothing(A: float, C: float, spin: float, channels: 
     plan = feasible(spacecraft)
     if transverse_rate_after(plan) > 1e-12:  # one weak channel may not be done within the horizon
         assert plan.pulses.end > spacecraft.horizon - 1.1 * spacecraft.body_period
-        assert any("remain" in remark for remark in plan.remarks)
+        assert any("remain" in remark for remark in remarks(plan))
     else:
         assert left(plan).nutation < NANODEGREE
         last, full = plan.pulses.pulses[-1], plan.pulses.pulses[0]

@@ -10,6 +10,7 @@ from builders import Outcome, channel, cross, fan, spinner, transverse
 from checker import violations
 
 from nutdamp import flight, planning
+from nutdamp.remarks import remarks
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
 NANODEGREE = math.radians(1e-9)
@@ -139,7 +140,7 @@ def test_train_keeps_the_number_of_pulses_allowed_and_says_what_is_left() -> Non
     assert len(plan.pulses) == 3
     taken = 3 * 30.0 * 0.1
     assert 120.0 * abs(plan.flight.settled.omega) == pytest.approx(spacecraft.least_impulse - taken, rel=1e-3)
-    assert any("limits.max_pulses = 3" in remark for remark in plan.remarks)
+    assert any("limits.max_pulses = 3" in remark for remark in remarks(plan))
 
 
 def test_the_channel_that_needs_fewest_pulses_is_taken_then_least_propellant_then_earliest() -> None:

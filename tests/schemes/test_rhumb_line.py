@@ -17,6 +17,7 @@ from checker import violations
 from nutdamp import planning
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import pointing
+from nutdamp.remarks import remarks
 from nutdamp.schemes import Choice, Options
 from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
@@ -100,7 +101,7 @@ def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
         closes(plan)
         if seed % 10 == 1:
             ends_on_the_target(plan)
-        count = re.search(r"([0-9]+) pulses of ", plan.remarks[0])
+        count = re.search(r"([0-9]+) pulses of ", remarks(plan)[0])
         assert count
         on_times = np.array([pulse.on_time for pulse in plan.pulses][-int(count[1]) :]) / options.on_time
         assert on_times == pytest.approx(np.ones(len(on_times)), abs=0.1 + 1e-9), seed
@@ -230,7 +231,7 @@ def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
     direct, rhumb = train(spacecraft), train(by_sun)
     ends_on_the_target(rhumb)
     assert rhumb.pulses.total_impulse > 1.02 * direct.pulses.total_impulse
-    assert "rhumb line at a fixed Sun phase" in rhumb.remarks[0]
+    assert "rhumb line at a fixed Sun phase" in remarks(rhumb)[0]
 
 
 def test_an_axis_towards_the_sun_has_no_phase() -> None:

@@ -18,6 +18,7 @@ from nutdamp import flight, planning
 from nutdamp.errors import Infeasible
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.limits import SLACK, Windows
+from nutdamp.remarks import remarks
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC, Options
 from nutdamp.schemes.tools import steerable_pair
@@ -60,7 +61,7 @@ def test_no_more_pulses_are_laid_than_anybody_commands(scheme: str) -> None:
     with within(10 * PLENTY):
         plan = planning.plan(body, scheme)
     assert len(plan.pulses) == MOST_PULSES
-    assert any(f"ends after {MOST_PULSES} pulses" in remark for remark in plan.remarks)
+    assert any(f"ends after {MOST_PULSES} pulses" in remark for remark in remarks(plan))
 
 
 def power(rng: np.random.Generator, least: float, most: float) -> float:

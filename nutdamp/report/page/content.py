@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from nutdamp import __version__
 from nutdamp.planning import Comparison, Plan, unrounded
 from nutdamp.recommendation import Standing
+from nutdamp.remarks import remarks as remarks_of
 from nutdamp.report import verdicts
 from nutdamp.report.check_tables import channel_table, disturbance_table
 from nutdamp.report.end_tables import end_table
@@ -135,7 +136,7 @@ def _schemes(compared: Comparison) -> Section:
     remarks = tuple(
         (plan.scheme, remark)
         for plan in compared.plans
-        for remark in ((plan.why,) if plan.why is not None else plan.remarks)
+        for remark in ((plan.why,) if plan.why is not None else remarks_of(plan))
     )
     note = Prose(
         "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "

@@ -20,7 +20,7 @@ from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.flown_builder import tolerable
-from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.schemes.tools.reasons import no_channels, turn_of
 from nutdamp.schemes.tools.steerable_pair import SteerablePair
 from nutdamp.schemes.tools.symmetric_model import model_of
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
@@ -279,8 +279,8 @@ class _Search:
         )
         if 2.0 * strongest < self.floor:
             return (
-                f"one pulse turns H by {strongest:.4g} N m s at most, and two are to do at least "
-                f"{self.floor:.4g} N m s; half-cone with more cones or rhumb-line take smaller ones"
+                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, and two together would have to "
+                f"by {turn_of(self.spacecraft, self.floor)}; half-cone with more cones or rhumb-line take smaller ones"
             )
         if self.within_reach:
             return (

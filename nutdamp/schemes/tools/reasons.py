@@ -68,10 +68,15 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         if left < FADED * builder.left:
             return f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
         return (
-            f"every channel's shortest pulse is too strong: {left:.4g} N m s are to be taken out, "
-            f"and firing would leave {builder.left_after(best):.4g} N m s; lower min_on_time"
+            f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} of nutation, and "
+            f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
         )
     return (
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
         f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that"
     )
+
+
+def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
+    """By how many degrees an ``impulse`` across the spin axis, N m s, turns H; of A|ω|, the nutation."""
+    return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"

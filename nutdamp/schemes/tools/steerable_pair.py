@@ -17,6 +17,7 @@ from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, steerable_pulse
+from nutdamp.schemes.tools.reasons import turn_of
 from nutdamp.spacecraft import Spacecraft, SpinState, Steerable, Vector
 
 SAMPLES = 256
@@ -219,8 +220,9 @@ class SteerablePair:
                 needed = float(np.linalg.norm(middle - self.momentum, axis=1).min())
             if needed > once:
                 return (
-                    f"one pulse turns H by at most 2M/|ω3| = {once:.4g} N m s, for the torque stays fixed in the body, "
-                    f"and {needed:.4g} N m s are needed at once; half-cone with more cones or rhumb-line take less"
+                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, as the torque is fixed in "
+                    f"the body), and {turn_of(self.spacecraft, needed)} are needed at once; half-cone with more "
+                    "cones or rhumb-line take less"
                 )
         return (
             f"the pulses of {cones} half cone{'s' if cones > 1 else ''} find no room within the horizon of "

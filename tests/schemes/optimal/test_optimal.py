@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from nutdamp.limits import broken_limits
 from nutdamp.planning import plan
+from nutdamp.remarks import remarks
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.residual_equations import Equations, small_angles
@@ -179,8 +180,8 @@ def test_an_impossible_deadline_says_what_to_relax() -> None:
 
 def test_the_plan_carries_its_proof() -> None:
     spacecraft = spinner(channels=channels(8.0, min_on_time=0.02, max_on_time=2.0))
-    remarks = plan(spacecraft, "optimal").remarks
-    assert any("first-order least within" in text and "leaves as little takes less than" in text for text in remarks)
+    said = remarks(plan(spacecraft, "optimal"))
+    assert any("first-order least within" in text and "leaves as little takes less than" in text for text in said)
 
 
 def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent() -> None:

@@ -1,0 +1,89 @@
+"""What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
+
+The plan gives the data; what is said of several plans together is in `nutdamp.report.verdicts`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from nutdamp.hindrance import Obstacle
+from nutdamp.planning import Plan
+
+TELLING = math.radians(1e-6)
+"""Nutation angle in rad from which what is left is worth a remark."""
+
+
+def remarks(plan: Plan) -> tuple[str, ...]:
+    """All of them; what the scheme says comes first."""
+    if plan.flown is None or not len(plan.pulses):
+        return plan.pulses.notes
+    return (*plan.pulses.notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan))
+
+
+def _bounds(plan: Plan) -> Iterator[str]:
+    """How much cheaper another schedule could be."""
+    bounds = plan.pulses.bounds
+    if bounds is None or (bounds.unit == "kg" and plan.pulses.propellant is None):
+        return
+    spent = plan.pulses.cost_in(bounds.unit)
+    scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
+    parts = [f"{scale * spent:.4g} {unit}"]
+    if bounds.first_order is not None:
+        gap = 100.0 * (spent / bounds.first_order - 1.0) if bounds.first_order > 0.0 else math.inf
+        rest = plan.flight.residual.nutation > TELLING
+        holds = "that leaves no nutation" if rest else "that holds for small angles"
+        beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: {holds}"
+        parts.append(
+            f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
+        )
+    if bounds.rigorous is not None:
+        least = f"{_down(scale * bounds.rigorous):.4g} {unit}"
+        parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
+    if len(parts) > 1:
+        yield "; ".join(parts)
+
+
+def _remainder(plan: Plan) -> Iterator[str]:
+    """Why nutation is left."""
+    left = plan.flight.residual.nutation
+    if left < TELLING or plan.options.uncorrected:
+        return
+    found = plan.hindrance
+    reason = {
+        Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
+        Obstacle.STEADY_TILT: f"{math.degrees(found.steady_tilt):.3g}° is the steady tilt under the disturbances",
+        Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} ends it",
+        Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
+        Obstacle.LIMITS: f"{plan.scheme} is held by {' and '.join(found.binding)}",
+        Obstacle.SCHEME: f"with these channels {plan.scheme} takes out no more",
+    }[found.obstacle]
+    yield f"{_degrees(left)} of nutation remain: {reason}"
+
+
+def _asymmetry(plan: Plan) -> Iterator[str]:
+    """What the same pulses would leave if I1 and I2 were their mean."""
+    without, inertia = plan.left_if_symmetric, plan.spacecraft.inertia
+    if without is None:
+        return
+    first, second, _ = inertia.moments
+    left = plan.flight.residual.nutation
+    yield (
+        f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % accounts for "
+        f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
+        f"and would leave {_degrees(without)} if both were their mean"
+    )
+
+
+def _down(value: float) -> float:
+    """The largest number of four digits that is not above ``value``: a bound must not be rounded up."""
+    if value <= 0.0 or not math.isfinite(value):
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return math.floor(value / step * (1.0 + 1e-12)) * step
+
+
+def _degrees(angle: float) -> str:
+    """An angle given in rad, as remarks show it; what is below 1e-9 deg is rounding."""
+    return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"
