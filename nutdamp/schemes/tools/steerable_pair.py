@@ -220,8 +220,8 @@ class SteerablePair:
                 needed = float(np.linalg.norm(middle - self.momentum, axis=1).min())
             if needed > once:
                 return (
-                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, as the torque is fixed in "
-                    f"the body), and {turn_of(self.spacecraft, needed)} are needed at once; half-cone with more "
+                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, the torque being fixed "
+                    f"in the body), and {turn_of(self.spacecraft, needed)} are needed at once; half-cone with more "
                     "cones or rhumb-line take less"
                 )
         return (
