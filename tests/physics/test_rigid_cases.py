@@ -27,7 +27,7 @@ TENSOR = (120.0, 100.0, 80.0)
 
 
 class Case(NamedTuple):
-    """The arguments of `many.fly`."""
+    """The arguments of `rigid_cases.fly`."""
 
     bodies: Bodies
     rates: Array
