@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import channel, cross, judged, spinner
+from builders import aimed, channel, cross, judged, off_target, spinner
 from cases_dir import case
 
 from nutdamp import compliance, flight, planning, schemes
 from nutdamp.compliance import Part
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.hindrance import Obstacle
+from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.planning import Comparison, Plan, compare
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.remarks import remarks
 from nutdamp.report import verdicts
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement
 
 INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
@@ -157,6 +157,49 @@ def test_costs_within_a_thousandth_are_equal() -> None:
     assert recommend([late, early, still]).ground is Ground.SHIFT
     dearer = judged("dearer", 0.0, shift=0.0, propellant=12.6312 * 1.0011, end=1.0)
     assert chosen(late, dearer) == "late"
+
+
+@pytest.mark.parametrize(
+    ("share", "ground", "best"),
+    [(1.0005, Ground.END, "early"), (1.002, Ground.COST, "late"), (1.008, Ground.COST, "late")],
+)
+def test_costs_count_as_equal_within_a_thousandth_and_no_further(share: float, ground: Ground, best: str) -> None:
+    late, early = judged("late", 0.0, propellant=1.0, end=9.0), judged("early", 0.0, propellant=share, end=1.0)
+    assert recommend([late, early]).ground is ground
+    assert chosen(late, early) == best
+
+
+@pytest.mark.parametrize(
+    ("shift", "ground", "best"),
+    [
+        (0.5e-9, Ground.END, "early"),
+        (2e-9, Ground.SHIFT, "late"),
+        (1e-6, Ground.SHIFT, "late"),
+        (5e-3, Ground.SHIFT, "late"),
+    ],
+)
+def test_shifts_count_as_equal_within_a_nanoradian_and_no_further(shift: float, ground: Ground, best: str) -> None:
+    late, early = judged("late", 0.0, end=9.0), judged("early", 0.0, shift=math.degrees(shift), end=1.0)
+    assert recommend([late, early]).ground is ground
+    assert chosen(late, early) == best
+
+
+@pytest.mark.parametrize(
+    ("asked", "nutation", "shift", "ground"),
+    [
+        (BOTH, 5e-6, 0.2501, Ground.COST),  # 0.04 % more than 0.25° of shift
+        (BOTH, 5e-6, 0.251, Ground.NEAREST),
+        (Requirement(nutation=math.radians(1e-6)), 5.0005e-6, 0.25, Ground.COST),
+        (Requirement(nutation=math.radians(1e-6)), 5.1e-6, 0.25, Ground.NEAREST),  # 1e-7° are no rounding
+    ],
+)
+def test_plans_are_as_near_to_the_requirement_within_a_thousandth(
+    asked: Requirement, nutation: float, shift: float, ground: Ground
+) -> None:
+    near = judged("near", 5e-6, shift=0.25, propellant=0.2, asked=asked)
+    cheap = judged("cheap", nutation, shift=shift, propellant=0.1, asked=asked)
+    assert recommend([near, cheap]).ground is ground
+    assert chosen(near, cheap) == ("cheap" if ground is Ground.COST else "near")
 
 
 def test_where_a_propellant_is_not_known_the_impulse_decides() -> None:
@@ -353,6 +396,25 @@ def test_the_warning_names_what_stands_in_the_way(
     assert text in verdicts.warnings(compared)[0]
 
 
+@pytest.mark.parametrize(
+    ("tick", "share", "obstacle", "binding"),
+    [
+        (0.01, 0.09, Obstacle.RESOLUTION, ("limits.tick",)),
+        (0.01, 0.11, Obstacle.LIMITS, ("limits.tick",)),
+        (None, 0.09, Obstacle.SCHEME, ()),
+        (None, 0.11, Obstacle.SCHEME, ()),
+    ],
+)
+def test_ticks_explain_what_is_left_up_to_a_tenth(
+    tick: float | None, share: float, obstacle: Obstacle, binding: tuple[str, ...]
+) -> None:
+    body = spinner(channels=cross(8.0), limits=Limits(tick=tick))
+    pulse = channel_pulse(body.channels[0], 1.0, 0.1)
+    found = Hindrance(body, Schedule((pulse,)), aware=False, nutation=share * body.nutation)
+    assert found.obstacle is obstacle
+    assert found.binding == binding
+
+
 def test_a_scheme_that_was_not_compared_is_named_where_it_may_help() -> None:
     far = judged("far", 1e-12, shift=3.5, impulse=20.0, asked=BOTH)
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
@@ -367,6 +429,17 @@ def test_the_parts_that_are_missed() -> None:
     assert [bound.part for bound in one.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
     assert one.severity == pytest.approx(1.0 / 0.003)
     assert Plan(one.spacecraft, "x", None, "why").severity == math.inf
+
+
+def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
+    """One pulse takes the nutation out and leaves H 11.7° from its target, having shifted it by 2.1°."""
+    body = aimed(spinner(channels=cross(8.0), requirement=Requirement(None, math.radians(1.0))), 10.0, 40.0)
+    made = planning.plan(body, "one-pulse")
+    assert made.flown is not None
+    assert made.severity == pytest.approx(off_target(body, made.pulses) / math.radians(1.0), rel=1e-9)
+    assert made.flown.momentum_shift < 0.9 * made.flown.axis_error
+    free = replace(body, requirement=None)
+    assert replace(made, spacecraft=free).severity == pytest.approx(off_target(body, made.pulses), rel=1e-9)
 
 
 def test_the_severity_of_many_is_that_of_each() -> None:

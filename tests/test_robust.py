@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from builders import cross, spinner
+from builders import cross, judged, spinner
 from checker import violations
 
 from nutdamp import planning, robust
@@ -191,6 +192,41 @@ def test_less_propellant_among_equals() -> None:
     close = [one.plan.pulses.cost for one in found.candidates if one.left <= 1.05 * least]
     assert len(close) == found.equals
     assert found.chosen.plan.pulses.cost <= min(close) * 1.001
+
+
+def of_given(
+    monkeypatch: pytest.MonkeyPatch, cheap: tuple[float, float | None], dear: tuple[float, float | None]
+) -> robust.RobustComparison:
+    """Two plans of 1 and 2 N m s, whose angle left (rad) and share of 1,000 cases met are given."""
+    plans = judged("cheap", 0.0, impulse=1.0), judged("dear", 0.0, impulse=2.0)
+    body = plans[0].spacecraft
+    given = dict(zip((1.0, 2.0), (cheap, dear), strict=True))
+
+    def fares(plan: planning.Plan, variant: str, *_: object, **__: object) -> robust.Candidate:
+        left, met = given[plan.pulses.total_impulse]
+        return robust.Candidate(plan, variant, left, 0.0, met)
+
+    monkeypatch.setattr(robust, "_dispersed", fares)
+    trials: list[robust.Attempt] = [partial(list, [("as planned", replace(plan, spacecraft=body))]) for plan in plans]
+    return robust.compare(planning.Comparison(body, plans), trials, samples=1_000)
+
+
+@pytest.mark.parametrize(
+    ("cheap", "dear", "best"),
+    [
+        ((1.04, None), (1.0, None), "cheap"),  # angles count as equal within 5 %
+        ((1.06, None), (1.0, None), "dear"),
+        ((1.0, 0.885), (1.0, 0.9), "cheap"),  # the 95 % interval of 900 in 1,000 cases begins at 0.880
+        ((1.0, 0.875), (1.0, 0.9), "dear"),
+    ],
+)
+def test_candidates_count_as_equal_within_the_sampling_error_and_no_further(
+    monkeypatch: pytest.MonkeyPatch, cheap: tuple[float, float | None], dear: tuple[float, float | None], best: str
+) -> None:
+    found = of_given(monkeypatch, cheap, dear)
+    assert found.chosen is not None
+    assert found.chosen.plan.scheme == best
+    assert found.equals == (2 if best == "cheap" else 1)
 
 
 def test_a_real_tensor_is_flown() -> None:

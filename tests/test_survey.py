@@ -28,6 +28,27 @@ def test_the_smallest_step_is_what_one_shortest_pulse_does_to_a_pure_spin() -> N
         assert steps.smallest == pytest.approx(flown.nutation, rel=1e-12)
 
 
+@pytest.mark.parametrize(("periods", "resonant"), [(2.9, False), (3.1, True)])
+def test_a_beat_over_three_horizons_is_a_resonance(periods: float, resonant: bool) -> None:
+    """The beat has the period 2π/|aω3 + r|."""
+    detuning = 2.0 * math.pi / (periods * EXAMPLE.horizon)
+    disturbance = Disturbance(1e-3 + 0j, rate=detuning - EXAMPLE.inertia.a * EXAMPLE.spin)
+    (found,) = survey.consequences(replace(EXAMPLE, disturbances=(disturbance,)))
+    assert found.beat_period == pytest.approx(periods * EXAMPLE.horizon, rel=1e-9)
+    assert (found.tilt is None) is resonant
+    assert bool(found.resonant) is resonant
+
+
+def test_the_largest_step_is_what_half_a_nutation_period_does_to_a_pure_spin() -> None:
+    """A longer pulse takes back what it has done; where max_on_time is shorter that bounds the step."""
+    for longest, on_time in ((math.inf, 0.5 * CALM.body_period), (0.2, 0.2)):
+        thrusters = tuple(replace(one, max_on_time=longest) for one in CALM.channels[0].thrusters)
+        channel = replace(CALM.channels[0], thrusters=thrusters)
+        (steps,) = survey.channel_steps(replace(CALM, channels=(channel,)))
+        flown = flight.flown(CALM, Schedule((channel_pulse(channel, 5.0, on_time),))).residual
+        assert steps.largest == pytest.approx(flown.nutation, rel=1e-9)
+
+
 def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
     """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it swells to the beat."""
     for disturbance in (Disturbance(0.4 - 0.3j), Disturbance(0.2 + 0.1j, rate=-3.0), Disturbance(0.3j, rate=0.7)):

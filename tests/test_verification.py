@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import reference
 from builders import spinner
 from process import Run
 
@@ -103,6 +104,26 @@ def test_momentum_and_energy_keep_on_coasts_of_a_free_body() -> None:
     found = verify(free, planning.plan(free, "four-pulse").pulses)
     assert found.momentum_drift < 1e-13
     assert found.energy_drift < 1e-13
+
+
+def test_what_a_disturbance_does_to_momentum_and_energy_is_seen() -> None:
+    """A pure spin under a torque about axis 3: |H| grows by M t, the energy as its square."""
+    body = replace(EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]), disturbances=(Disturbance(0j, axial=0.5),))
+    found = verify(body, Schedule())
+    after = 80.0 * 3.0 + 0.5 * body.inertial_period
+    assert found.momentum_drift == pytest.approx(1.0 - 240.0 / after, rel=1e-9)
+    assert found.energy_drift == pytest.approx(1.0 - (240.0 / after) ** 2, rel=1e-9)
+
+
+def test_dissipation_takes_energy_and_leaves_the_momentum() -> None:
+    body = replace(EXAMPLE, dissipation=20.0)
+    found = verify(body, Schedule())
+    end = flight.flown(body, Schedule(), body.inertial_period)
+    rates, _ = end.motion(np.array([0.0, body.inertial_period]))
+    before, after = (reference.energy(body.inertia.moments, one) for one in rates)
+    assert found.momentum_drift < 1e-12
+    assert found.energy_drift == pytest.approx(1.0 - after / before, rel=1e-9)
+    assert found.energy_drift > 1e-4
 
 
 def test_the_budget_names_each_imperfection_of_the_body() -> None:

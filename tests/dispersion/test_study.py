@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 import zipfile
 from dataclasses import replace
@@ -19,7 +20,7 @@ from nutdamp.dispersion.study import Results, Study, run
 from nutdamp.dispersion.truth import Model
 from nutdamp.errors import BadRequest, CannotRead
 from nutdamp.files.study_file import load_results, save_results
-from nutdamp.spacecraft import Requirement
+from nutdamp.spacecraft import Disturbance, Goal, Requirement
 from nutdamp.tolerances import Dispersions, Tolerance
 
 MANY = 3 * BLOCK + 1_234
@@ -100,6 +101,17 @@ def test_only_the_same_study_is_taken_up(tmp_path: Path) -> None:
         with pytest.raises(BadRequest, match="another study"):
             load_results(path, other, 200)
     assert load_results(path, a_study(), 200).done == 100
+
+
+def test_results_under_other_disturbances_are_not_taken_up(tmp_path: Path) -> None:
+    path = str(tmp_path / "study.npz")
+    leak = Disturbance(0.01 + 0.0j)
+    save_results(path, run(Results(a_study(disturbances=(leak,)), 100)))
+    others = ((), (leak, leak), (replace(leak, transverse=0.02 + 0.0j),), (replace(leak, rate=-3.0),))
+    for disturbances in others:
+        with pytest.raises(BadRequest, match="another study"):
+            load_results(path, a_study(disturbances=disturbances), 200)
+    assert load_results(path, a_study(disturbances=(leak,)), 200).done == 100
 
 
 @pytest.mark.parametrize("content", [b"", b"not a study", b"PK\x03\x04 broken"])
@@ -236,6 +248,17 @@ def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
     assert free.meets_requirement is None
     assert free.values is not None
     assert free.worst.cases[0] == np.argmax(free.values[0])
+
+
+def test_with_a_target_the_distance_from_it_counts_and_not_the_shift() -> None:
+    """H shifts by 0.027 rad, and ends 0.098 to 0.105 rad from the target."""
+    goal = Goal(axis=np.array([math.sin(0.1), 0.0, math.cos(0.1)]))
+    results = run(Results(a_study(goal=goal, requirement=Requirement(momentum_shift=0.1)), 1_000))
+    assert results.values is not None
+    shift, distance = (results.values[OUTPUTS.index(name)] for name in ("momentum_shift", "axis_error"))
+    assert results.worst.cases[0] == np.argmax(distance) != np.argmax(shift)
+    assert results.worst.severities[0] == pytest.approx(np.max(distance) / 0.1, rel=1e-12)
+    assert results.met == np.count_nonzero(distance <= 0.1) < np.count_nonzero(shift <= 0.1)
 
 
 def test_unphysical_draws_are_counted() -> None:

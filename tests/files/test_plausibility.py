@@ -107,6 +107,21 @@ def test_units_and_common_numbers_give_no_warning(text: str) -> None:
     assert doubts_of(text) == []
 
 
+@pytest.mark.parametrize(
+    ("on_times", "doubted"),
+    [
+        ("2.05", []),
+        ("2.15", ["min_on_time"]),
+        ("20 ms, max_on_time: 103", []),
+        ("20 ms, max_on_time: 106", ["max_on_time"]),
+    ],
+)
+def test_on_times_are_doubted_from_one_turn_and_from_fifty(on_times: str, doubted: list[str]) -> None:
+    """At 3 rad/s a turn takes 2.094 s, and fifty 104.7 s."""
+    found = doubts_of(BASE + THRUSTER.format(0.3, on_times))
+    assert [key for text in found for key in ("min_on_time", "max_on_time") if f".{key}: warning" in text] == doubted
+
+
 def test_a_shortest_firing_is_judged_by_the_spin() -> None:
     slow = BASE.replace("3]", "0.3]") + THRUSTER.format(0.3, 20)
     assert doubts_of(slow) == []  # a turn takes 20.9 s
