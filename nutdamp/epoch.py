@@ -44,7 +44,7 @@ class Epoch:
         """
         found = _TIME.fullmatch(text)
         if found is None:
-            raise ValueError(f"{text!r} is no epoch; 2026-03-01T12:00:00.000 is of the form wanted")
+            raise ValueError(f"{text!r} is no epoch; expected the form 2026-03-01T12:00:00.000")
         try:
             day = _day(found)
         except ValueError as reason:
@@ -56,7 +56,7 @@ class Epoch:
         day, minutes = day + minutes // 1440, minutes % 1440
         within = 61 if minutes == 1439 and day in LEAP_DAYS else 60
         if hour > 23 or minute > 59 or second >= within:
-            raise ValueError(f"{text!r} is no epoch: a time of day from 00:00:00 to 23:59:59.999… is wanted")
+            raise ValueError(f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…")
         if day < FIRST_DAY:
             raise ValueError(f"{text!r} lies before 1972, when UTC had seconds of another length")
         return cls(Fraction(86400 * (day - FIRST_DAY) + _leaps_before(day) + 60 * minutes) + second)

@@ -89,7 +89,7 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
     elif isinstance(value, int | float) and not isinstance(value, bool):
         number, factor = value, 1.0
     else:
-        raise ValueError(f"{shown(value)} stands where {wanted.noun} is wanted: {wanted.wanted}")
+        raise ValueError(f"expected {wanted.noun} ({wanted.wanted}), got {shown(value)}")
     try:
         result = float(number) * factor
     except OverflowError:
@@ -122,7 +122,7 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
         raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {wanted.units}{hint}")
     if found[0] != kind:
-        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; {wanted.noun} is wanted: {wanted.wanted}")
+        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; expected {wanted.noun}: {wanted.wanted}")
     return number, found[1]
 
 

@@ -55,7 +55,7 @@ def command(
     if scheme is not None and schedule is not None:
         raise click.UsageError("name what to show: either --scheme or --schedule")
     if until is not None and until <= 0.0:
-        raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
     expect_outputs(spacecraft, schedule, output=output)
     from nutdamp.report.figures import animation
 

@@ -75,7 +75,7 @@ def command(
     if (scheme is None) == (schedule is None):
         raise click.UsageError("name what to propagate: either --scheme or --schedule")
     if until is not None and until <= 0.0:
-        raise click.BadParameter("a time after t = 0 is wanted", param_hint="--until")
+        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
     silent = expect_outputs(spacecraft, schedule, csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")

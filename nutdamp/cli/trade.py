@@ -80,7 +80,7 @@ def command(
     for `nutdamp plan`.
     """
     if any(shift < 0.0 for shift in allow):
-        raise click.BadParameter("an angle of at least 0, or any, is wanted", param_hint="--allow")
+        raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
     from nutdamp import trade
     from nutdamp.files.trade_files import schedule_files, schedule_path
 

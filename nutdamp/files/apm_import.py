@@ -50,7 +50,7 @@ def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
 def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
     lines = [
-        f"# From the attitude parameter message {printable(path)}; numbers as they stand there.",
+        f"# From the attitude parameter message {printable(path)}; numbers as given there.",
         "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
         f"name: {_text(contents.name)}",
     ]

@@ -54,7 +54,7 @@ def _probability(facts: Facts) -> Iterator[Finding]:
     if facts.has("requirement", "probability") and not (
         facts.has("requirement", "nutation") or facts.has("requirement", "momentum_shift")
     ):
-        problem = "stands alone; say what must be met with it: nutation, momentum_shift or both"
+        problem = "given alone; name what must be met with it: nutation, momentum_shift or both"
         yield Finding(("requirement", "probability"), problem, True)
 
 
@@ -153,7 +153,7 @@ def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
     if not given and not said:
         yield Finding(entry.path, f"says no distribution; give {_example(entry.kind)}")
     for key in given[1:]:
-        yield Finding((*entry.path, key), f"stands beside {given[0]}; keep one of the two", True)
+        yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
     for key in given:
         problem = _size_fault(facts, entry, key, node.value[key].plain())
         if problem is not None:
@@ -175,7 +175,7 @@ def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | No
         return str(wrong)
     if key != "bias" and size < 0.0:
         what = "one sigma" if key == "normal" else "half a width"
-        return f"{shown(value)} is negative; {what} of at least 0 is wanted, or bias for a fixed offset"
+        return f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
     if entry.kind == "force" and not relative:
         unknown = _without_thrust(facts, entry)
         if unknown is not None:
@@ -189,7 +189,7 @@ def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | No
     most = f"{'of at most' if key == 'normal' else 'below'} {100 * limit:g} %"
     amounts = f"is {100 * fraction:.3g} % of {entry.of}" if entry.of and not relative else "is out of range"
     what = {"normal": "one sigma", "bias": "an offset"}.get(key, "half a width")
-    return f"{shown(value)} {amounts}; {what} {most} is wanted"
+    return f"{shown(value)} {amounts}; expected {what} {most}"
 
 
 def _without_thrust(facts: Facts, entry: Entry) -> str | None:

@@ -86,7 +86,7 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
     for step, child in node.children():
         annotation = fields[step].annotation if isinstance(step, str) and fields and not named else model
         if child.value is None:
-            cure = "give a value, or leave the key out" if isinstance(step, str) else "a value is wanted"
+            cure = "give a value, or leave the key out" if isinstance(step, str) else "expected a value"
             yield Finding((*path, step), f"empty; {cure}")
         below = section_of(annotation) if fields else None
         yield from _spelling(child, below, (*path, step), _holds_names(annotation))
@@ -114,37 +114,37 @@ def _description(path: KeyPath) -> str:
     return text[:1].lower() + text[1:].rstrip(".")
 
 
-def _stands(details: ErrorDetails, wanted: str) -> str:
-    return f"{shown(details['input'])} stands where {wanted} is wanted"
+def _mismatch(details: ErrorDetails, wanted: str) -> str:
+    return f"expected {wanted}, got {shown(details['input'])}"
 
 
 def _text(details: ErrorDetails) -> str:
     cure = "" if isinstance(details["input"], dict | list) else "; put it in quotes"
-    return _stands(details, "a text") + cure
+    return _mismatch(details, "a text") + cure
 
 
 def _count(details: ErrorDetails) -> str:
     wanted, found = details["ctx"].get("min_length", details["ctx"].get("max_length")), len(details["input"])
     if wanted == 1:
-        return "empty; an entry is wanted"
-    return f"{found} {'entry stands' if found == 1 else 'entries stand'} where {wanted} are wanted"
+        return "empty; expected an entry"
+    return f"expected {wanted} entries, got {found}"
 
 
 def _choice(details: ErrorDetails) -> str:
     expected, given = details["ctx"]["expected"], details["input"]
     meant = nearest(given, re.findall("'([^']*)'", expected)) if isinstance(given, str) else None
-    return _stands(details, expected) + (f"; did you mean {shown(meant)}?" if meant else "")
+    return _mismatch(details, expected) + (f"; did you mean {shown(meant)}?" if meant else "")
 
 
 _WORDING: dict[str, Callable[[ErrorDetails], str]] = {
     "missing": lambda details: f"missing; {_description(details['loc'])}",
-    "model_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
-    "dict_type": lambda details: _stands(details, "a mapping, {key: value, …},"),
-    "list_type": lambda details: _stands(details, "a list, [value, …],"),
-    "int_type": lambda details: _stands(details, "a whole number"),
+    "model_type": lambda details: _mismatch(details, "a mapping {key: value, …}"),
+    "dict_type": lambda details: _mismatch(details, "a mapping {key: value, …}"),
+    "list_type": lambda details: _mismatch(details, "a list [value, …]"),
+    "int_type": lambda details: _mismatch(details, "a whole number"),
     "literal_error": _choice,
-    "greater_than_equal": lambda details: _stands(details, f"at least {details['ctx']['ge']}"),
-    "less_than_equal": lambda details: _stands(details, f"at most {details['ctx']['le']}"),
+    "greater_than_equal": lambda details: _mismatch(details, f"at least {details['ctx']['ge']}"),
+    "less_than_equal": lambda details: _mismatch(details, f"at most {details['ctx']['le']}"),
     "string_type": _text,
     "too_short": _count,
     "too_long": _count,

@@ -33,10 +33,10 @@ class Quantity:
         """SI value; raises ValueError, which says what would be right."""
         result = parse(value, self.kind)
         if not self._allows(result):
-            raise ValueError(f"{shown(value)} is out of range; {self.range} is wanted{self._degrees(value)}")
+            raise ValueError(f"{shown(value)} is out of range; expected {self.range}{self._degrees(value)}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             raise ValueError(
-                f"{shown(value)} is too small to be real; {self.range} is wanted, in SI at least {SMALLEST:g}"
+                f"{shown(value)} is too small to be real; expected {self.range}, in SI at least {SMALLEST:g}"
             )
         return result
 

@@ -69,7 +69,7 @@ def reference(spacecraft: Spacecraft) -> Reference:
             f"this format needs {names}, which the spacecraft file does not give; {verb}\nattitude:\n{lines}"
         )
     if given.frame not in FRAMES:
-        problem = f"{given.frame!r} is no frame that the format knows; one of {', '.join(FRAMES)} is wanted"
+        problem = f"{given.frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
         raise Unsuitable(("attitude", "frame"), problem)
     try:
         return Reference(Epoch.parse(given.epoch), given.frame)

@@ -25,7 +25,7 @@ def _epoch(text: str) -> str:
         datetime.datetime.fromisoformat(text)
     except ValueError:
         example = "2026-03-01T12:00:00Z"
-        raise ValueError(f"{shown(text)} is no epoch; ISO 8601 with date and time is wanted: {example}") from None
+        raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
     return text
 
 

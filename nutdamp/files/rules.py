@@ -72,7 +72,7 @@ def _names(facts: Facts) -> Iterator[Finding]:
         if name is None:
             continue
         if not name.strip() or not name.isprintable():
-            yield Finding(path, f"{shown(name)} is no name; printable characters are wanted", at_key)
+            yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
         elif name == STEERABLE and path[0] in ("thrusters", "channels"):
             yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
     first: dict[tuple[str | int, str], KeyPath] = {}
@@ -88,7 +88,7 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     keys = [key for key, _ in facts.children("inertia") if key in ("A", "C", "tensor")]
     if "tensor" in keys:
         if len(keys) > 1:
-            yield Finding(("inertia", "tensor"), "stands beside A or C; keep either tensor, or A and C", True)
+            yield Finding(("inertia", "tensor"), "given together with A or C; keep either tensor, or A and C", True)
         tensor = tensor_of(facts)
         fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, spin_of(facts))
         if fault is not None:
@@ -166,12 +166,12 @@ def spin_of(facts: Facts) -> float | None:
 
 def _motion(facts: Facts) -> Iterator[Finding]:
     if facts.has("omega0") and facts.has("state"):
-        yield Finding(("state",), "stands beside omega0; keep one of the two", True)
+        yield Finding(("state",), "given together with omega0; keep one of the two", True)
     if not facts.has("omega0") and not facts.has("state"):
         yield Finding(("omega0",), "missing; give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}")
     for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
         if spin is not None and abs(spin) < SMALLEST:
-            yield Finding(path, "the spin is zero; a rate about axis 3 is wanted, nothing nutates without it")
+            yield Finding(path, "the spin is zero; expected a rate about axis 3; nothing nutates without it")
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
@@ -188,7 +188,7 @@ def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
 def _attitude(facts: Facts) -> Iterator[Finding]:
     quaternion = facts.vector("number", 4, "attitude", "quaternion")
     if quaternion is not None and _norm(quaternion) < SMALLEST:
-        yield Finding(("attitude", "quaternion"), "zero; a turn is wanted, such as [1, 0, 0, 0]")
+        yield Finding(("attitude", "quaternion"), "zero; expected a rotation, such as [1, 0, 0, 0]")
 
 
 _MOUNTING = ("position", "direction", "force")
@@ -206,7 +206,7 @@ def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     given = " and ".join(mounting)
     if facts.has(*path, "torque"):
         if mounting:
-            problem = f"stands beside {given}; keep either torque, or position, direction and force"
+            problem = f"given together with {given}; keep either torque, or position, direction and force"
             yield Finding((*path, "torque"), problem, True)
     elif not mounting:
         yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
@@ -221,16 +221,16 @@ def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
 def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     direction = facts.vector("number", 3, *path, "direction")
     if direction is not None and _norm(direction) < SMALLEST:
-        yield Finding((*path, "direction"), "zero; a direction is wanted, such as [1, 0, 0]")
+        yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
     elif _cancel([_torque(facts, path)]):
         if facts.has(*path, "torque"):
-            yield Finding((*path, "torque"), "zero; at least one component other than 0 is wanted")
+            yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
         else:
             problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
             yield Finding((*path, "position"), problem)
     least, most = _on_times(facts, path)
     if least > most:
-        yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; at most {most:g} s is wanted")
+        yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; expected at most {most:g} s")
 
 
 def _torque(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
@@ -275,7 +275,7 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             if name not in thrusters:
                 yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
             elif (member := ("thrusters", thrusters[name])) in members:
-                yield Finding((*path, index), f"{shown(name)} stands twice in this channel; once is wanted")
+                yield Finding((*path, index), f"{shown(name)} is listed twice in this channel; expected once")
             else:
                 members.add(member)
         if members and len(members) == len(list(node.children())):
@@ -325,14 +325,14 @@ def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iter
             yield Finding((*path, key), f"goes with kind rotating, not {kind}; leave one of the two out", True)
         return
     if len(turning) == 2:
-        yield Finding((*path, "fixed_in"), "stands beside rate; keep one of the two", True)
+        yield Finding((*path, "fixed_in"), "given together with rate; keep one of the two", True)
     elif kind == "rotating" and not turning:
         yield Finding((*path, "rate"), "missing; give rate: … rad/s, as seen in the body, or fixed_in: inertial")
     rate = facts.number("rate", *path, "rate")
     if rate is not None and abs(rate) < SMALLEST:
         yield Finding((*path, "rate"), "zero; for a torque fixed in the body say kind: constant and leave rate out")
     if facts.text(*path, "fixed_in") == "body":
-        problem = "'body' stands where 'inertial' is wanted; for a torque fixed in the body say kind: constant"
+        problem = "expected 'inertial', got 'body'; for a torque fixed in the body say kind: constant"
         yield Finding((*path, "fixed_in"), f"{problem} and leave fixed_in out")
 
 
@@ -341,37 +341,37 @@ def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Findi
     path = (*path, "torque")
     if single is not None and kind in ("constant", "rotating"):
         cure = "; or, for a torque about axis 3 only, kind: axial" if kind == "constant" else ""
-        yield Finding(path, f"a single torque stands where three components, [M1, M2, M3], are wanted{cure}")
+        yield Finding(path, f"expected three components, [M1, M2, M3], got a single torque{cure}")
     elif single is not None and abs(single) < SMALLEST:
-        yield Finding(path, "zero; a torque other than 0 is wanted")
+        yield Finding(path, "zero; expected a torque other than 0")
     if torque is None:
         return
     size = _norm(torque)
     if size < SMALLEST:
-        yield Finding(path, "zero; at least one component other than 0 is wanted")
+        yield Finding(path, "zero; expected at least one component other than 0")
     elif kind == "axial" and _norm(torque[:2]) > CANCELLED * size:
-        problem = "transverse components stand in an axial torque; [0, 0, M3] is wanted, or kind: constant"
+        problem = "an axial torque has no transverse components; expected [0, 0, M3], or kind: constant"
         yield Finding(path, problem)
     elif kind == "rotating" and abs(torque[2]) > CANCELLED * size:
-        problem = "a rotating torque has no part about axis 3; 0 is wanted"
+        problem = "a rotating torque has no part about axis 3; expected 0"
         yield Finding((*path, 2), f"{problem}, and this part as a disturbance of its own, kind: axial")
 
 
 def _dissipation(facts: Facts) -> Iterator[Finding]:
     time_constant = facts.number("time", "dissipation", "time_constant")
     if time_constant == 0.0:
-        cure = "a time above 0 is wanted, or leave dissipation out for none"
+        cure = "expected a time above 0, or leave dissipation out for none"
         yield Finding(("dissipation", "time_constant"), f"zero; {cure}")
 
 
 def _limits(facts: Facts) -> Iterator[Finding]:
     earliest, horizon = facts.number("time", "limits", "earliest"), facts.number("time", "limits", "horizon")
     if earliest is not None and horizon is not None and earliest >= horizon > 0:
-        yield Finding(("limits", "earliest"), f"not before the horizon; less than {horizon:g} s is wanted")
+        yield Finding(("limits", "earliest"), f"not before the horizon; expected less than {horizon:g} s")
     for index, _ in facts.children("limits", "blackout"):
         window = facts.vector("time", 2, "limits", "blackout", index)
         if window is not None and window[1] < window[0]:
-            yield Finding(("limits", "blackout", index), "ends before it begins; [begin, end] is wanted")
+            yield Finding(("limits", "blackout", index), "ends before it begins; expected [begin, end]")
 
 
 def _goal(facts: Facts) -> Iterator[Finding]:
@@ -380,7 +380,7 @@ def _goal(facts: Facts) -> Iterator[Finding]:
         for pair in (("tilt", "azimuth"), ("right_ascension", "declination"))
     )
     if in_n and in_sky:
-        problem = f"stands beside {' and '.join(in_sky)}; keep tilt and azimuth, or the other pair"
+        problem = f"given together with {' and '.join(in_sky)}; keep tilt and azimuth, or the other pair"
         yield Finding(("goal", in_n[0]), problem, True)
     elif in_n == ["azimuth"]:
         yield Finding(("goal", "tilt"), "missing; azimuth alone names no direction")
@@ -392,6 +392,6 @@ def _goal(facts: Facts) -> Iterator[Finding]:
         yield Finding(("goal", in_sky[0]), problem, True)
     final, spin = facts.number("rate", "goal", "spin"), spin_of(facts)
     if final is not None and abs(final) < SMALLEST:
-        yield Finding(("goal", "spin"), "zero; a rate about axis 3 is wanted")
+        yield Finding(("goal", "spin"), "zero; expected a rate about axis 3")
     elif final is not None and spin is not None and final * spin < 0.0:
         yield Finding(("goal", "spin"), "of the other sign than the spin at t = 0; the spin cannot be reversed")

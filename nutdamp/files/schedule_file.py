@@ -89,7 +89,7 @@ class _Reader:
             if column not in self.header:
                 self._fault(1, column, f"the column is missing{self._misspelt(column)}")
         for column in {entry for entry in self.header if self.header.count(entry) > 1}:
-            self._fault(1, column, "the column stands twice")
+            self._fault(1, column, "the column is given twice")
         if self.faults:
             raise FaultyFile(self.faults)
         for column in self.header:

@@ -133,7 +133,7 @@ def decode(data: bytes, name: str) -> str:
         raise fault(0, "the text is UTF-16; save it as UTF-8")
     if b"\0" in data:
         position = data.index(b"\0")
-        raise fault(position, f"binary data (a zero byte at byte {position}); a YAML text is wanted")
+        raise fault(position, f"binary data (a zero byte at byte {position}); expected a YAML text")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -150,7 +150,7 @@ def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
     builder = _Builder(text.removeprefix("\ufeff"), name)
     root = builder.document("a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft")
     if not isinstance(root.value, dict):
-        problem = f"{shown(root.plain())} stands here; a mapping with name, inertia, … is wanted"
+        problem = f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
         raise builder.fatal(root.place, problem)
     return root, builder.faults
 
@@ -258,7 +258,7 @@ class _Builder:
         node = self.anchors.get(name)
         if node is not None:
             return node
-        problem = "stands inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
+        problem = "lies inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
         raise self.fatal(_start(event), f"alias {shown('*' + name)} {problem}", path)
 
     def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
@@ -285,7 +285,7 @@ class _Builder:
                 self.anchors[key.anchor] = Node(text, place)
             value = self.node(self.next(), (*path, text))
             if text in values:
-                problem = f"duplicate key; it stands already at {keys[text]}; remove one of them"
+                problem = f"duplicate key; already given at {keys[text]}; remove one of them"
                 self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place

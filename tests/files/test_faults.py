@@ -72,7 +72,7 @@ colour: red
 
 def test_a_fault_reads_as_one_line_with_its_place() -> None:
     assert str(faults_of(SPIN + "inertia: {A: 120 kg, C: 80}\n")[0]) == (
-        "f.yaml:3:14: inertia.A: '120 kg' is a mass; a moment of inertia is wanted: "
+        "f.yaml:3:14: inertia.A: '120 kg' is a mass; expected a moment of inertia: "
         "a number in kg m^2, or a text in kg m^2"
     )
 

@@ -153,9 +153,9 @@ def test_no_file_that_comes_along_is_doubted(path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "hint"),
     [
-        ("state: {spin: 3, nutation: 5}", "below 90 deg is wanted (read as radians; write 5 deg)"),
-        ("requirement: {nutation: 2}", "below 90 deg is wanted (read as radians; write 2 deg)"),
-        ("goal: {tilt: 30, azimuth: 0}", "below 180 deg is wanted (read as radians; write 30 deg)"),
+        ("state: {spin: 3, nutation: 5}", "below 90 deg (read as radians; write 5 deg)"),
+        ("requirement: {nutation: 2}", "below 90 deg (read as radians; write 2 deg)"),
+        ("goal: {tilt: 30, azimuth: 0}", "below 180 deg (read as radians; write 30 deg)"),
         ("goal: {right_ascension: 1, declination: -22.5}", "(read as radians; write -22.5 deg)"),
     ],
 )

@@ -112,7 +112,7 @@ def test_values_that_aliases_share_change_only_where_they_are_set() -> None:
 
 
 CASES = {
-    "limits.horizon=-3 s": "limits.horizon: '-3 s' is out of range; a time above 0",
+    "limits.horizon=-3 s": "limits.horizon: '-3 s' is out of range; expected a time above 0",
     "limits.horizn=300s": "limits.horizn: unknown key; did you mean 'horizon'?",
     "limits.earlist=300s": "limits.earlist: unknown key; did you mean 'earliest'?",
     "thrusters.T11.torque=[1, 0, 0]": "no entry of thrusters has the name 'T11'; did you mean 'T1'?",

@@ -114,9 +114,9 @@ def test_anchors_and_aliases_in_moderation() -> None:
 def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
     root, faults = read_tree("a: 1\nb: {c: 1, c: 2}\na: 3\na: 4\n", "f.yaml")
     assert [str(fault) for fault in sorted(faults, key=lambda fault: fault.line)] == [
-        "f.yaml:2:11: b.c: duplicate key; it stands already at line 2, column 5; remove one of them",
-        "f.yaml:3:1: a: duplicate key; it stands already at line 1, column 1; remove one of them",
-        "f.yaml:4:1: a: duplicate key; it stands already at line 1, column 1; remove one of them",
+        "f.yaml:2:11: b.c: duplicate key; already given at line 2, column 5; remove one of them",
+        "f.yaml:3:1: a: duplicate key; already given at line 1, column 1; remove one of them",
+        "f.yaml:4:1: a: duplicate key; already given at line 1, column 1; remove one of them",
     ]
     assert root.plain() == {"a": 1, "b": {"c": 1}}
 
@@ -127,9 +127,9 @@ def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
         ("", "f.yaml:1:1: empty; a spacecraft file is a mapping"),
         ("  \n\n", "f.yaml:1:1: empty"),
         ("# only\n# words\n", "f.yaml:1:1: only comments; a spacecraft file is a mapping"),
-        ("---\n", "f.yaml:2:1: nothing stands here; a mapping"),
-        ("5\n", "f.yaml:1:1: 5 stands here; a mapping"),
-        ("- a\n- b\n", "f.yaml:1:1: a list stands here; a mapping"),
+        ("---\n", "f.yaml:2:1: expected a mapping with name, inertia, …, got nothing"),
+        ("5\n", "f.yaml:1:1: expected a mapping with name, inertia, …, got 5"),
+        ("- a\n- b\n", "f.yaml:1:1: expected a mapping with name, inertia, …, got a list"),
         ("a: 1\n---\nb: 2\n", "f.yaml:2:1: a second document begins; one file holds one spacecraft"),
         ("a:\n\tb: 1\n", "f.yaml:2:1: not YAML: a tab indents here; use spaces"),
         ("a: b: c\n", "f.yaml:1:5: not YAML: a second ': ' in one line, or wrong indentation"),
@@ -152,7 +152,7 @@ def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
         ("a: 1\nb: \x1b[0m\n", "f.yaml:2:4: the character '\\x1b' has no place in a text"),
         ("? [1]\n: 2\n", "f.yaml:1:3: a key must be a plain text"),
         ("a: *x\n", "f.yaml:1:4: a: alias '*x' has no anchor &x above it"),
-        ("a: &x [1, *x]\n", "f.yaml:1:11: a[1]: alias '*x' stands inside the value it repeats"),
+        ("a: &x [1, *x]\n", "f.yaml:1:11: a[1]: alias '*x' lies inside the value it repeats"),
         ("a: !!python/object/apply:os.system [id]\n", "f.yaml:1:4: a: the tag '!!python/object/apply:os.system'"),
         ("a: !!python/name:os.system ''\n", "the tag '!!python/name:os.system' does not fit here; leave it out"),
         ("!!python/dict {a: 1}\n", "f.yaml:1:1: the tag '!!python/dict' does not fit here"),

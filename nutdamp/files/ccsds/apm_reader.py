@@ -91,9 +91,9 @@ def _refuse_other_versions(path: str, outside: Block, faults: list[Fault]) -> No
     if first is None or not re.fullmatch("CCSDS_[A-Z]+_VERS", first.keyword):
         raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an APM: its first line is {_VERSION} = {VERSION}")])
     if first.keyword != _VERSION:
-        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; {_VERSION} is wanted")])
+        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {_VERSION}")])
     if first.value != VERSION:
-        problem = f"version {first.value!r} is not read, its keywords are others; version {VERSION} is wanted"
+        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
         raise FaultyFile([Fault(path, first.line, 1, _VERSION, problem)])
 
 
@@ -117,7 +117,7 @@ class _Reader:
                 self._fault(block.line, f"{block.name}_START", f"unknown block; known are {known}")
                 continue
             if last and order.index(block.name) < order.index(last):
-                self._fault(block.line, block.name, f"stands after {last}; the order is {', '.join(order)}")
+                self._fault(block.line, block.name, f"comes after {last}; the order is {', '.join(order)}")
             elif self.blocks[block.name] and block.name != "MAN":
                 self._fault(block.line, block.name, "a second block of this kind; which one counts is not said")
             last = block.name
@@ -133,7 +133,7 @@ class _Reader:
         """The contents; None where faults leave none."""
         outside = self.outside
         if outside.text("TIME_SYSTEM") not in (None, "UTC"):
-            outside.fault("TIME_SYSTEM", f"{outside.text('TIME_SYSTEM')!r} stands where UTC is wanted")
+            outside.fault("TIME_SYSTEM", f"expected UTC, got {outside.text('TIME_SYSTEM')!r}")
         epoch = outside.epoch("EPOCH")
         quaternion = self._attitude()
         rates = self._rates(quaternion)
@@ -172,17 +172,17 @@ class _Reader:
             block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
             return None
         if inertial not in (*FRAMES, *SAME_AXES):
-            block.fault(keyword, f"{inertial!r} is no inertial frame known here; one of {', '.join(FRAMES)} is wanted")
+            block.fault(keyword, f"{inertial!r} is no inertial frame known here; expected one of {', '.join(FRAMES)}")
             return None
         if not forward and not reversible:
-            block.fault("REF_FRAME_A", "the body stands first; this block leads from the inertial frame to the body")
+            block.fault("REF_FRAME_A", "the body comes first; this block leads from the inertial frame to the body")
             return None
         self._body_frame(block, "REF_FRAME_B" if forward else "REF_FRAME_A", body)
         known = SAME_AXES.get(inertial, inertial)
         if known != inertial:
             self._remark(f"{inertial} is taken as {known}, whose axes are the same")
         if self.frame not in (None, known):
-            block.fault(keyword, f"{inertial!r} stands here, {self.frame!r} in another block; one frame is wanted")
+            block.fault(keyword, f"{inertial!r} here, {self.frame!r} in another block; expected one frame")
         self.frame = self.frame or known
         return forward
 
@@ -191,9 +191,9 @@ class _Reader:
         if frame is None:
             return
         if not _BODY.fullmatch(frame):
-            block.fault(keyword, f"{frame!r} is no frame fixed in the body; SC_BODY_1 is wanted")
+            block.fault(keyword, f"{frame!r} is no frame fixed in the body; expected SC_BODY_1")
         elif self.body not in (None, frame):
-            block.fault(keyword, f"{frame!r} stands here, {self.body!r} in another block; one body frame is wanted")
+            block.fault(keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame")
         else:
             self.body = frame
 
@@ -209,7 +209,7 @@ class _Reader:
         if block is not None:
             forward, parts = self._endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
             if parts is not None and not unit_length(parts, UNIT):
-                block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; 1 is wanted")
+                block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; expected 1")
             elif parts is not None and forward is not None:
                 turn = np.array(parts) / math.hypot(*parts)
         elif (block := self._one("EULER")) is not None:
@@ -251,7 +251,7 @@ class _Reader:
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
         nutating, with_momentum = block.has(_NUTATION), block.has(_MOMENTUM)
         if nutating and with_momentum:
-            block.fault("MOMENTUM_ALPHA", "stands beside NUTATION; keep one set of the two")
+            block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
         if angles is None:
             return quaternion, rates
         alpha, delta, angle, about_axis = map(math.radians, angles)
@@ -260,7 +260,7 @@ class _Reader:
         if nutating and (values := block.numbers(*_NUTATION)) is not None:
             tilt, phase = math.radians(values[0]), math.radians(values[2])
             if values[1] <= 0.0:
-                block.fault("NUTATION_PER", f"{values[1]:g} s is no period; more than 0 is wanted")
+                block.fault("NUTATION_PER", f"{values[1]:g} s is no period; expected more than 0")
                 return quaternion, rates
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
@@ -297,11 +297,11 @@ class _Reader:
             frame = block.text("MAN_REF_FRAME")
             self._body_frame(block, "MAN_REF_FRAME", frame)
             if duration is not None and duration <= 0.0:
-                block.fault("MAN_DURATION", f"{duration:g} s is no duration; more than 0 is wanted")
+                block.fault("MAN_DURATION", f"{duration:g} s is no duration; expected more than 0")
             if mass is not None and mass > 0.0:
-                block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; 0 or less is wanted")
+                block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; expected 0 or less")
             if torque is not None and not any(torque):
-                block.fault("MAN_TOR_X", "the torque is zero; at least one component other than 0 is wanted")
+                block.fault("MAN_TOR_X", "the torque is zero; expected at least one component other than 0")
             if begins is not None:
                 if epoch is not None and begins < epoch:
                     block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")

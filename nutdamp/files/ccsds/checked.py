@@ -40,11 +40,11 @@ class Checked:
                 self.faults.append(Fault(self.file, entry.line, 1, name, f"unknown keyword; {cure}"))
             elif name in self.entries:
                 first = self.entries[name].line
-                self.faults.append(Fault(self.file, entry.line, 1, name, f"stands here again, after line {first}"))
+                self.faults.append(Fault(self.file, entry.line, 1, name, f"given again, first in line {first}"))
             else:
                 self.entries[name] = entry
                 if last and order.index(name) < order.index(last):
-                    self.fault(name, f"stands after {last}; the order of the standard is {', '.join(order)}")
+                    self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
                 else:
                     last = name
                 self._form(entry, self._known[name])
@@ -52,14 +52,14 @@ class Checked:
     def _form(self, entry: Entry, keyword: Keyword) -> None:
         """Whether the value is of the kind that the table has, in its unit."""
         if not entry.value:
-            self.fault(keyword.name, "empty; a value is wanted")
+            self.fault(keyword.name, "empty; expected a value")
         elif not keyword.text and not _NUMBER.fullmatch(entry.value):
             self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
         elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
             self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
         if entry.unit and entry.unit != keyword.unit:
-            wanted = f"[{keyword.unit}] is the unit" if keyword.unit else "it has no unit"
-            self.fault(keyword.name, f"[{entry.unit}] stands here; {wanted}")
+            wanted = f"[{keyword.unit}]" if keyword.unit else "no unit"
+            self.fault(keyword.name, f"expected {wanted}, got [{entry.unit}]")
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
@@ -101,7 +101,7 @@ class Checked:
         there = [keyword for keyword in wanted if keyword in self.entries]
         if there and len(there) < len(wanted):
             absent = next(keyword for keyword in wanted if keyword not in there)
-            self.fault(there[0], f"stands without {absent}; {', '.join(wanted)} go together")
+            self.fault(there[0], f"given without {absent}; {', '.join(wanted)} go together")
             return False
         return bool(there)
 

@@ -130,17 +130,17 @@ class _Reader:
         self._depth = 0
 
     def _doctype(self, *_: object) -> None:
-        raise _Foreign("a document type stands in the file; a message has none")
+        raise _Foreign("the file has a document type; a message has none")
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         line = self.parser.CurrentLineNumber
         self._depth += 1
         if self._depth == 1:
             if tag != "apm":
-                raise _Foreign(f"<{tag}> stands where <apm> is wanted")
+                raise _Foreign(f"expected <apm>, got <{tag}>")
             self.outside.append(Entry("CCSDS_APM_VERS", attributes.get("version", ""), "", line))
         elif self._open is not None:
-            self.faults.append(Fault(self.name, line, 1, tag, f"stands within {self._open[0]}, which holds a value"))
+            self.faults.append(Fault(self.name, line, 1, tag, f"lies within {self._open[0]}, which holds a value"))
         elif tag in _TAGS and self._block is None:
             self._block, self._entries = (_TAGS[tag], line), []
         elif tag.upper() == tag:

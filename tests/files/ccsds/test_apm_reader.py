@@ -245,14 +245,14 @@ BROKEN = [
     ("EPOCH = 2026-03-01T12:00:00.5\n", "", "1:1: EPOCH: missing"),
     ("EPOCH = 2026-03-01T12:00:00.5", "EPOCH = noon", "EPOCH: 'noon' is no epoch"),
     ("EPOCH = 2026-03-01T12:00:00.5", "EPOCH =", "EPOCH: empty"),
-    ("TIME_SYSTEM = UTC", "TIME_SYSTEM = TAI", "'TAI' stands where UTC is wanted"),
+    ("TIME_SYSTEM = UTC", "TIME_SYSTEM = TAI", "expected UTC, got 'TAI'"),
     ("OBJECT_ID = 2026-031A\n", "", "OBJECT_ID: missing"),
     ("OBJECT_ID = 2026-031A", "OBJECT_IDENT = 2026-031A", "OBJECT_IDENT: unknown keyword; did you mean OBJECT_ID?"),
-    ("ORIGINATOR = TEST", "ORIGINATOR = TEST\nORIGINATOR = TEST", "ORIGINATOR: stands here again, after line 3"),
+    ("ORIGINATOR = TEST", "ORIGINATOR = TEST\nORIGINATOR = TEST", "ORIGINATOR: given again, first in line 3"),
     (
         "ORIGINATOR = TEST\n\nOBJECT_NAME = SPINNER",
         "OBJECT_NAME = SPINNER\n\nORIGINATOR = TEST",
-        "stands after OBJECT_NAME",
+        "comes after OBJECT_NAME",
     ),
     ("EPOCH = 2026", "META_START\nMETA_STOP\nEPOCH = 2026", "META_START: unknown block"),
     ("Q2 = 0.6\n", "", "Q2: missing in this QUAT block"),
@@ -260,24 +260,24 @@ BROKEN = [
     ("Q2 = 0.6", "Q2 = 0,6", "'0,6' is not a number"),
     ("Q2 = 0.6", "Q2 = nan", "'nan' is not a number"),
     ("Q2 = 0.6", "Q2 = 1e999", "beyond anything physical"),
-    ("Q1 = 0.0\nQ2 = 0.6", "Q2 = 0.6\nQ1 = 0.0", "Q1: stands after Q2; the order of the standard is"),
+    ("Q1 = 0.0\nQ2 = 0.6", "Q2 = 0.6\nQ1 = 0.0", "Q1: comes after Q2; the order of the standard is"),
     (
         "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nQ1",
         "REF_FRAME_A = TOD\nREF_FRAME_B = SC_BODY_1\nQ1",
         "'TOD' is no inertial frame",
     ),
     ("REF_FRAME_B = SC_BODY_1\nQ1", "REF_FRAME_B = GCRF\nQ1", "one of the two frames must be the body"),
-    ("REF_FRAME_B = SC_BODY_1\nQ1", "REF_FRAME_B = SC_BODY_2\nQ1", "one body frame is wanted"),
+    ("REF_FRAME_B = SC_BODY_1\nQ1", "REF_FRAME_B = SC_BODY_2\nQ1", "expected one body frame"),
     (
         "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nQ1",
         "REF_FRAME_A = GCRF\nREF_FRAME_B = SC_BODY_1\nQ1",
-        "one frame is wanted",
+        "expected one frame",
     ),
     ("QUAT_STOP\n", "", "QUAT_STOP is missing before it"),
-    ("QUAT_STOP", "ANGVEL_STOP", "ANGVEL_STOP: QUAT_STOP is wanted"),
+    ("QUAT_STOP", "ANGVEL_STOP", "ANGVEL_STOP: expected QUAT_STOP"),
     ("QUAT_START\n", "", "QUAT_STOP: no block is open"),
-    ("ANGVEL_X = 8 [deg/s]", "ANGVEL_X = 8 [rad/s]", "[rad/s] stands here; [deg/s] is the unit"),
-    ("Q2 = 0.6", "Q2 = 0.6 [deg]", "[deg] stands here; it has no unit"),
+    ("ANGVEL_X = 8 [deg/s]", "ANGVEL_X = 8 [rad/s]", "expected [deg/s], got [rad/s]"),
+    ("Q2 = 0.6", "Q2 = 0.6 [deg]", "expected no unit, got [deg]"),
     ("ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = GCRF", "'GCRF' is neither REF_FRAME_A nor REF_FRAME_B"),
     ("INERTIA_REF_FRAME = SC_BODY_1", "INERTIA_REF_FRAME = EME2000", "'EME2000' is no frame fixed in the body"),
     ("MAN_REF_FRAME = SC_BODY_1", "MAN_REF_FRAME = EME2000", "'EME2000' is no frame fixed in the body"),
@@ -311,13 +311,13 @@ def test_blocks_missing_repeated_and_out_of_order(folder: Path) -> None:
     )
     moved = angvel[0] + "QUAT_START"
     found = faults(without("ANGVEL").replace("QUAT_START", moved), folder)
-    assert "QUAT: stands after ANGVEL" in found[0]
+    assert "QUAT: comes after ANGVEL" in found[0]
 
 
 def test_spin_blocks_that_cannot_be(folder: Path) -> None:
     text = without("QUAT", without("ANGVEL")).replace("INERTIA_START", SPIN.strip() + "\n\nINERTIA_START")
     for old, new, problem in (
-        ("MOMENTUM_DELTA = 70\n", "", "MOMENTUM_ALPHA: stands without MOMENTUM_DELTA"),
+        ("MOMENTUM_DELTA = 70\n", "", "MOMENTUM_ALPHA: given without MOMENTUM_DELTA"),
         (
             "MOMENTUM_ALPHA = 0",
             "NUTATION = 1\nNUTATION_PER = 2\nNUTATION_PHASE = 3\nMOMENTUM_ALPHA = 0",
@@ -326,7 +326,7 @@ def test_spin_blocks_that_cannot_be(folder: Path) -> None:
         (
             "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1",
             "REF_FRAME_A = SC_BODY_1\nREF_FRAME_B = EME2000",
-            "the body stands first",
+            "the body comes first",
         ),
         (
             "MOMENTUM_ALPHA = 0\nMOMENTUM_DELTA = 70\nNUTATION_VEL = 0.01",
@@ -354,12 +354,12 @@ def test_all_faults_at_once_with_their_lines(folder: Path) -> None:
     [
         ("", "not an APM"),
         ("hello\n", "not an APM"),
-        ("CCSDS_AEM_VERS = 2.0\n", "another message; CCSDS_APM_VERS is wanted"),
+        ("CCSDS_AEM_VERS = 2.0\n", "another message; expected CCSDS_APM_VERS"),
         ("CCSDS_APM_VERS = 1.0\nQ_FRAME_A = X\n", "version '1.0' is not read"),
         ("<apm id='CCSDS_APM_VERS' version='1.0'></apm>", "version '1.0' is not read"),
-        ("<aem id='CCSDS_AEM_VERS' version='2.0'></aem>", "<aem> stands where <apm> is wanted"),
+        ("<aem id='CCSDS_AEM_VERS' version='2.0'></aem>", "expected <apm>, got <aem>"),
         ("<apm", "not XML"),
-        ("<!DOCTYPE apm [<!ENTITY a 'b'>]><apm version='2.0'>&a;</apm>", "a document type stands in the file"),
+        ("<!DOCTYPE apm [<!ENTITY a 'b'>]><apm version='2.0'>&a;</apm>", "the file has a document type"),
     ],
 )
 def test_what_is_no_such_message(folder: Path, text: str, problem: str) -> None:
@@ -370,7 +370,7 @@ def test_faults_of_xml_have_lines_too(folder: Path) -> None:
     text = export_text(messages.planned("prolate"), "apm", xml=True)
     for old, new, problem in (
         ("<Q1>", "<Q9>", "Q9: unknown keyword"),
-        ('<MAN_DURATION units="s">', '<MAN_DURATION units="ms">', "[ms] stands here; [s] is the unit"),
+        ('<MAN_DURATION units="s">', '<MAN_DURATION units="ms">', "expected [s], got [ms]"),
         ("<spin>", "<spinning>", "spinning: unknown tag"),
     ):
         place = next(number for number, line in enumerate(text.splitlines(), start=1) if old in line)
