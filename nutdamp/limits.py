@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -212,33 +212,47 @@ def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
 
 
 def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
-    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all."""
+    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all.
+
+    Each limit is named once, with the first pulse that breaks it and the number of others that do.
+    """
+    broken: dict[str, list[str]] = {}
+    for limit, text in _breaches(spacecraft, made):
+        broken.setdefault(limit, []).append(text)
+    most = spacecraft.limits.max_pulses
+    if most is not None and len(made) > most:
+        broken["max_pulses"] = [f"{len(made)} pulses are more than {most}"]
+    return [first + _likewise(len(others)) for first, *others in broken.values()]
+
+
+def _likewise(others: int) -> str:
+    return f"; likewise {others} more pulse{'s' * (others > 1)}" if others else ""
+
+
+def _breaches(spacecraft: Spacecraft, made: Schedule) -> Iterator[tuple[str, str]]:
+    """Each limit that a pulse breaks, and how, in words."""
     limits, horizon = spacecraft.limits, spacecraft.horizon
     channels = {channel.name: channel for channel in spacecraft.channels}
-    broken: list[str] = []
     previous_end = -math.inf
     for number, pulse in enumerate(made, start=1):
         slack = touching(pulse.end)
         name = f"pulse {number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s)"
         if not pulse.resolved:
-            broken.append(f"{name} is too short for its time, where times are {math.ulp(pulse.end):.2g} s apart")
+            yield "resolution", f"{name} is too short for its time, where times are {math.ulp(pulse.end):.2g} s apart"
         if pulse.start < min(limits.earliest, 0.0) - slack or pulse.start < limits.earliest - slack:
-            broken.append(f"{name} starts before {limits.earliest:.6g} s")
+            yield "earliest", f"{name} starts before {limits.earliest:.6g} s"
         if pulse.end > horizon + slack:
-            broken.append(f"{name} ends after the horizon of {horizon:.6g} s")
+            yield "horizon", f"{name} ends after the horizon of {horizon:.6g} s"
         if pulse.start < previous_end + limits.gap - slack:
-            broken.append(f"{name} comes less than {limits.gap:.6g} s after the one before")
+            yield "gap", f"{name} comes less than {limits.gap:.6g} s after the one before"
         for begins, ends in limits.blackout:
             if pulse.start < ends - slack and pulse.end > begins + slack:
-                broken.append(f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s")
+                yield f"blackout {begins}", f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s"
         channel = channels.get(pulse.channel)
         if channel is not None and not (channel.min_on_time - slack <= pulse.on_time <= channel.max_on_time + slack):
-            broken.append(f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows")
+            yield "on-time", f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows"
         if limits.tick is not None:
             for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
                 if abs(value - round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick:
-                    broken.append(f"{name} {what} off the ticks of {limits.tick:.6g} s")
+                    yield what, f"{name} {what} off the ticks of {limits.tick:.6g} s"
         previous_end = max(previous_end, pulse.end)
-    if limits.max_pulses is not None and len(made) > limits.max_pulses:
-        broken.append(f"{len(made)} pulses are more than {limits.max_pulses}")
-    return broken

@@ -171,7 +171,20 @@ def test_broken_limits_are_named(pulses: list[tuple[float, float]], complaint: s
 
 def test_every_broken_limit_is_named() -> None:
     body = spinner(channels=cross(20.0, min_on_time=0.2, max_on_time=2.0), limits=TIGHT)
-    assert len(broken_limits(body, fired((0.5, 0.1), (0.8, 0.5), (6.5, 0.2), (25.0, 9.0)))) >= 7
+    assert broken_limits(body, fired((0.5, 0.1), (0.8, 0.5), (6.5, 0.2), (25.0, 9.0))) == [
+        "pulse 1 (+1, 0.45 s to 0.55 s) starts before 1 s; likewise 1 more pulse",
+        "pulse 1 (+1, 0.45 s to 0.55 s) is on for 0.1 s, outside what the channel allows; likewise 1 more pulse",
+        "pulse 2 (+1, 0.55 s to 1.05 s) comes less than 0.5 s after the one before",
+        "pulse 3 (+1, 6.4 s to 6.6 s) lies in the blackout window 6 s to 7 s",
+        "pulse 4 (+1, 20.5 s to 29.5 s) ends after the horizon of 20 s",
+        "4 pulses are more than 3",
+    ]
+
+
+def test_a_limit_that_many_pulses_break_is_named_once() -> None:
+    body = spinner(channels=cross(20.0), limits=Limits(horizon=20.0))
+    found = broken_limits(body, fired(*((21.0 + number, 0.5) for number in range(222))))
+    assert found == ["pulse 1 (+1, 20.75 s to 21.25 s) ends after the horizon of 20 s; likewise 221 more pulses"]
 
 
 # --- figures of a plan -----------------------------------------------------------------------------------------------

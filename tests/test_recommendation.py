@@ -326,7 +326,7 @@ def test_the_warning_says_how_far_the_pulses_come() -> None:
     assert "damping takes 21 N m s" in text
     assert f"The last one ends at {made.pulses.end:.3f} s of a horizon of 30 s." in text
     assert made.hindrance.binding == ("max_on_time", "limits.horizon")
-    assert any("four-pulse is held by max_on_time and limits.horizon" in remark for remark in remarks(made))
+    assert any("four-pulse is limited by max_on_time and limits.horizon" in remark for remark in remarks(made))
 
 
 def test_pulses_that_may_not_be_shorter_are_named() -> None:
@@ -334,7 +334,7 @@ def test_pulses_that_may_not_be_shorter_are_named() -> None:
     compared = compare(body, ("two-pulse",))
     (made,) = compared.plans
     assert made.hindrance.binding == ("min_on_time",)
-    assert any("two-pulse is held by min_on_time" in remark for remark in remarks(made))
+    assert any("two-pulse is limited by min_on_time" in remark for remark in remarks(made))
     assert "and min_on_time allows no shorter ones; damping takes 21 N m s." in verdicts.warnings(compared)[0]
 
 

@@ -23,8 +23,10 @@ from nutdamp.schemes import NAMES, Options
 
 @click.command("animate", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to show; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Show the pulses of a CSV file: start_s, on_time_s, channel.")
+@click.option(
+    "--scheme", type=click.Choice(NAMES), help="Show this scheme with default options; without it the recommended one."
+)
+@click.option("--schedule", type=FILE, help="Show the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")

@@ -47,8 +47,12 @@ SAVED_EVERY = 30.0
 
 @click.command("disperse", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to disperse; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file: start_s, on_time_s, channel.")
+@click.option(
+    "--scheme",
+    type=click.Choice(NAMES),
+    help="Disperse this scheme with default options; without it the recommended one.",
+)
+@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
 @click.option(

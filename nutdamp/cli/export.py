@@ -35,8 +35,12 @@ from nutdamp.schemes import NAMES, Options
     "script that flies the schedule; json: as `plan --json`.",
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
-@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to export; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file: start_s, on_time_s, channel.")
+@click.option(
+    "--scheme",
+    type=click.Choice(NAMES),
+    help="Export this scheme with default options; without it the recommended one.",
+)
+@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")

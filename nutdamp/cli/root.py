@@ -53,8 +53,8 @@ class Commands(click.Group):
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
-        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 nothing that was asked "
-        "for is feasible; 4 no feasible plan meets the requirement; 130 interrupted; 143 terminated."
+        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 none of the "
+        "schemes is feasible; 4 no feasible plan meets the requirement; 130 interrupted; 143 terminated."
     ),
 )
 @click.version_option(__version__, prog_name="nutdamp")

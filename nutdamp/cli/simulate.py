@@ -34,8 +34,12 @@ PICTURED = 100_000
 
 @click.command("simulate", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", type=click.Choice(NAMES), help="Plan and propagate this scheme; none is free motion.")
-@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file: start_s, on_time_s, channel.")
+@click.option(
+    "--scheme",
+    type=click.Choice(NAMES),
+    help="Plan this scheme with default options and propagate it; none is free motion.",
+)
+@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(

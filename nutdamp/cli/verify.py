@@ -31,8 +31,12 @@ if TYPE_CHECKING:
 
 @click.command("verify", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", type=click.Choice(NAMES), help="The scheme to verify; default the recommended one.")
-@click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file: start_s, on_time_s, channel.")
+@click.option(
+    "--scheme",
+    type=click.Choice(NAMES),
+    help="Verify this scheme with default options; without it the recommended one.",
+)
+@click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option

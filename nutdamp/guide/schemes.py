@@ -27,7 +27,7 @@ def _scheme(
             Part("How it works", how),
             Part("Equation", (Formula(formula), meaning)),
             Part("When to use it", (use,)),
-            Part("Options", (Rows((*options, _DISTURBED)),)),
+            Part("Options of nutdamp plan", (Rows((*options, _DISTURBED)),)),
             Part("Limits", limits),
             Part("See also", (see,)),
         ),

@@ -263,7 +263,7 @@ def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tup
         f"ideal impulses would cost {candidate.factor:.3f} × A|ω0|"
     )
     if candidate.short > 1e-9:
-        text += f"; {100 * candidate.short:.2g} % of the impulse is more than two pulses can give"
+        text += f"; the allowed on-times miss the impulse needed by {100 * candidate.short:.2g} %"
     return (text,)
 
 

@@ -21,6 +21,7 @@ from nutdamp.report.figures import style
 from nutdamp.report.page.content import Repeat, report_page
 from nutdamp.report.page.html import number_in, page_html
 from nutdamp.report.page.markdown import page_markdown
+from nutdamp.report.page.sheets import spacecraft_facts
 from nutdamp.schemes import CLASSIC
 
 PAGE = Path(__file__).parents[2] / "nutdamp" / "report" / "page"
@@ -153,6 +154,12 @@ def test_the_comparison_says_what_the_json_says(example: str) -> None:
         assert row[heads.index("requirement")].text == verdict
     marks = [row.attributes.get("class") for row in parsed(example).all("tr")]
     assert marks.count("mark") == 1
+
+
+def test_the_requirement_is_given_once() -> None:
+    names = [name for name, _ in spacecraft_facts(read_spacecraft(built_in_example_text(), "example")).rows]
+    assert names.count("requirement") == 1
+    assert names[-1] == "horizon"
 
 
 def test_the_schedule_is_the_recommended_one(example: str) -> None:

@@ -17,14 +17,12 @@ from nutdamp.spacecraft import Spacecraft
 
 
 def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
-    """The spacecraft at t = 0, what is asked of its plans, and what they must keep."""
-    return facts_of(title, derived_table(spacecraft, _asked(spacecraft)))
+    """The spacecraft at t = 0, its requirement, and the limits of its plans."""
+    return facts_of(title, derived_table(spacecraft, _limits(spacecraft)))
 
 
-def _asked(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     limits = spacecraft.limits
-    if compliance.required(spacecraft):
-        yield "requirement", verdicts.required(spacecraft)
     yield "horizon", duration(spacecraft.horizon)
     kept = []
     if limits.earliest > 0.0:

@@ -167,7 +167,10 @@ def test_frames_and_epochs_that_no_format_knows_are_refused() -> None:
     plan = messages.planned("prolate")
     assert plan.spacecraft.attitude is not None
     for attitude, problem in (
-        (replace(plan.spacecraft.attitude, frame="TEME"), "'TEME' is no frame that the format knows; expected one of EME2000"),
+        (
+            replace(plan.spacecraft.attitude, frame="TEME"),
+            "'TEME' is no frame that the format knows; expected one of",
+        ),
         (replace(plan.spacecraft.attitude, epoch="1969-07-20T20:17:40Z"), "before 1972"),
     ):
         with pytest.raises(BadRequest, match=problem):
