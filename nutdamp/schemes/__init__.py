@@ -55,9 +55,9 @@ def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
 def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:
     """Pulses of the scheme ``name``, disturbances and all.
 
-    The scheme plans on the symmetric, undisturbed `symmetric_model` of the spacecraft; where that is not exact, the last pulse
-    (the last four of schemes that keep or turn H) is trimmed on the true motion. Raises Infeasible with the reason
-    where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
+    The scheme plans on the symmetric, undisturbed `symmetric_model` of the spacecraft; where that is not exact, the
+    last pulse (the last four of schemes that keep or turn H) is trimmed on the true motion. Raises Infeasible with the
+    reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
     """
     from nutdamp.schemes.tools.symmetric_model import model_of
 

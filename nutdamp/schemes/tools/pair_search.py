@@ -1,8 +1,9 @@
 """Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
 
-A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone says how
-large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis comes
-there; the moments are kept at which the second channel then stands the right way. Both are trimmed on the real widths.
+A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
+says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
+comes there; the moments are kept at which the second channel then stands the right way. Both are trimmed on the real
+widths.
 """
 
 from __future__ import annotations
