@@ -282,6 +282,13 @@ def test_a_plan_that_keeps_h_for_little_more_is_mentioned() -> None:
     )
 
 
+def test_of_plans_that_keep_h_for_little_more_the_cheapest_is_mentioned() -> None:
+    best = judged("best", 0.0, shift=1.0, propellant=0.1)
+    dear, cheap = (judged(name, 0.0, shift=0.1, propellant=cost) for name, cost in (("dear", 0.108), ("cheap", 0.105)))
+    for plans in ((best, dear, cheap), (best, cheap, dear)):
+        assert recommend(plans).steadier is cheap
+
+
 def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:
     cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
     assert recommend([cheap, judged("idle", 4.0, shift=0.0, propellant=12.5)]).steadier is None
@@ -415,6 +422,13 @@ def test_ticks_explain_what_is_left_up_to_a_tenth(
     assert found.binding == binding
 
 
+def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
+    body = spinner(channels=cross(8.0, min_on_time=0.1))
+    for on_time, binding in ((0.1, ("min_on_time",)), (0.11, ())):
+        made = Schedule((channel_pulse(body.channels[0], 1.0, 0.5), channel_pulse(body.channels[1], 3.0, on_time)))
+        assert Hindrance(body, made, aware=False, nutation=0.01).binding == binding
+
+
 def test_a_scheme_that_was_not_compared_is_named_where_it_may_help() -> None:
     far = judged("far", 1e-12, shift=3.5, impulse=20.0, asked=BOTH)
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
@@ -511,6 +525,7 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert growing.growth > 0.0
     assert compliance.unaided(growing)
     assert not compliance.unaided(replace(growing, limits=Limits(horizon=21.0)))
+    assert not compliance.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
     assert "up to the horizon of 20 s too" in (verdicts.needless(compare(growing, ("four-pulse",))) or "")
     assert not compliance.unaided(replace(calm, disturbances=(Disturbance(0.5 + 0j),)))
 

@@ -7,12 +7,13 @@ import math
 
 import numpy as np
 import pytest
-from builders import fan, spinner
+from builders import channel, fan, spinner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp.limits import SLACK, Windows, for_pairs
-from nutdamp.spacecraft import Limits
+from nutdamp.limits import SLACK, Windows, commandable, for_pairs, longest_on_time, rooms
+from nutdamp.schedule import channel_pulse, steerable_pulse
+from nutdamp.spacecraft import Limits, Steerable
 
 
 def windows(**limits: object) -> Windows:
@@ -120,3 +121,39 @@ def test_of_very_many_channels_pairs_are_made_of_the_cheapest_about_each_directi
     assert max(np.diff(turns)) < 2 * math.tau / 24
     few = spinner(channels=fan(9, 5.0))
     assert for_pairs(few) == list(few.channels)
+
+
+def test_a_pulse_across_the_spin_axis_is_useful_for_half_a_nutation_period() -> None:
+    """π/|aω3| with a = 1/3 and ω3 = 3 rad/s; about the spin axis only max_on_time bounds it."""
+    body = spinner()
+    across, along = (8.0, 0.0, 0.0), (0.0, 0.0, 8.0)
+    assert longest_on_time(body, channel("T", *across)) == pytest.approx(math.pi, rel=1e-12)
+    assert longest_on_time(body, channel("T", *across, max_on_time=2.0)) == 2.0
+    assert longest_on_time(body, channel("T", *along)) == math.inf
+    assert longest_on_time(body, channel("T", *along, max_on_time=9.0)) == 9.0
+
+
+def test_pulses_of_a_torquer_are_put_on_ticks_with_the_impulse_of_their_on_time() -> None:
+    body = spinner(limits=Limits(tick=0.1))
+    ideal = commandable(body, steerable_pulse(Steerable(), 0.33, 0.4, impulse=3.0))
+    assert ideal.on_time == 0.0
+    assert ideal.t == pytest.approx(0.3)
+    assert ideal.magnitude == pytest.approx(3.0)
+    torquer = Steerable(20.0, 220.0, 0.8)
+    exact = steerable_pulse(torquer, 1.02, 0.4, on_time=0.26)
+    wide = commandable(body, exact)
+    assert wide.start == pytest.approx(0.9)
+    assert wide.on_time == pytest.approx(0.3)
+    assert wide.magnitude == pytest.approx(20.0 * 0.3)
+    assert exact.propellant is not None
+    assert wide.propellant == pytest.approx(exact.propellant * 0.3 / 0.26)
+
+
+def test_two_pulses_share_the_time_between_them_but_for_the_gap() -> None:
+    """Pulses from 10 to 11 s and from 20 to 22 s: 8 of the 9 s between them are shared, 1 s is the gap."""
+    body = spinner(limits=Limits(horizon=100.0, earliest=0.5, gap=1.0, blackout=((2.0, 3.0), (30.0, 40.0))))
+    thruster = channel("T", 8.0, 0.0, 0.0)
+    pulses = (channel_pulse(thruster, 10.5, 1.0), channel_pulse(thruster, 21.0, 2.0))
+    assert rooms(body, pulses) == [(3.0, pytest.approx(15.0)), (pytest.approx(16.0), 30.0)]
+    alone = spinner(limits=Limits(horizon=100.0, earliest=0.5))
+    assert rooms(alone, pulses[:1]) == [(0.5, 100.0)]
