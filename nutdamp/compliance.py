@@ -112,10 +112,14 @@ def unaided(spacecraft: Spacecraft) -> bool:
     """
     if spacecraft.disturbances:
         return False
-    grown = min(max(spacecraft.growth, 0.0) * spacecraft.horizon, 700.0)
-    nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(grown))
+    change = min(spacecraft.growth * spacecraft.horizon, 700.0)
+    nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(change))
     aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
-    return all(one.met for one in held(spacecraft, Left(nutation, aim, spacecraft.spin)))
+    # H stays, and C ω3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
+    faster = math.cos(nutation) / math.cos(spacecraft.nutation)
+    most = max(nutation, spacecraft.nutation)
+    ends = [Left(most, aim, spin) for spin in (spacecraft.spin, spacecraft.spin * faster)]
+    return all(one.met for left in ends for one in held(spacecraft, left))
 
 
 def severity(spacecraft: Spacecraft, left: Left) -> Any:

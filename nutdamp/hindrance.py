@@ -61,6 +61,11 @@ class Hindrance:
         return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(limits.blackout)
 
     @property
+    def evident(self) -> bool:
+        """Whether the schedule itself shows that a limit ends it; windows and ticks alone do not."""
+        return self.full or self.to_the_end or self.shortest
+
+    @property
     def full(self) -> bool:
         """Whether every pulse is as long as its channel may be on; never where nothing says how long that is."""
         longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}

@@ -51,12 +51,13 @@ def _remainder(plan: Plan) -> Iterator[str]:
     if left < TELLING or plan.options.uncorrected:
         return
     found = plan.hindrance
+    limited = "is limited by" if found.evident else "may be limited by"
     reason = {
         Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
         Obstacle.STEADY_TILT: f"{math.degrees(found.steady_tilt):.3g}° is the steady tilt under the disturbances",
         Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} ends it",
         Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
-        Obstacle.LIMITS: f"{plan.scheme} is limited by {' and '.join(found.binding)}",
+        Obstacle.LIMITS: f"{plan.scheme} {limited} {' and '.join(found.binding)}",
         Obstacle.SCHEME: f"with these channels {plan.scheme} takes out no more",
     }[found.obstacle]
     yield f"{_degrees(left)} of nutation remain: {reason}"

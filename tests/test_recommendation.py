@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import reference
 from builders import aimed, channel, cross, judged, off_target, spinner
 from cases_dir import case
 
@@ -345,6 +346,15 @@ def test_pulses_that_may_not_be_shorter_are_named() -> None:
     assert "and min_on_time allows no shorter ones; damping takes 21 N m s." in verdicts.warnings(compared)[0]
 
 
+def test_a_limit_that_may_not_be_what_ends_it_is_no_more_than_suspected() -> None:
+    """In a sphere one channel takes out what it opposes of the nutation, whatever the ticks."""
+    body = spinner(100.0, 100.0, channels=(channel("T", 5.0, 5.0, 0.0),), limits=Limits(tick=1e-3))
+    body = replace(body, omega0=np.array([-0.2, 0.1, 3.0]))
+    made = planning.plan(body, "four-pulse")
+    assert not made.hindrance.evident
+    assert any("four-pulse may be limited by limits.tick" in remark for remark in remarks(made))
+
+
 def test_where_nothing_is_feasible_what_was_not_compared_is_named() -> None:
     body = spinner(channels=cross(8.0), limits=Limits(horizon=0.01))
     assert verdicts.reason(compare(body, schemes.CLASSIC)).endswith("feasible; --scheme optimal was not compared")
@@ -528,6 +538,22 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert not compliance.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
     assert "up to the horizon of 20 s too" in (verdicts.needless(compare(growing, ("four-pulse",))) or "")
     assert not compliance.unaided(replace(calm, disturbances=(Disturbance(0.5 + 0j),)))
+
+
+@pytest.mark.parametrize(("A", "C", "degrees", "horizon", "kept"), [(120, 80, 2, 60, False), (120, 80, 2, 2, True)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_spin_that_dissipation_changes_counts(
+    A: float, C: float, degrees: float, horizon: float, kept: bool, turned: bool
+) -> None:
+    """H stays, so the spin falls with cos θ: by the reference integrator too, for either shape."""
+    if turned:
+        A, C, degrees = C, A, 10 * degrees
+        kept = False
+    body = spinner(A, C, degrees=degrees, requirement=Requirement(nutation=math.radians(30)))
+    body = replace(body, dissipation=30.0, goal=Goal(spin=3.0), limits=Limits(horizon=horizon))
+    ended = reference.fly(body.inertia.moments, body.omega0, [], horizon, growth=body.growth)
+    assert (abs(ended.rates[2] - 3.0) <= 3e-3) == kept
+    assert compliance.unaided(body) == kept
 
 
 # --- rounding does not decide ----------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from builders import Outcome, aimed, cross, fan, off_target, spinner
+from builders import Outcome, aimed, channel, cross, fan, off_target, spinner
 from checker import violations
 
 from nutdamp import planning
@@ -113,3 +113,21 @@ def test_limits() -> None:
 def test_without_a_target_it_says_so() -> None:
     for scheme in ("half-cone", "rhumb-line"):
         assert planning.plan(spinner(), scheme).why == "needs a target axis: --target, or goal in the file"
+
+
+def test_no_time_left_is_not_told_as_a_negative_time() -> None:
+    """What takes the nutation out first ends so late that the gap reaches past the horizon."""
+    body = spinner(
+        2.373744652338654,
+        2.6800748046618628,
+        -0.462832262592392,
+        0.05,
+        0.3283535213204525,
+        channels=(
+            channel("T0", -0.0002798774275361531, -9.312022413487486e-05, 0.0, min_on_time=0.12),
+            channel("T1", 0.0002781184471714144, 9.824907088693092e-05, 0.0),
+        ),
+        limits=Limits(horizon=8.41668748101266, gap=0.6011919629294757),
+    )
+    why = planning.plan(aimed(body, 0.05, 197.04), "half-cone").why
+    assert why == "the pulses before leave no time within limits.horizon"

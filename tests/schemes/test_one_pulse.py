@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+from dataclasses import replace
 
 import pytest
 from builders import Outcome, channel, cross, fan, spinner, transverse
@@ -229,3 +231,16 @@ def test_one_pulse_allowed_where_more_are_needed_does_what_one_can(phase: float,
 def test_earliest_beyond_the_default_horizon_is_infeasible(steerable: Steerable | None) -> None:
     limits = Limits(earliest=1e6)
     assert infeasible(spinner(channels=cross(20.0), steerable=steerable, limits=limits))
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
+@pytest.mark.parametrize("torque", [3.0, 30.0, 300.0])
+@pytest.mark.parametrize("min_on_time", [0.0, 0.02])
+def test_the_horizon_that_is_named_is_long_enough(scheme: str, torque: float, min_on_time: float) -> None:
+    """What ends there is the pulse that it takes, not the shortest that there is."""
+    body = spinner(degrees=5.0, channels=(channel("T", torque, 0.0, 0.0, min_on_time=min_on_time),))
+    short = planning.plan(replace(body, limits=Limits(horizon=0.3)), scheme)
+    found = re.search(r"would end at (\S+) s: set limits.horizon beyond that", short.why or "")
+    assert found is not None, short.why
+    longer = planning.plan(replace(body, limits=Limits(horizon=float(found[1]) * (1.0 + 1e-5))), scheme)
+    assert longer.feasible, longer.why

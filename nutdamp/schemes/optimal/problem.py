@@ -181,7 +181,10 @@ class Problem:
                 needed = self.least_horizon(0.5 * later, later, NAMED)
                 shifts = self.equations.shift and body.transverse_rate > 0.0
                 more = ", or use --free-axis" if shifts else ""
-                return f"set limits.horizon to {needed:.4g} s or later ({needed - horizon:.3g} s more){more}"
+                return (
+                    f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
+                    f"without other limits){more}"
+                )
         if body.limits.blackout:
             free = replace(body, limits=replace(body.limits, blackout=()))
             if self.program(free).solve().unmet <= UNMET:

@@ -300,7 +300,7 @@ class Train:
     def _too_few(self, needed: int, moments: int) -> str:
         most = self.here.limits.max_pulses
         if most is not None and most < needed:
-            return f"a train to the target takes {needed} pulses at least, and limits.max_pulses allows {most}"
+            return f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
         if needed <= moments:
             return "the shortest pulses turn H beyond the target in so many; lower min_on_time, or take two-pulse"
         turns = needed / self.options.per_turn * self.turn

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 
+from nutdamp.schedule import Pulse
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Channel, Spacecraft
 
@@ -17,6 +18,8 @@ def no_channels(spacecraft: Spacecraft) -> str:
     if any(channel.damps for channel in spacecraft.channels):
         ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
         time = spacecraft.horizon - spacecraft.limits.earliest
+        if time <= 0.0:  # where other pulses of the scheme come first
+            return "the pulses before leave no time within limits.horizon"
         return (
             f"no channel can be on for as long as its min_on_time asks{ticks}, at most for its max_on_time, within the "
             f"{time:.4g} s from limits.earliest to limits.horizon"
@@ -61,7 +64,8 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
         return "no channel ever opposes the nutation" + (
             ": dissipation brings the body into flat spin before, where ω stands still in it" if builder.growing else ""
         )
-    ends = [pulse.end for pulse in there if builder.helps(pulse)]
+    by_name = {channel.name: channel for channel in channels}
+    ends = [_end(builder, by_name[pulse.channel], pulse) for pulse in there if builder.helps(pulse)]
     if not ends:
         best = min(there, key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
@@ -80,3 +84,11 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
     """By how many degrees an ``impulse`` across the spin axis, N m s, turns H; of A|ω|, the nutation."""
     return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"
+
+
+def _end(builder: ImpulseBuilder, channel: Channel, shortest: Pulse) -> float:
+    """End in s of the first pulse of a channel that is as long as it takes; of the ``shortest`` where none has room."""
+    needed = builder.on_time_for(channel, builder.left)
+    most = min(channel.max_on_time, 0.5 * builder.period)
+    pulse = builder.align(channel, most if needed is None else min(needed, most))
+    return shortest.end if pulse is None else max(pulse.end, shortest.end)
