@@ -106,11 +106,12 @@ def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
 
 
 def unaided(spacecraft: Spacecraft) -> bool:
-    """Whether the body keeps all `bounds` up to the horizon when no pulse is fired; unknown with disturbances: False.
+    """Whether the body keeps all `bounds` up to the horizon when no pulse is fired.
 
-    Dissipation leaves H where it is and lets tan θ grow or decay.
+    Dissipation leaves H where it is and lets tan θ grow or decay. False where it is not known: with disturbances, and
+    with I1 ≠ I2, where nutation and spin run to and fro.
     """
-    if spacecraft.disturbances:
+    if spacecraft.disturbances or not spacecraft.inertia.symmetric:
         return False
     change = min(spacecraft.growth * spacecraft.horizon, 700.0)
     nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(change))

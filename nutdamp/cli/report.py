@@ -114,6 +114,8 @@ def command(
         page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed, note=note)
         content = form.write(page, output)
     deliver([(output, content)])
+    if not page.good:
+        remark(page.verdict)
     if output != "-":
         remark(f"wrote {output}")
     if show_failures(compared):

@@ -201,8 +201,8 @@ def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
     if best is None or not math.isfinite(least):
         names = ", ".join(channel.name for channel in channels)
         raise Infeasible(
-            f"none of the channels ({names}) is in phase for a cone with {cones} to go within the {span:.4g} s that "
-            "the horizon leaves it, on-times and blackout windows kept; another number of cones or rhumb-line can help"
+            f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse that its on-times and "
+            f"the blackout windows allow in the {span:.4g} s left; --cones with another number, or rhumb-line, can help"
         )
     return commandable(here, best[2])
 

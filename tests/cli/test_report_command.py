@@ -73,6 +73,7 @@ def test_the_page_is_written_whatever_the_verdict(
 ) -> None:
     (tmp_path / "craft.yaml").write_text(text)
     done = run("report", "craft.yaml", "-o", "report.md", *arguments)
+    assert said.rstrip(".").lower() in done.stderr.lower()
     assert done.returncode == status
     verdict = (tmp_path / "report.md").read_text(encoding="utf-8").splitlines()[2]
     assert verdict.startswith("⚠️ **")

@@ -167,7 +167,7 @@ class Problem:
         else:
             what = (
                 f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
-                f"{100.0 * min(left, 1.0):.2g} % of it stays"
+                f"{100.0 * min(left, 1.0):.3g} % of it stays"
             )
         return f"{what}; {self.relaxed()}"
 
