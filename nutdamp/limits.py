@@ -249,8 +249,12 @@ def _breaches(spacecraft: Spacecraft, made: Schedule) -> Iterator[tuple[str, str
             if pulse.start < ends - slack and pulse.end > begins + slack:
                 yield f"blackout {begins}", f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s"
         channel = channels.get(pulse.channel)
-        if channel is not None and not (channel.min_on_time - slack <= pulse.on_time <= channel.max_on_time + slack):
-            yield "on-time", f"{name} is on for {pulse.on_time:.6g} s, outside what the channel allows"
+        if channel is not None and pulse.on_time < channel.min_on_time - slack:
+            least = f"less than the shortest on-time of {channel.min_on_time:.6g} s"
+            yield "min_on_time", f"{name} is on for {pulse.on_time:.6g} s, {least}"
+        if channel is not None and pulse.on_time > channel.max_on_time + slack:
+            most = f"more than the longest on-time of {channel.max_on_time:.6g} s"
+            yield "max_on_time", f"{name} is on for {pulse.on_time:.6g} s, {most}"
         if limits.tick is not None:
             for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
                 if abs(value - round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick:

@@ -154,8 +154,8 @@ def fired(*times: tuple[float, float]) -> Schedule:
         ([(2.0, 1.0), (3.2, 1.0)], "less than 0.5 s after the one before"),
         ([(6.5, 0.2)], "blackout window 6 s to 7 s"),
         ([(5.8, 0.6)], "blackout window 6 s to 7 s"),
-        ([(2.0, 0.1)], "outside what the channel allows"),
-        ([(4.0, 3.0)], "outside what the channel allows"),
+        ([(2.0, 0.1)], "is on for 0.1 s, less than the shortest on-time of 0.2 s"),
+        ([(4.0, 3.0)], "is on for 3 s, more than the longest on-time of 2 s"),
         ([(2.0, 0.5), (4.0, 0.5), (8.0, 0.5), (10.0, 0.5)], "4 pulses are more than 3"),
     ],
 )
@@ -173,10 +173,11 @@ def test_every_broken_limit_is_named() -> None:
     body = spinner(channels=cross(20.0, min_on_time=0.2, max_on_time=2.0), limits=TIGHT)
     assert broken_limits(body, fired((0.5, 0.1), (0.8, 0.5), (6.5, 0.2), (25.0, 9.0))) == [
         "pulse 1 (+1, 0.45 s to 0.55 s) starts before 1 s; likewise 1 more pulse",
-        "pulse 1 (+1, 0.45 s to 0.55 s) is on for 0.1 s, outside what the channel allows; likewise 1 more pulse",
+        "pulse 1 (+1, 0.45 s to 0.55 s) is on for 0.1 s, less than the shortest on-time of 0.2 s",
         "pulse 2 (+1, 0.55 s to 1.05 s) comes less than 0.5 s after the one before",
         "pulse 3 (+1, 6.4 s to 6.6 s) lies in the blackout window 6 s to 7 s",
         "pulse 4 (+1, 20.5 s to 29.5 s) ends after the horizon of 20 s",
+        "pulse 4 (+1, 20.5 s to 29.5 s) is on for 9 s, more than the longest on-time of 2 s",
         "4 pulses are more than 3",
     ]
 

@@ -62,7 +62,7 @@ def test_a_message_of_such_a_name_becomes_a_spacecraft_file(run: Run, tmp_path: 
     assert run("export", f"{odd}.yaml", "--format", "apm", "-o", f"{odd}.apm").returncode == 0
     done = run("import", "apm", f"{odd}.apm", "--schedule", "again.csv")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(r"# From the attitude parameter message d\udcfcse.apm; numbers as they stand there.")
+    assert done.stdout.startswith(r"# From the attitude parameter message d\udcfcse.apm; numbers as given there.")
     (tmp_path / "again.yaml").write_text(done.stdout)
     assert run("check", "again.yaml").returncode == 0
 
