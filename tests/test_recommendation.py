@@ -216,7 +216,7 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
     assert compared.recommended is not None
     assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
-    assert verdicts.reason(compared) == "leaves least nutation of the 3 feasible plans"
+    assert verdicts.reason(compared) == "leaves the least residual nutation of the 3 feasible plans"
     (warning,) = verdicts.warnings(compared)
     assert warning.startswith(
         f"none of the 3 schemes compared damps the nutation. four-pulse leaves "
@@ -311,7 +311,7 @@ def test_reasons_say_what_decided() -> None:
     assert said(near, nearer) == "least impulse of the 2 plans that reach the target"
     assert said(judged("a", 0.0, shift=1.0), judged("b", 0.0)).endswith("within 0.1 %; of these least shift of H")
     assert said(judged("a", 0.0), judged("b", 0.0, end=2.0)).endswith("within 0.1 %; of these it ends first")
-    assert said(judged("a", 3.0), judged("b", 4.0)) == "leaves least nutation of the 2 feasible plans"
+    assert said(judged("a", 3.0), judged("b", 4.0)) == "leaves the least residual nutation of the 2 feasible plans"
     assert said(judged("a", 3.0), INFEASIBLE) == "the only feasible plan"
     assert said(judged("a", 3.0)) == "the scheme named"
 

@@ -213,7 +213,7 @@ def _shifted_moments(facts: Facts) -> Iterator[Finding]:
     first, second, third = (1 + wider) * moments[0], (1 + wider) * moments[1], (1 + longer) * moments[2]
     if third > (first + second) * (1 + 1e-9) or abs(first - second) > third:
         key = "C" if longer != 0.0 else "A"
-        problem = f"with this offset C = {third:g} and A = {0.5 * (first + second):g} kg m^2, as in no body"
+        problem = f"with this offset C = {third:g} and A = {0.5 * (first + second):g} kg m^2: not physically possible"
         yield Finding(("dispersions", key, "bias"), f"{problem}; C must be at most 2 A")
 
 

@@ -100,7 +100,8 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
                 yield Finding(("inertia", key), f"missing; the {what} moment of inertia, in kg m^2")
     A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
     if A is not None and C is not None and C > 2 * A > 0:
-        problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2, as in no body; at most 2 A (a flat disc)"
+        most = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
+        problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {most}"
         yield Finding(("inertia", "C"), problem)
 
 

@@ -70,7 +70,7 @@ def reason(compared: Comparison) -> str:
         }.get(found.ground or Ground.COST, f"least {cost} {among}")
     meeting = found.standing is Standing.MEETS
     among = f"of the {found.count} {'plans that meet the requirement' if meeting else 'feasible plans'}"
-    least = "leaves least nutation" if body.goal.axis is None else "comes nearest to the target"
+    least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
     if found.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
     then = {
@@ -253,7 +253,7 @@ def robust_reason(found: RobustComparison) -> str:
         as_good = f"{found.equals} leave about as little"
     else:
         best = f"most cases comply, of {count} plans"
-        as_good = f"{found.equals} comply as often but for the sampling error"
+        as_good = f"{found.equals} comply equally often within the sampling error"
     if count == 1:
         return "the scheme named" if len(found.comparison.plans) == 1 else "the only plan"
     cost = "propellant" if found.by_propellant else "impulse"
