@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from builders import spinner
 
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import BLOCK, Draws
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft, Steerable, Thruster
 from nutdamp.tolerances import Dispersions, Tolerance

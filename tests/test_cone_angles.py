@@ -14,9 +14,9 @@ from cases_dir import case
 from process import Run
 
 from nutdamp import flight
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model
 from nutdamp.files.plan_json import residual_json, spacecraft_json
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.physics.arc_cones import arc_cones

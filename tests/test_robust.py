@@ -1,4 +1,4 @@
-"""Robust planning: the choice goes by what dispersed truths leave, and says what that costs."""
+"""Robust planning: the choice goes by what dispersed cases leave, and says what that costs."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_what_is_best_for_the_estimate_stays_where_nothing_is_better() -> None:
 
 
 def test_the_figures_of_a_candidate_are_those_of_flights_one_by_one() -> None:
-    """The nutation that 90 % of 200 truths do not exceed, flown singly through real widths."""
+    """The nutation that 90 % of 200 cases do not exceed, flown singly through real widths."""
     body = dispersed(Dispersions(A=normal(0.02), thrust_per_pulse=normal(0.05)), Requirement(None, None, 0.9))
     found = planned(body, ("four-pulse",))
     assert found.probability == 0.9

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model
 from nutdamp.errors import BadRequest
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft

@@ -1,4 +1,4 @@
-"""Truths flown through real pulse widths, with the true tensor and the disturbances, many at once."""
+"""Cases flown through real pulse widths, with the true tensor and the disturbances, many at once."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import flight
+from nutdamp.dispersion.cases import DispersedCases, Model, Triple, rotated
 from nutdamp.dispersion.kernel import Ends, carried
-from nutdamp.dispersion.truth import Model, Triple, Truth, rotated
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
 
@@ -20,9 +20,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RealWidths:
-    """Flies truths of ``model`` by Euler's equations, see `nutdamp.physics.rigid_cases`.
+    """Flies cases of ``model`` by Euler's equations, see `nutdamp.physics.rigid_cases`.
 
-    Disturbances and dissipation act as the estimate has them, whatever the truth's moments are.
+    Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
     """
 
     model: Model
@@ -31,15 +31,15 @@ class RealWidths:
     def _setting(self) -> flight.Setting:
         return flight.make_setting(self.model.spacecraft)
 
-    def __call__(self, truth: Truth) -> Ends:
-        """How the cases of ``truth`` end. Raises Infeasible for motions too long to be integrated."""
-        parts = (*truth.moments, *truth.omega0, *truth.starts, *(part for pulse in truth.impulses for part in pulse))
+    def __call__(self, cases: DispersedCases) -> Ends:
+        """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
+        parts = (*cases.moments, *cases.omega0, *cases.starts, *(part for pulse in cases.impulses for part in pulse))
         count = max(np.size(part) for part in parts)
-        moments, rates = _whole(truth.moments, count), _whole(truth.omega0, count)
+        moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
         pulses = rigid_cases.Pulses(
-            _whole(truth.starts, count),
+            _whole(cases.starts, count),
             np.array(self.model.on_times),
-            np.array([_whole(impulse, count) for impulse in truth.impulses]).reshape(-1, 3, count),
+            np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count),
         )
         upright = np.zeros((4, count))
         upright[0] = 1.0  # the true body axes at t = 0 are where everything is seen from
@@ -53,11 +53,11 @@ class RealWidths:
             momentum=momentum,
             before=_triple(moments * rates),
             after=after,
-            pointed=rotated(after, truth.tilt),
+            pointed=rotated(after, cases.tilt),
             spin=settled[2],
             spin_change=settled[2] - rates[2],
-            propellant=truth.propellant,
-            nutation=None if truth.moments[0] is truth.moments[1] else largest_nutation(moments, momentum, sense),
+            propellant=cases.propellant,
+            nutation=None if cases.moments[0] is cases.moments[1] else largest_nutation(moments, momentum, sense),
         )
 
 

@@ -24,7 +24,7 @@ SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class Input(NamedTuple):
-    """One drawn quantity: truth = ``nominal`` + draw, in ``unit``.
+    """One drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
 
     ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
     `nutdamp.tolerances.KINDS`, in ``unit`` (a bare number for factors).

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.truth import TINY, Cases, Model, Triple, Truth, plus, rotated, times
+from nutdamp.dispersion.cases import TINY, Cases, DispersedCases, Model, Triple, plus, rotated, times
 from nutdamp.physics import energy_sink
 from nutdamp.physics.rigid_cases import cos_sin
 
@@ -54,24 +54,24 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Flies truths of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
+    """Flies cases of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
 
-    Dissipation acts as the estimate has it, whatever the truth's moments are.
+    Dissipation acts as the estimate has it, whatever the moments of a case are.
     """
 
     model: Model
 
-    def __call__(self, truth: Truth) -> Ends:
-        """How the cases of ``truth`` end."""
+    def __call__(self, cases: DispersedCases) -> Ends:
+        """How the ``cases`` end."""
         on_times = self.model.on_times
         nodes = self._nodes
-        mixed = _out_of_order(truth.starts, on_times)
+        mixed = _out_of_order(cases.starts, on_times)
         growth = self.model.spacecraft.growth
-        ends = _fly(truth, on_times, nodes, growth)
+        ends = _fly(cases, on_times, nodes, growth)
         if mixed is None:
             return ends
         # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
-        return _replaced(ends, mixed, _fly(*_reordered(truth, on_times, mixed), (max(nodes),) * len(nodes), growth))
+        return _replaced(ends, mixed, _fly(*_reordered(cases, on_times, mixed), (max(nodes),) * len(nodes), growth))
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
@@ -86,18 +86,18 @@ class ClosedForm:
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...], growth: float) -> Ends:
+def _fly(cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: float) -> Ends:
     """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse, ``growth`` κ in 1/s."""
-    A, C = truth.A, truth.C
+    A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
-    x, y = truth.moments[0] * truth.omega0[0], truth.moments[1] * truth.omega0[1]  # H is the true one, I1 ≠ I2 or not
-    spin = truth.omega0[2]
+    x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
+    spin = cases.omega0[2]
     z = C * spin
     before = (x, y, z)
     phase: Cases = 0.0
     now: Cases = 0.0
     turn: tuple[Cases, ...] | None = None
-    for number, (start, impulse) in enumerate(zip(truth.starts, truth.impulses, strict=True)):
+    for number, (start, impulse) in enumerate(zip(cases.starts, cases.impulses, strict=True)):
         on_time = on_times[number]
         centre = start + 0.5 * on_time
         coast = centre - now
@@ -122,10 +122,10 @@ def _fly(truth: Truth, on_times: Any, nodes: tuple[int, ...], growth: float) -> 
         momentum=(x, y, z),
         before=before,
         after=after,
-        pointed=rotated(after, truth.tilt),
+        pointed=rotated(after, cases.tilt),
         spin=spin,
-        spin_change=spin - truth.omega0[2],
-        propellant=truth.propellant,
+        spin_change=spin - cases.omega0[2],
+        propellant=cases.propellant,
     )
 
 
@@ -249,50 +249,52 @@ def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
 
 
 def _out_of_order(starts: tuple[Cases, ...], on_times: tuple[float, ...]) -> NDArray[np.intp] | None:
-    """The cases in which a pulse comes before one that is planned earlier; None where there are none."""
+    """Rows of the cases in which a pulse comes before one that is planned earlier; None where there are none."""
     centres = [start + 0.5 * on_time for start, on_time in zip(starts, on_times, strict=True)]
     mixed: Any = False
     for first, second in itertools.pairwise(centres):
         if isinstance(first, float) and isinstance(second, float):
             continue
         mixed = mixed | (np.real(second) < np.real(first))
-    cases = np.flatnonzero(mixed)
-    return cases if len(cases) else None
+    rows = np.flatnonzero(mixed)
+    return rows if len(rows) else None
 
 
-def _reordered(truth: Truth, on_times: tuple[float, ...], cases: NDArray[np.intp]) -> tuple[Truth, Any]:
-    """The ``cases`` of ``truth`` with the pulses of each in the order of their centres, and their on-times."""
+def _reordered(
+    cases: DispersedCases, on_times: tuple[float, ...], rows: NDArray[np.intp]
+) -> tuple[DispersedCases, Any]:
+    """The ``rows`` of ``cases`` with the pulses of each in the order of their centres, and their on-times."""
 
     def taken(value: Cases) -> Any:
-        return value[cases] if np.ndim(value) else np.full(len(cases), value)
+        return value[rows] if np.ndim(value) else np.full(len(rows), value)
 
-    starts = np.array([taken(start) for start in truth.starts])
-    widths = np.array([np.full(len(cases), on_time) for on_time in on_times])
-    impulses = np.array([[taken(part) for part in impulse] for impulse in truth.impulses])
+    starts = np.array([taken(start) for start in cases.starts])
+    widths = np.array([np.full(len(rows), on_time) for on_time in on_times])
+    impulses = np.array([[taken(part) for part in impulse] for impulse in cases.impulses])
     order = np.argsort(np.real(starts) + 0.5 * widths, axis=0, kind="stable")
     starts, widths = np.take_along_axis(starts, order, 0), np.take_along_axis(widths, order, 0)
     impulses = np.take_along_axis(impulses, order[:, None, :], 0)
-    first, second, third = (taken(moment) for moment in truth.moments)
-    one, two, three = (taken(rate) for rate in truth.omega0)
+    first, second, third = (taken(moment) for moment in cases.moments)
+    one, two, three = (taken(rate) for rate in cases.omega0)
     return (
-        Truth(
-            moments=(first, first if truth.moments[0] is truth.moments[1] else second, third),
+        DispersedCases(
+            moments=(first, first if cases.moments[0] is cases.moments[1] else second, third),
             omega0=(one, two, three),
             starts=tuple(starts),
             impulses=tuple((impulse[0], impulse[1], impulse[2]) for impulse in impulses),
-            tilt=(taken(truth.tilt[0]), taken(truth.tilt[1])),
-            propellant=None if truth.propellant is None else taken(truth.propellant),
+            tilt=(taken(cases.tilt[0]), taken(cases.tilt[1])),
+            propellant=None if cases.propellant is None else taken(cases.propellant),
         ),
         widths,
     )
 
 
-def _replaced(ends: Ends, cases: NDArray[np.intp], others: Ends) -> Ends:
-    """``ends`` with those of ``cases`` taken from ``others``."""
+def _replaced(ends: Ends, rows: NDArray[np.intp], others: Ends) -> Ends:
+    """``ends`` with those of ``rows`` taken from ``others``."""
 
     def mended(value: Cases, other: Cases, count: int) -> Any:
         whole = np.array(np.broadcast_to(value, count), dtype=np.result_type(value, other))
-        whole[cases] = other
+        whole[rows] = other
         return whole
 
     count = max(np.size(part) for part in (*ends.momentum, *ends.after))

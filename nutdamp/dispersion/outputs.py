@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dispersion.cases import Cases, Model, Triple
 from nutdamp.dispersion.kernel import Ends
-from nutdamp.dispersion.truth import Cases, Model, Triple
 from nutdamp.spacecraft import Spacecraft
 
 Array = NDArray[np.float64]

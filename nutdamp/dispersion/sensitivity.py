@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.inputs import Input
 from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
-from nutdamp.dispersion.truth import Model
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def first_order(model: Model) -> FirstOrder:
             draws[entry.name] = np.full(len(inputs), entry.size if entry.kind == "bias" else 0.0, dtype=complex)
             draws[entry.name][index] += 1j * steps[index]
         out = np.empty((ROWS, len(inputs)), dtype=complex)
-        vectors(model, ClosedForm(model)(model.truth(draws)), out)  # type: ignore[arg-type]
+        vectors(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
         jacobian = out.imag / steps
     return FirstOrder(inputs, jacobian)
 

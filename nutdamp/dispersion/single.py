@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import flight
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import Draws
-from nutdamp.dispersion.truth import Model
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Spacecraft
@@ -19,22 +19,22 @@ Array = NDArray[np.float64]
 
 def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
-    body, truth = model.spacecraft, model.truth(draws)
+    body, case = model.spacecraft, model.cases(draws)
     pulses = []
-    for planned, start, parts in zip(model.schedule, truth.starts, truth.impulses, strict=True):
+    for planned, start, parts in zip(model.schedule, case.starts, case.impulses, strict=True):
         impulse = np.array(parts, dtype=float)
         torque = None if planned.on_time == 0.0 else impulse / planned.on_time
         pulses.append(Pulse(float(start) + 0.5 * planned.on_time, planned.on_time, planned.channel, impulse, torque))
-    tilt = np.array([*truth.tilt, 0.0], dtype=float)
+    tilt = np.array([*case.tilt, 0.0], dtype=float)
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])
     axes = body.inertia.axes
     quaternion = attitude.multiply(attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T))
-    first, second, third = (float(moment) for moment in truth.moments)
+    first, second, third = (float(moment) for moment in case.moments)
     true = replace(
         body,
         inertia=replace(body.inertia, moments=(first, second, third)),
-        omega0=np.array(truth.omega0, dtype=float),
+        omega0=np.array(case.omega0, dtype=float),
         attitude=Attitude(quaternion),
     )
     return true, Schedule(tuple(pulses))
@@ -47,7 +47,7 @@ def flown_outputs(model: Model, draws: Draws) -> Array:
     settled, left = made.settled, made.residual
     momentum = attitude.rotate(settled.quaternion, settled.rates * np.asarray(made.moments))
     target = attitude.rotate(model.spacecraft.initial.quaternion, model.target)
-    propellant = model.truth(draws).propellant
+    propellant = model.cases(draws).propellant
     return np.array(
         [
             left.nutation,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp import compliance, flight
 from nutdamp.compliance import Left
+from nutdamp.dispersion.cases import Cases, DispersedCases, Model
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, aim_output, measure, vectors
@@ -28,13 +29,12 @@ from nutdamp.dispersion.statistics import (
     Worst,
     binomial_interval,
 )
-from nutdamp.dispersion.truth import Cases, Model, Truth
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
 from nutdamp.physics import rigid_cases
 
 Array = NDArray[np.float64]
-Fly = Callable[[Truth], Ends]
+Fly = Callable[[DispersedCases], Ends]
 
 CHUNK = 8_192
 """Cases that the kernel works on at once, so that they stay in the cache."""
@@ -71,7 +71,7 @@ def threads_here() -> int:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is studied: truths of ``model`` drawn from ``seed``, flown by ``fly`` (closed form by default).
+    """What is studied: cases of ``model`` drawn from ``seed``, flown by ``fly`` (closed form by default).
 
     Cases count from 0 here; people see them count from 1.
     """
@@ -83,7 +83,7 @@ class Study:
 
     @property
     def flies(self) -> Fly:
-        """What flies a truth."""
+        """What flies the cases."""
         return self.fly or self._closed_form
 
     @cached_property
@@ -107,8 +107,8 @@ class Study:
     def outputs_of(self, draws: Draws) -> Array:
         """The outputs (5,) of one case with these deviations; none: of the estimate itself."""
         out = np.empty((len(OUTPUTS), 1))
-        truth = self.model.truth({name: np.atleast_1d(draw) for name, draw in draws.items()})
-        measure(self.model, self.flies(truth), out)
+        cases = self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()})
+        measure(self.model, self.flies(cases), out)
         return out[:, 0]
 
     @property
@@ -350,7 +350,7 @@ class _Round:
         for low in range(begin - begin % STRIDE, end, self.chunk):
             high = min(low + self.chunk, end + -end % STRIDE)
             rows = slice(low - start, high - start)
-            ends = study.flies(study.model.truth({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
+            ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
             wanted = slice(max(low, begin), min(high, end))
             inner = slice(wanted.start - low, wanted.stop - low)
             outputs = np.empty((len(OUTPUTS), high - low))

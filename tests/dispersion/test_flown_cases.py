@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from nutdamp import flight
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths, largest_nutation
 from nutdamp.dispersion.outputs import measure
 from nutdamp.dispersion.single import flown_outputs, realised
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Disturbance
@@ -49,7 +49,7 @@ SINKING = [dispersed.sinking(MODELS["prolate"]), dispersed.sinking(MODELS["oblat
 def test_each_case_is_the_flight_of_its_own_spacecraft(model: Model) -> None:
     draws = dispersed.first_cases(Study(model), CASES)
     found = np.empty((5, CASES))
-    measure(model, RealWidths(model)(model.truth(draws)), found)
+    measure(model, RealWidths(model)(model.cases(draws)), found)
     for case in range(0, CASES, 3):
         one = dispersed.one_of(draws, case)
         assert found[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)

@@ -13,11 +13,11 @@ import swarm
 from builders import spinner
 
 from nutdamp import flight
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.kernel import ClosedForm, nodes_for
 from nutdamp.dispersion.outputs import OUTPUTS, measure
 from nutdamp.dispersion.single import realised
 from nutdamp.dispersion.study import Study
-from nutdamp.dispersion.truth import Model
 from nutdamp.physics import rates
 from nutdamp.physics.rigid_cases import cos_sin
 from nutdamp.schedule import Schedule, steerable_pulse
@@ -40,7 +40,7 @@ SINKING = {
 
 def outputs(model: Model, draws: object) -> np.ndarray:
     out = np.empty((5, CASES))
-    measure(model, ClosedForm(model)(model.truth(draws)), out)  # type: ignore[arg-type]
+    measure(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
     return out
 
 
@@ -153,8 +153,8 @@ def test_pulses_that_change_places_fire_in_their_own_order() -> None:
 def test_a_pulse_shifted_before_t_0_fires_at_0() -> None:
     body = replace(spinner(steerable=Steerable(20.0)), dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)))
     pulses = Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),))
-    truth = Model(body, pulses).truth({"timing offset": -5.0})
-    assert truth.starts == (0.0,)
+    cases = Model(body, pulses).cases({"timing offset": -5.0})
+    assert cases.starts == (0.0,)
 
 
 def test_a_schedule_without_pulses_leaves_what_is_there() -> None:

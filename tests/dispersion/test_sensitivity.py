@@ -8,17 +8,17 @@ import dispersed
 import numpy as np
 import pytest
 
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
 from nutdamp.dispersion.sensitivity import first_order, sampled_shares
 from nutdamp.dispersion.study import EARLY, Results, Study, run
-from nutdamp.dispersion.truth import Model
 from nutdamp.tolerances import Tolerance
 
 
 def outcome(model: Model, draws: dict[str, float]) -> np.ndarray:
     out = np.empty((ROWS, 1))
-    vectors(model, ClosedForm(model)(model.truth({name: np.array([draw]) for name, draw in draws.items()})), out)
+    vectors(model, ClosedForm(model)(model.cases({name: np.array([draw]) for name, draw in draws.items()})), out)
     return out[:, 0]
 
 

@@ -14,10 +14,10 @@ import pytest
 
 from nutdamp.dispersion import study as study_module
 from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import BLOCK
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import Results, Study, run
-from nutdamp.dispersion.truth import Model
 from nutdamp.errors import BadRequest, CannotRead
 from nutdamp.files.study_file import load_results, save_results
 from nutdamp.spacecraft import Disturbance, Goal, Requirement

@@ -1,4 +1,4 @@
-"""What a dispersed truth is, against vector algebra written out for single cases."""
+"""What a dispersed case is, against vector algebra written out for single cases."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from builders import channel, spinner
 from scipy.spatial.transform import Rotation
 
+from nutdamp.dispersion.cases import Model, rotated, tilt_axes
 from nutdamp.dispersion.inputs import list_inputs
-from nutdamp.dispersion.truth import Model, rotated, tilt_axes
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Channel, Inertia, Steerable
@@ -40,14 +40,14 @@ def test_a_tilted_and_moved_force_gives_its_torque() -> None:
         expected += factor * np.cross(arm, force)
         used += factor * jet.mass_flow
     pulse = model.schedule.pulses[2]
-    truth = model.truth(draws)
-    assert np.array(truth.impulses[2]) == pytest.approx(expected * pulse.on_time, rel=1e-13)
+    cases = model.cases(draws)
+    assert np.array(cases.impulses[2]) == pytest.approx(expected * pulse.on_time, rel=1e-13)
     others = sum(
         p.propellant * (1.0 + draws[f"thrust {p.channel}"])
         for p in model.schedule.pulses[:2]
         if p.propellant is not None
     )
-    assert truth.propellant == pytest.approx(used * pulse.on_time + others, rel=1e-13)
+    assert cases.propellant == pytest.approx(used * pulse.on_time + others, rel=1e-13)
 
 
 def test_tilt_axes_are_square_to_the_force_and_to_each_other() -> None:
@@ -61,23 +61,23 @@ def test_a_steerable_pulse_is_turned_in_the_1_2_plane() -> None:
     torquer = Steerable(20.0, 220.0, 0.8)
     body = spinner(steerable=torquer)
     pulses = Schedule((steerable_pulse(torquer, 1.0, 0.4, on_time=0.5),))
-    truth = Model(body, pulses).truth({"thrust steerable": 0.1, "thrust pulse 1": 0.01, "direction steerable": 0.3})
+    cases = Model(body, pulses).cases({"thrust steerable": 0.1, "thrust pulse 1": 0.01, "direction steerable": 0.3})
     size = 10.0 * 1.1 * 1.01
-    assert np.array(truth.impulses[0]) == pytest.approx([size * np.cos(0.7), size * np.sin(0.7), 0.0])
+    assert np.array(cases.impulses[0]) == pytest.approx([size * np.cos(0.7), size * np.sin(0.7), 0.0])
     assert pulses.propellant is not None
-    assert truth.propellant == pytest.approx(pulses.propellant * 1.1 * 1.01)
+    assert cases.propellant == pytest.approx(pulses.propellant * 1.1 * 1.01)
 
 
 def test_a_pulse_that_the_file_does_not_explain_keeps_its_impulse() -> None:
     """A schedule file may give a channel another torque: thrust scales what it gives, tilts come on top."""
     body = spinner(channels=(channel("T1", 8.0, 0.0, 0.0, isp=200.0, thrust=10.0),))
     pulse = replace(channel_pulse(body.channels[0], 1.0, 0.5), impulse=np.array([3.0, 1.0, 0.0]))
-    truth = Model(body, Schedule((pulse,))).truth({"thrust T1": 0.1})
-    assert np.array(truth.impulses[0]) == pytest.approx([3.3, 1.1, 0.0])
+    cases = Model(body, Schedule((pulse,))).cases({"thrust T1": 0.1})
+    assert np.array(cases.impulses[0]) == pytest.approx([3.3, 1.1, 0.0])
     unknown = replace(pulse, channel="elsewhere", propellant=None)
-    truth = Model(body, Schedule((unknown,))).truth({"thrust pulse 1": 0.1})
-    assert np.array(truth.impulses[0]) == pytest.approx([3.3, 1.1, 0.0])
-    assert truth.propellant is None
+    cases = Model(body, Schedule((unknown,))).cases({"thrust pulse 1": 0.1})
+    assert np.array(cases.impulses[0]) == pytest.approx([3.3, 1.1, 0.0])
+    assert cases.propellant is None
 
 
 def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
@@ -86,12 +86,12 @@ def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
     jet = dispersed.jet("T1", (0.1, 0.3, 0.8), (0.0, -10.0, 1.0))  # in principal axes
     body = replace(spinner(moments=moments, channels=(Channel("T1", (jet,)),)), inertia=Inertia(moments, axes))
     model = Model(body, Schedule((channel_pulse(body.channels[0], 1.0, 0.5),)))
-    truth = model.truth({"omega0_1": 0.01, "omega0_3": 0.02, "position T1 y": 0.05, "A": 0.01 * body.inertia.A})
-    assert np.array(truth.omega0) == pytest.approx(body.omega0 + axes.T @ [0.01, 0.0, 0.02])
+    cases = model.cases({"omega0_1": 0.01, "omega0_3": 0.02, "position T1 y": 0.05, "A": 0.01 * body.inertia.A})
+    assert np.array(cases.omega0) == pytest.approx(body.omega0 + axes.T @ [0.01, 0.0, 0.02])
     more = 0.5 * np.cross(axes.T @ [0.0, 0.05, 0.0], [0.0, -10.0, 1.0])
-    assert np.array(truth.impulses[0]) == pytest.approx(0.5 * jet.torque + more)
+    assert np.array(cases.impulses[0]) == pytest.approx(0.5 * jet.torque + more)
     # A scales both transverse moments.
-    assert np.array(truth.moments) == pytest.approx([1.01 * moments[0], 1.01 * moments[1], moments[2]])
+    assert np.array(cases.moments) == pytest.approx([1.01 * moments[0], 1.01 * moments[1], moments[2]])
 
 
 def test_the_attitude_is_off_by_a_rotation_vector() -> None:

@@ -1,6 +1,6 @@
-"""The dispersed truth: what body flies, how it moves at t = 0, and which impulses it really gets.
+"""The dispersed cases: what body flies, how it moves at t = 0, and which impulses it really gets.
 
-The schedule is fixed: which channel, commanded start, on-time. A truth differs from the estimate in its moments, its
+The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
 rates, and in what each pulse does. Everything here is elementwise over cases (structure of arrays); a quantity that
 nothing disperses stays one number for all of them.
 """
@@ -79,8 +79,8 @@ def _parts(vector: Vector) -> Triple:
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
-    """Dispersed truths, in principal axes and SI.
+class DispersedCases:
+    """Dispersed cases, in principal axes and SI.
 
     ``moments`` (I1, I2, I3) kg m²; ``omega0`` rad/s at t = 0; of each pulse its ``starts`` s and ``impulses`` N m s;
     ``tilt`` the rotation vector (rad, about body axes 1 and 2) by which the attitude at t = 0 is off; ``propellant``
@@ -168,8 +168,8 @@ class Model:
                 good = good & (draw >= -1.0)
         return good  # type: ignore[no-any-return]
 
-    def truth(self, draws: Draws) -> Truth:
-        """The truths of the ``draws`` (deviations by input name)."""
+    def cases(self, draws: Draws) -> DispersedCases:
+        """The cases of the ``draws`` (deviations by input name)."""
         turn = self.spacecraft.inertia.axes
         omega0 = _parts(self.spacecraft.omega0)
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
@@ -190,7 +190,7 @@ class Model:
             impulses.append(impulse if isinstance(factor, float) and factor == 1.0 else _scaled(impulse, factor))
             used = one.pulse.propellant
             propellant = None if propellant is None or used is None else propellant + used * flow * factor
-        return Truth(
+        return DispersedCases(
             moments=self._moments(draws),
             omega0=_sum(omega0, _turned(turn.T, off)),
             starts=tuple(starts),
