@@ -21,12 +21,12 @@ def instance(name: str, value: object, kind: type[Kind], expected: str) -> Kind:
     raise BadRequest(f"{name}: expected {expected}, got {shown(value)}")
 
 
-def path(name: str, value: str | PathLike[str]) -> str:
+def path(name: str, value: str | PathLike[str], expected: str = "the name of a file") -> str:
     """The name of a file; raises BadRequest."""
     try:
-        return instance(name, fspath(value), str, "the name of a file")
+        return instance(name, fspath(value), str, expected)
     except TypeError:
-        raise BadRequest(f"{name}: expected the name of a file, got {shown(value)}") from None
+        raise BadRequest(f"{name}: expected {expected}, got {shown(value)}") from None
 
 
 def changes(value: Any) -> Mapping[str, object]:

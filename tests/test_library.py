@@ -86,6 +86,80 @@ def test_the_example_runs(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "track.csv").stat().st_size > 100_000
 
 
+def test_the_sweep_runs(run: Run, tmp_path: Path) -> None:
+    assert run("init").returncode == 0
+    sweep = EXAMPLE.with_name("library_sweep.py")
+    done = subprocess.run([sys.executable, str(sweep)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    lines = []
+    for angle in (1, 3, 5):
+        changed = ("--set", f"state.nutation={angle} deg", "--set", "limits.horizon=300 s")
+        run("plan", "--scheme", "two-pulse", *changed, "--json", "plan.json")
+        (plan,) = json.loads((tmp_path / "plan.json").read_text())["plans"]
+        assert plan["feasible"]
+        assert plan["flown"]["nutation_deg"] < 1e-6
+        lines.append(f"{angle} deg: {plan['propellant_kg']:.5f} kg of propellant")
+    assert done.stdout.splitlines() == lines
+
+
+KEYS: dict[str, Any] = {
+    "name": "Tilted",
+    "inertia": {"tensor": np.array([[120, 3, 6], [3, 118, -4], [6, -4, 80]])},
+    "omega0": (0.2, np.float64(0.1), 3.0),
+    "steerable": {"torque": "40 N m", "isp": "220 s", "lever_arm": "1 m"},
+    "requirement": {"nutation": "0.5 deg"},
+    "limits": {"horizon": "100 s", "max_pulses": np.int64(3)},
+}
+
+
+def test_a_dict_is_read_as_the_file_is() -> None:
+    text = TILTED + "limits: {horizon: 100 s, max_pulses: 3}\n"
+    assert nutdamp.load(KEYS).to_dict() == nutdamp.read(text).to_dict()
+    assert nutdamp.load(KEYS, set={"limits.horizon": 50.0}).core.limits.horizon == 50.0
+    assert nutdamp.load({**KEYS, "name": "1e3"}).name == "1e3"
+
+
+def test_a_fault_in_a_dict_has_a_place() -> None:
+    with pytest.raises(errors.FaultyFile, match=r"dict:2:\d+: nam: ") as raised:
+        nutdamp.load({"nam": "X", "inertia": {"A": "120 s", "C": 80}, "omega0": [0, 0, 3]})
+    assert any(fault.file == "dict" and fault.line == 4 and "inertia.A" in fault.where for fault in raised.value.faults)
+
+
+def test_with_changes_the_keys_named_and_no_others(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
+    first = nutdamp.load(KEYS).with_(limits={"horizon": "300 s"}, requirement={"momentum_shift": "1 deg"})
+    assert (first.core.limits.horizon, first.core.limits.max_pulses) == (300.0, 3)
+    assert first.core.requirement is not None
+    assert first.core.requirement.nutation == pytest.approx(math.radians(0.5))
+    again = first.with_(limits={"max_pulses": 2})
+    assert (again.core.limits.horizon, again.core.limits.max_pulses) == (300.0, 2)
+    assert first.core.limits.max_pulses == 3
+    changed = craft.with_(state={"nutation": "8 deg"}, thrusters={"+M1": {"force": 12.0}})
+    assert changed.nutation == pytest.approx(math.radians(8.0))
+    assert changed.core.omega0[2] == craft.core.omega0[2]
+    forces = {one.name: one.thrust for channel in changed.core.channels for one in channel.thrusters}
+    assert (forces["+M1"], forces["-M1"]) == (12.0, 10.0)
+    (tmp_path / "own.yaml").write_text(TILTED)
+    held = nutdamp.load(tmp_path / "own.yaml", set={"steerable.isp": 200.0})
+    for one in (held, nutdamp.plan(held, "two-pulse").spacecraft, nutdamp.plan(held, "none").fly(3.0).spacecraft):
+        more = one.with_(name="Other")
+        assert more.name == "Other"
+        assert more.core.steerable is not None
+        assert more.core.steerable.isp == 200.0
+    compared = nutdamp.compare(held, ["two-pulse"])
+    assert compared["two-pulse"].spacecraft.with_(mass=3).core.mass == 3.0
+
+
+def test_with_is_checked_as_the_file_is(craft: nutdamp.Spacecraft) -> None:
+    for keys, problem in (
+        ({"limits": {"horizon": "3 kg"}}, "with_ limits.horizon=3 kg: limits.horizon: "),
+        ({"limit": {"horizon": 3}}, "did you mean"),
+        ({"limits": "soon"}, "with_ limits=soon: limits: "),
+        ({"thrusters": {"T9": {"force": 3}}}, "no entry of thrusters has the name 'T9'"),
+    ):
+        with pytest.raises(errors.FaultyFile, match=re.escape(problem)):
+            craft.with_(**keys)
+
+
 def test_files_are_those_of_the_command_line(craft: nutdamp.Spacecraft, run: Run, tmp_path: Path) -> None:
     run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json")
     run("simulate", "--scheme", "two-pulse", "--flown", "--csv", "flown.csv")
@@ -239,11 +313,24 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
         lambda *_: nutdamp.read({"name": "X"}),  # type: ignore[arg-type]
         "text: expected the text of a spacecraft file (nutdamp.load reads files), got a dict",
     ),
-    "a number as file": (lambda *_: nutdamp.load(3), "path: expected the name of a file, got 3"),  # type: ignore[arg-type]
-    "bytes as file": (lambda *_: nutdamp.load(b"x"), "expected the name of a file, got a bytes"),  # type: ignore[arg-type]
+    "a number as file": (lambda *_: nutdamp.load(3), "path: expected the name of a file or a dict of its keys, got 3"),  # type: ignore[arg-type]
+    "bytes as file": (lambda *_: nutdamp.load(b"x"), "expected the name of a file or a dict of its keys, got a bytes"),  # type: ignore[arg-type]
     "a number as schedule": (
         lambda craft, _: nutdamp.load_schedule(3, craft),  # type: ignore[arg-type]
         "path: expected the name of a file, got 3",
+    ),
+    "an object in a dict": (
+        lambda *_: nutdamp.load({"name": object()}),
+        "dict: expected a number, a text, a list or a mapping, got object",
+    ),
+    "an object to change": (
+        lambda craft, _: craft.with_(limits={"horizon": object()}),
+        "expected a number, a text, a list or a mapping, got object",
+    ),
+    "a number as key": (lambda craft, _: craft.with_(limits={3: 4}), "with_ limits: expected the name of a key, got 3"),
+    "a spacecraft without a file": (
+        lambda craft, _: nutdamp.Spacecraft(craft.core).with_(mass=3),
+        "with_: expected a spacecraft from nutdamp.load, read or example",
     ),
     "a number to change": (
         lambda *_: nutdamp.load("x", set={3: 4}),  # type: ignore[dict-item]

@@ -50,7 +50,12 @@ def test_the_picture_is_there() -> None:
     assert (ROOT / path).read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_library_example_is_the_one_that_is_run() -> None:
-    (shown,) = re.findall(r"```python\n(.+?)```", TEXT, re.DOTALL)
-    example = (ROOT / "tests" / "library_example.py").read_text(encoding="utf-8")
-    assert example.endswith(shown)
+@pytest.mark.parametrize(("index", "name"), [(0, "library_example.py"), (1, "library_sweep.py")])
+def test_the_library_examples_are_those_that_are_run(index: int, name: str) -> None:
+    shown = re.findall(r"```python\n(.+?)```", TEXT, re.DOTALL)
+    assert len(shown) == 2
+    assert (ROOT / "tests" / name).read_text(encoding="utf-8").endswith(shown[index])
+
+
+def test_the_sweep_takes_at_most_ten_lines() -> None:
+    assert len(re.findall(r"```python\n(.+?)```", TEXT, re.DOTALL)[1].splitlines()) <= 10

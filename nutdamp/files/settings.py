@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import ast
 import difflib
+import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from numbers import Real
+from numbers import Integral, Real
 from typing import NamedTuple
 
 from nutdamp.errors import BadRequest, Fault, FaultyFile
@@ -59,9 +60,43 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
         path, end = _parse_path(key)
         if not path or end < len(key):
             raise BadRequest(f"{shown(key)} is not a key of a spacecraft file, such as limits.horizon")
-        text = value if isinstance(value, str) else shown(value)
-        settings.append(Setting(path, value, f"set {dotted(path)}={_brief(text)}"))
+        settings.append(_labelled("set", path, value))
     return tuple(settings)
+
+
+def settings_within(values: Mapping[str, object]) -> tuple[Setting, ...]:
+    """The settings in nested mappings, such as ``{"limits": {"horizon": "300 s"}}``; raises BadRequest.
+
+    A mapping stands for its keys, so that those beside them in the file keep their values.
+    """
+    return tuple(_within(values, ()))
+
+
+def text_of(values: Mapping[str, object], name: str) -> str:
+    """The text of a spacecraft file with these keys and values, one a line; raises BadRequest.
+
+    It is JSON, which unlike other YAML needs no rule for texts that look like numbers.
+    """
+    plain = _of_python(values, Place(setting=name)).plain()
+    return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
+
+
+def _within(values: Mapping[str, object], behind: KeyPath) -> Iterator[Setting]:
+    if len(behind) >= MAX_DEPTH:
+        raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
+    for key, value in values.items():
+        if not isinstance(key, str):
+            raise BadRequest(f"with_ {dotted(behind)}: expected the name of a key, got {shown(key)}")
+        path = (*behind, key)
+        if isinstance(value, Mapping):
+            yield from _within(value, path)
+        else:
+            yield _labelled("with_", path, value)
+
+
+def _labelled(call: str, path: KeyPath, value: object) -> Setting:
+    text = value if isinstance(value, str) else shown(value)
+    return Setting(path, value, f"{call} {dotted(path)}={_brief(text)}")
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
@@ -172,6 +207,8 @@ def _of_python(value: object, place: Place, depth: int = 0) -> Node:
         raise BadRequest(f"{place}: nested more than {MAX_DEPTH} levels deep")
     if value is None or isinstance(value, str | bool | int | float):
         return Node(value, place)
+    if isinstance(value, Integral):
+        return Node(int(value), place)
     if isinstance(value, Real):
         return Node(float(value), place)
     if isinstance(value, Mapping):

@@ -1,21 +1,8 @@
-"""nutdamp as a library: load a spacecraft, plan a scheme, fly it, and take the numbers along.
-
-    import nutdamp
-
-    spacecraft = nutdamp.load("spacecraft.yaml")
-    plan = nutdamp.plan(spacecraft, "two-pulse")
-    flight = plan.fly()
-    flight.to_csv("track.csv")
-
-It stands beside the command line, on top of everything else: thin objects that hold the results of the floors below
-(``core``) and add what knows files and screens. Attributes are SI and radians, vectors in the axes of the spacecraft
-file; arrays with named fields carry the names and units of the CSV files.
-"""
+"""Plans, the flights of their schedules, and comparisons of plans."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -25,109 +12,20 @@ from numpy.typing import NDArray
 
 from nutdamp import arguments, planning
 from nutdamp import flight as flights
-from nutdamp import spacecraft as craft
-from nutdamp.errors import BadRequest, Fault, Infeasible, printable
+from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight import Residual
-from nutdamp.limits import broken_limits
+from nutdamp.library.craft import Source, Spacecraft
+from nutdamp.library.notebook import block
 from nutdamp.outcome import seen_at
 from nutdamp.remarks import remarks
 from nutdamp.report.text import degrees
-from nutdamp.schemes import Choice, Options
-from nutdamp.schemes.options import FourPulseOptions, HalfConeOptions, OptimalOptions, RhumbLineOptions, TwoPulseOptions
-from nutdamp.spacecraft import Inertia
 from nutdamp.track import Track, in_file_axes, in_pieces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nutdamp.report.page.document import Block
-
-__all__ = [
-    "Comparison",
-    "Flight",
-    "FourPulseOptions",
-    "HalfConeOptions",
-    "OptimalOptions",
-    "Options",
-    "Plan",
-    "Residual",
-    "RhumbLineOptions",
-    "Spacecraft",
-    "Track",
-    "TwoPulseOptions",
-    "compare",
-    "example",
-    "load",
-    "load_schedule",
-    "plan",
-    "read",
-]
-
 Table = NDArray[np.void]
 """A structured array: one row a pulse or a sample, fields named as the columns of the CSV files."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Spacecraft:
-    """A spacecraft as a file describes it; ``core`` holds it in principal axes, for the modules below."""
-
-    core: craft.Spacecraft
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return self.core.name
-
-    @property
-    def inertia(self) -> Inertia:
-        """Principal moments (kg m²), the inertia ratio ``a`` and the shape."""
-        return self.core.inertia
-
-    @property
-    def rates(self) -> NDArray[np.float64]:
-        """Body rates at t = 0, (3,) rad/s, in the axes of the file."""
-        return self.core.inertia.in_file(self.core.omega0)
-
-    @property
-    def nutation(self) -> float:
-        """Nutation angle at t = 0, rad."""
-        return self.core.nutation
-
-    @property
-    def body_period(self) -> float:
-        """Nutation period seen in the body, s; infinite for a sphere."""
-        return self.core.body_period
-
-    @property
-    def inertial_period(self) -> float:
-        """Nutation period seen inertially, s."""
-        return self.core.inertial_period
-
-    @property
-    def least_impulse(self) -> float:
-        """A|ω0| in N m s: no schedule of a symmetric body removes the nutation with less."""
-        return self.core.least_impulse
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the channels that can be fired."""
-        return tuple(channel.name for channel in self.core.channels)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What the JSON files say of a spacecraft."""
-        from nutdamp.files.output import finite
-        from nutdamp.files.plan_json import spacecraft_json
-
-        return finite(spacecraft_json(self.core))
-
-    def __repr__(self) -> str:
-        inertia = self.inertia
-        return f"<Spacecraft {self.name}: {inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(self.nutation)}>"
-
-    def _repr_html_(self) -> str:
-        from nutdamp.report.page.sheets import spacecraft_facts
-
-        return _html(spacecraft_facts(self.core, title=self.name))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,11 +39,12 @@ class Flight:
     core: flights.Flight
     sampled: Track
     by_impulses: bool = False
+    source: Source | None = None
 
     @property
     def spacecraft(self) -> Spacecraft:
         """What was flown."""
-        return Spacecraft(self.core.spacecraft)
+        return Spacecraft(self.core.spacecraft, self.source)
 
     @property
     def track(self) -> Track:
@@ -199,7 +98,7 @@ class Flight:
     def _repr_html_(self) -> str:
         from nutdamp.report.page.sheets import residual_sheet
 
-        return _html(residual_sheet(f"{self.spacecraft.name}: {self._summary}", self.residual))
+        return block(residual_sheet(f"{self.spacecraft.name}: {self._summary}", self.residual))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -207,11 +106,12 @@ class Plan:
     """A scheme's schedule for a spacecraft, and how it was judged; an infeasible one says ``why``."""
 
     core: planning.Plan
+    source: Source | None = None
 
     @property
     def spacecraft(self) -> Spacecraft:
         """What it was planned for."""
-        return Spacecraft(self.core.spacecraft)
+        return Spacecraft(self.core.spacecraft, self.source)
 
     @property
     def scheme(self) -> str:
@@ -278,7 +178,7 @@ class Plan:
         end = arguments.end_of_flight(pulses.end + body.inertial_period if until is None else until)
         count = arguments.rows(samples)
         made = seen_at((flights.by_impulses if by_impulses else flights.flown)(body, pulses, end), end)
-        return Flight(made, made.track(count, end), by_impulses)
+        return Flight(made, made.track(count, end), by_impulses, self.source)
 
     def to_numpy(self) -> Table:
         """The pulses with the columns of `to_csv` as fields; empty where infeasible."""
@@ -317,7 +217,7 @@ class Plan:
         from nutdamp.report.page.document import Prose
         from nutdamp.report.page.sheets import pulse_sheet
 
-        return _html(pulse_sheet(self.core) if self.feasible else Prose(repr(self)[1:-1]))
+        return block(pulse_sheet(self.core) if self.feasible else Prose(repr(self)[1:-1]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -325,16 +225,17 @@ class Comparison:
     """Several plans for one spacecraft; ``comparison["two-pulse"]`` is one of them, iterating gives all."""
 
     core: planning.Comparison
+    source: Source | None = None
 
     @property
     def plans(self) -> tuple[Plan, ...]:
         """All plans, infeasible ones too."""
-        return tuple(Plan(one) for one in self.core.plans)
+        return tuple(Plan(one, self.source) for one in self.core.plans)
 
     @property
     def recommended(self) -> Plan | None:
         """The plan to fly; None where no scheme is feasible."""
-        return None if self.core.recommended is None else Plan(self.core.recommended)
+        return None if self.core.recommended is None else Plan(self.core.recommended, self.source)
 
     @property
     def reason(self) -> str:
@@ -378,84 +279,4 @@ class Comparison:
     def _repr_html_(self) -> str:
         from nutdamp.report.page.sheets import comparison_sheet
 
-        return _html(comparison_sheet(self.core))
-
-
-def load(path: str | PathLike[str], *, set: Mapping[str, object] | None = None) -> Spacecraft:  # noqa: A002 - as --set
-    """The spacecraft in a file (YAML or JSON); raises CannotRead, or FaultyFile with everything wrong in it.
-
-    ``set`` changes keys of the file as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
-    """
-    from nutdamp.files.settings import settings_of
-    from nutdamp.files.spacecraft_file import load_spacecraft
-
-    name, changes = arguments.path("path", path), settings_of(arguments.changes(set))
-    doubts: list[Fault] = []
-    return _with_warnings(load_spacecraft(name, changes, doubts.append), doubts)
-
-
-def read(text: str, name: str = "text") -> Spacecraft:
-    """The spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file ``name``."""
-    from nutdamp.files.spacecraft_file import read_spacecraft
-
-    doubts: list[Fault] = []
-    arguments.instance("text", text, str, "the text of a spacecraft file (nutdamp.load reads files)")
-    body = read_spacecraft(text, arguments.instance("name", name, str, "a text"), warn=doubts.append)
-    return _with_warnings(body, doubts)
-
-
-def example() -> Spacecraft:
-    """The built-in example, which ``nutdamp init`` writes."""
-    from nutdamp.files.spacecraft_file import built_in_example_text
-
-    return read(built_in_example_text(), "example.yaml")
-
-
-def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
-    """Plan one scheme and judge it by flying it; an infeasible plan says why.
-
-    Raises BadRequest for a scheme that there is not, or an option that makes no sense.
-    """
-    (name,) = arguments.scheme_names([scheme])
-    return Plan(planning.plan(_core(spacecraft), name, arguments.options(options)))
-
-
-def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice = None) -> Comparison:
-    """Plan the schemes named and recommend one; raises as `plan` does.
-
-    Default: the classic three, or those that point where the file has a target axis.
-    """
-    core = _core(spacecraft)
-    chosen = arguments.scheme_names(names) or planning.usual(core)
-    return Comparison(planning.compare(core, chosen, arguments.options(options)))
-
-
-def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
-    """The pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
-
-    Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
-    """
-    from nutdamp.files.schedule_file import read_pulses
-
-    core, name = _core(spacecraft), arguments.path("path", path)
-    schedule, remarks = read_pulses(name, core)
-    for remark in (*remarks, *broken_limits(core, schedule)):
-        warnings.warn(remark, stacklevel=2)
-    return Plan(planning.Plan(core, printable(name), schedule))
-
-
-def _with_warnings(body: craft.Spacecraft, doubts: list[Fault]) -> Spacecraft:
-    """The spacecraft of a file; warns of numbers that are hardly what was meant, where the library was called."""
-    for doubt in doubts:
-        warnings.warn(doubt.as_warning, stacklevel=3)
-    return Spacecraft(body)
-
-
-def _core(spacecraft: Spacecraft) -> craft.Spacecraft:
-    return arguments.instance("spacecraft", spacecraft, Spacecraft, "a Spacecraft, as nutdamp.load gives it").core
-
-
-def _html(block: Block) -> str:
-    from nutdamp.report.page.html import block_html
-
-    return block_html(block)
+        return block(comparison_sheet(self.core))
