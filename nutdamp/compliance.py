@@ -123,13 +123,21 @@ def unaided(spacecraft: Spacecraft) -> bool:
     return all(one.met for left in ends for one in held(spacecraft, left))
 
 
+def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
+    """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more.
+
+    Numbers, or arrays over cases.
+    """
+    return nutation if spacecraft.goal.axis is None else np.maximum(nutation, aim)
+
+
 def severity(spacecraft: Spacecraft, left: Left) -> Any:
     """The largest share of a bound that is `required` which is used up: 1 or less complies.
 
-    Without such bounds what is left in rad: nutation, with a target axis the distance from it where that is more.
+    Without such bounds what is `missed`, rad.
     """
     limits = required(spacecraft)
     if not limits:
-        return left.nutation if spacecraft.goal.axis is None else np.maximum(left.nutation, left.aim)
+        return missed(spacecraft, left.nutation, left.aim)
     shares = [left_of(bound.part, left, spacecraft) / bound.most for bound in limits]
     return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))

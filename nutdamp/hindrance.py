@@ -84,8 +84,7 @@ class Hindrance:
     def to_the_end(self) -> bool:
         """Whether less than one nutation period is left of the horizon after the last pulse."""
         body = self.spacecraft
-        period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
-        return body.horizon - self.pulses.end < period
+        return body.horizon - self.pulses.end < body.nutation_period
 
     @property
     def steady_tilt(self) -> float:

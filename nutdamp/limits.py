@@ -1,7 +1,7 @@
 """All that a schedule must keep: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
 
-`Windows` says when a pulse may be on; `keeps_limits` and `broken_limits` judge whole schedules, for the schemes and for
-the reader.
+`Windows` says when a pulse may be on; `keeps_limits` and `broken_limits` judge whole schedules: the first
+by start and end alone, for the schemes, the second by everything, for the reader.
 """
 
 from __future__ import annotations
@@ -148,11 +148,11 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time."""
     tick, time = spacecraft.limits.tick, spacecraft.horizon - spacecraft.limits.earliest
 
-    def commandable(channel: Channel) -> bool:
+    def has_on_time(channel: Channel) -> bool:
         least = channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - SLACK) / tick), 1) * tick
         return least <= min(channel.max_on_time, time) + SLACK
 
-    return [channel for channel in spacecraft.channels if (channel.damps or axial) and commandable(channel)]
+    return [channel for channel in spacecraft.channels if (channel.damps or axial) and has_on_time(channel)]
 
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
@@ -201,7 +201,7 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
 
 
 def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
-    """Whether the pulses, in order, keep every limit on their times."""
+    """Whether pulses, in order, keep earliest start, gap, blackout windows and horizon; on-times are not judged."""
     windows = Windows(spacecraft)
     ready = windows.limits.earliest
     for pulse in pulses:

@@ -195,7 +195,7 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes
     broken = broken_limits(spacecraft, made)
     if broken:
         return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
-    if scheme != "none" and left is not None and not _helps(flown, left):
+    if scheme in schemes.PLANNED and left is not None and not _helps(flown, left):
         angle = math.degrees(left.nutation)
         return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")
     return flown
@@ -241,9 +241,9 @@ class Comparison:
     def with_disturbances(self) -> Plan | None:
         """What would be recommended of the same schemes if they planned with the disturbances, where they did not.
 
-        None where that is the case already, and where it is not looked at: of optimal, which takes long.
+        None where that is the case already, and where it is not looked at: of schemes that are slow.
         """
-        quick = [one for one in self.plans if one.scheme not in schemes.SPINNING]
+        quick = [one for one in self.plans if not schemes.SCHEMES[one.scheme].slow]
         chosen, body = self.recommended, self.spacecraft
         if chosen is None or not quick or not body.disturbances or chosen.options.with_disturbances:
             return None

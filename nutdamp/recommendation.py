@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
-from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, Part, required
+from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, Part, missed, required
 from nutdamp.flight import Residual
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft
@@ -133,11 +133,6 @@ def cheapest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     return min(still, key=lambda one: one.pulses.end), Ground.SHIFT if len(still) == 1 else Ground.END
 
 
-def missed(spacecraft: Spacecraft, nutation: float, aim: float) -> float:
-    """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more."""
-    return nutation if spacecraft.goal.axis is None else max(nutation, aim)
-
-
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     """The plan that leaves least, and what decided; of those that leave as little the nearest to the requirement.
 
@@ -183,4 +178,4 @@ def _off(plan: Judged) -> float:
 
 def _missed(plan: Judged) -> float:
     assert plan.flown is not None
-    return missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error)
+    return float(missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error))

@@ -6,7 +6,6 @@ All of them fly the same draws through real widths, so that what is compared is 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import planning
+from nutdamp.compliance import missed
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
 from nutdamp.dispersion.outputs import aim_output
@@ -24,7 +24,7 @@ from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, thre
 from nutdamp.errors import Infeasible
 from nutdamp.limits import broken_limits
 from nutdamp.planning import Comparison, Plan
-from nutdamp.recommendation import Ground, by_propellant, cheapest, missed
+from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Spacecraft
 
@@ -53,13 +53,13 @@ class Candidate:
     @property
     def left(self) -> float:
         """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
-        return missed(self.plan.spacecraft, self.nutation, self.off)
+        return float(missed(self.plan.spacecraft, self.nutation, self.off))
 
     @property
     def nominal(self) -> float | None:
         """The same for nominal values, rad."""
         flown = self.plan.flown
-        return None if flown is None else missed(self.plan.spacecraft, flown.nutation, flown.axis_error)
+        return None if flown is None else float(missed(self.plan.spacecraft, flown.nutation, flown.axis_error))
 
     @property
     def rank(self) -> float:
@@ -200,9 +200,8 @@ def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tup
 
 def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     """Spacecraft for which the scheme plans in another way: later, or without one of the channels that it fires."""
-    period = body.body_period if math.isfinite(body.body_period) else body.inertial_period
     for periods in LATER:
-        earliest = body.limits.earliest + periods * period
+        earliest = body.limits.earliest + periods * body.nutation_period
         if earliest < body.horizon:
             yield f"from {earliest:.4g} s on", replace(body, limits=replace(body.limits, earliest=earliest))
     for name in dict.fromkeys(pulse.channel for pulse in base.pulses):

@@ -343,6 +343,11 @@ class Spacecraft:
         return cones.inertial_period(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin)
 
     @property
+    def nutation_period(self) -> float:
+        """Nutation period as seen in the body, s; for a sphere, where that is infinite, as seen inertially."""
+        return self.body_period if math.isfinite(self.body_period) else self.inertial_period
+
+    @property
     def least_impulse(self) -> float:
         """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without dissipation with less."""
         return self.inertia.A * self.transverse_rate

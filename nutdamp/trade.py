@@ -13,6 +13,7 @@ import numpy as np
 from nutdamp.planning import Plan, plan
 from nutdamp.schedule import Bounds
 from nutdamp.schemes.options import OptimalOptions
+from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
 SAVES = 1e-3
@@ -99,7 +100,7 @@ def _front(
     spacecraft: Spacecraft, options: OptimalOptions, count: int, shift: float, progress: Callable[[int], None]
 ) -> Front:
     """The fastest schedule, then horizons from its end to that of the file, evenly by their ratios."""
-    fastest = plan(spacecraft, "optimal", replace(options, least="time"))
+    fastest = plan(spacecraft, OPTIMAL.name, replace(options, least="time"))
     progress(1)
     if fastest.schedule is None or fastest.schedule.bounds is None:
         return Front(shift, (), fastest.why or "there is nothing to do")
@@ -108,7 +109,7 @@ def _front(
     for index, share in enumerate(np.linspace(0.0, 1.0, count)[1:], start=2):
         horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        found = plan(body, "optimal", options)
+        found = plan(body, OPTIMAL.name, options)
         progress(index)
         if found.schedule is not None and found.schedule.bounds is not None:
             points.append(Point(found, horizon))

@@ -22,7 +22,7 @@ from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
-from nutdamp.schemes import NAMES, Options
+from nutdamp.schemes import NAMES, PLANNED, Options
 
 
 @click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
@@ -78,7 +78,7 @@ def command(
     deliver([(output, export_text(plan, form, xml=notation, until=until))])
     if output != "-":
         remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
-    if plan.meets_requirement is False and scheme != "none":
+    if plan.meets_requirement is False and (scheme is None or scheme in PLANNED):
         remark(f"{plan.scheme} does not meet the requirement")
         sys.exit(REQUIREMENT_MISSED)
 

@@ -23,6 +23,7 @@ from nutdamp.cli.parameters import FILE, FOLDER, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
 from nutdamp.schemes.options import LEAST, OptimalOptions, Options
+from nutdamp.schemes.registry import OPTIMAL
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -93,7 +94,7 @@ def command(
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
     chosen = OptimalOptions(least=least, with_disturbances=options.with_disturbances)
-    expect_read(("optimal",), options, body, remark)
+    expect_read((OPTIMAL.name,), options, body, remark)
 
     from nutdamp.cli.progress import progress
 

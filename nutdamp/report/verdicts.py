@@ -16,6 +16,7 @@ from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Comparison, Plan
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.report.text import MISSING, degrees, duration, mass, moment, quantity
+from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:  # few runs look for a robust plan
@@ -182,7 +183,7 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
 def _optimal_untried(compared: Comparison) -> bool:
     """Whether there are channels that it can fire, and it was not compared."""
     able = any(channel.damps for channel in compared.spacecraft.channels)
-    return able and "optimal" not in {one.scheme for one in compared.plans}
+    return able and OPTIMAL.name not in {one.scheme for one in compared.plans}
 
 
 def _unplanned(compared: Comparison) -> str:

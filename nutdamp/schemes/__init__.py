@@ -16,7 +16,7 @@ from nutdamp.schemes.registry import CLASSIC, NAMES, PLANNED, POINTING, SCHEMES,
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
-    from nutdamp.schemes.tools.symmetric_model import Model
+    from nutdamp.schemes.tools.symmetric_model import SymmetricModel
     from nutdamp.spacecraft import Spacecraft
 
 __all__ = [
@@ -86,21 +86,23 @@ def _loaded(scheme: Scheme) -> ModuleType:
     return import_module(scheme.module)
 
 
-def _corrected(scheme: Scheme, model: Model, made: Schedule, options: SchemeOptions) -> Schedule:
+def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
     """A schedule for the ``model`` as one for the true spacecraft, trimmed on its motion where that differs."""
     from nutdamp.schemes.tools import least_squares
 
     made = model.translate(made)
     if not model.exact:
         made = made.without_proof
-    if model.truth.goal.axis is not None and not scheme.points and made.pulses:
+    if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
         made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
     if model.exact or options.uncorrected or not made.pulses:
         return made
     keeps = scheme.points and not options.frees_axis
     # The last pulses, which know what the others did on the model, undo what the true motion made of them.
     chosen = tuple(range(-min(len(made), 4), 0)) if keeps else (-1,)
-    spin = scheme.sets_spin and model.truth.goal.spin is not None
+    spin = scheme.sets_spin and model.spacecraft.goal.spin is not None
     if spin:  # and the pulse that gives most to the spin
         chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-    return least_squares.refine(model.truth, made, chosen=chosen, momentum=keeps, spin=spin, on_times=options.on_times)
+    return least_squares.refine(
+        model.spacecraft, made, chosen=chosen, momentum=keeps, spin=spin, on_times=options.on_times
+    )

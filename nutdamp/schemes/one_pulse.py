@@ -36,10 +36,10 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
-    walks = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
-    if not walks:
+    trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
+    if not trains:
         raise Infeasible(no_alignment(spacecraft, channels))
-    best = min(walks, key=_preference)
+    best = min(trains, key=_preference)
     return best.schedule()
 
 

@@ -21,7 +21,7 @@ class Scheme:
     ``classic``: of Magnus 1970, planned when none is named. ``points``: can turn the spin axis to a target, and is
     planned when there is one and none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps
     its pulses at a fixed phase to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
-    function ``alternatives`` too, of schedules about as good.
+    function ``alternatives`` too, of schedules about as good. ``slow``: takes seconds.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Scheme:
     reads_sun: bool = False
     sets_spin: bool = False
     weighs_alternatives: bool = False
+    slow: bool = False
 
 
 ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
@@ -41,7 +42,7 @@ TWO_PULSE = Scheme(
     "two-pulse", "nutdamp.schemes.two_pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
 )
 FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True)
-OPTIMAL = Scheme("optimal", "nutdamp.schemes.optimal.search", OptimalOptions, points=True, sets_spin=True)
+OPTIMAL = Scheme("optimal", "nutdamp.schemes.optimal.search", OptimalOptions, points=True, sets_spin=True, slow=True)
 HALF_CONE = Scheme("half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True)
 RHUMB_LINE = Scheme(
     "rhumb-line", "nutdamp.schemes.rhumb_line", RhumbLineOptions, points=True, only_points=True, reads_sun=True

@@ -19,36 +19,36 @@ from nutdamp.spacecraft import Attitude, Channel, Disturbance, Inertia, Spacecra
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """``body`` stands for ``truth``; ``stretch`` (2,) leads from the ellipse of (ω1, ω2) to the circle planned on."""
+class SymmetricModel:
+    """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1, ω2) to the circle."""
 
-    truth: Spacecraft
+    spacecraft: Spacecraft
     body: Spacecraft
     stretch: Vector
 
     @property
     def exact(self) -> bool:
-        """Whether the model moves as the truth does, so that nothing has to be trimmed."""
-        return self.truth.inertia.symmetric and not self.truth.disturbances and self.truth.growth == 0.0
+        """Whether the model moves as the spacecraft does, so that nothing has to be trimmed."""
+        return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
     def translate(self, made: Schedule) -> Schedule:
         """The schedule with the true actuators."""
-        if self.truth.inertia.symmetric:
+        if self.spacecraft.inertia.symmetric:
             return made
-        channels = {channel.name: channel for channel in self.truth.channels}
-        windows, ready, pulses = Windows(self.truth), self.truth.limits.earliest, []
+        channels = {channel.name: channel for channel in self.spacecraft.channels}
+        windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
         for pulse in made:
             channel = channels.get(pulse.channel)
             if channel is None:
                 pulses.append(self._steered(pulse, windows, ready))
             else:
                 pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
-            ready = pulses[-1].end + self.truth.limits.gap
+            ready = pulses[-1].end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), made.notes, made.bounds)
 
     def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
         """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits ask for it."""
-        torquer = self.truth.torquer
+        torquer = self.spacecraft.torquer
         assert torquer is not None
         first, second = pulse.impulse[:2] / self.stretch
         impulse, angle = math.hypot(first, second), math.atan2(second, first)
@@ -60,12 +60,12 @@ class Model:
         return steerable_pulse(torquer, t, angle, on_time=on_time)
 
 
-def model_of(spacecraft: Spacecraft) -> Model:
+def model_of(spacecraft: Spacecraft) -> SymmetricModel:
     """The model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself."""
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
     if inertia.symmetric:
-        return Model(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
+        return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
     from nutdamp.physics import triaxial  # a body of three moments needs it, and few plans are of one
 
     first, second, C = inertia.moments
@@ -82,25 +82,25 @@ def model_of(spacecraft: Spacecraft) -> Model:
         steerable=_stretched_torquer(undisturbed.steerable, stretch),
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
-    return Model(spacecraft, _aimed(body, spacecraft), stretch)
+    return SymmetricModel(spacecraft, _aimed(body, spacecraft), stretch)
 
 
-def _aimed(body: Spacecraft, truth: Spacecraft) -> Spacecraft:
-    """The ``body`` with the attitude of the ``truth``, and the target axis as far from its H as the true one is.
+def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
+    """The ``body`` with the attitude of the ``spacecraft``, and the target axis as far from its H as the true one is.
 
     Both have other rates, and so another H; what a plan has to do is the turn from H to the target.
     """
-    if truth.goal.axis is None or body is truth:
+    if spacecraft.goal.axis is None or body is spacecraft:
         return body
-    quaternion = truth.initial.quaternion
-    given = truth.attitude or Attitude(quaternion)
-    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(truth.inertia.axes.T))
+    quaternion = spacecraft.initial.quaternion
+    given = spacecraft.attitude or Attitude(quaternion)
+    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
     held = replace(body, attitude=replace(given, quaternion=in_file_axes))
-    before, after = (one / float(np.linalg.norm(one)) for one in (truth.momentum, held.momentum))
+    before, after = (one / float(np.linalg.norm(one)) for one in (spacecraft.momentum, held.momentum))
     # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
     middle = (before + after) / float(np.linalg.norm(before + after))
-    axis = truth.goal.axis - 2.0 * (middle @ truth.goal.axis) * middle
-    return replace(held, goal=replace(truth.goal, axis=axis - 2.0 * (after @ axis) * after))
+    axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
+    return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
 
 
 def _stretched(channel: Channel, stretch: Vector) -> Channel:
