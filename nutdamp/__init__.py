@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from nutdamp.errors import NutdampError
     from nutdamp.library import (
         Comparison,
+        Dispersion,
         Flight,
         FourPulseOptions,
         HalfConeOptions,
@@ -21,17 +22,24 @@ if TYPE_CHECKING:
         RhumbLineOptions,
         Spacecraft,
         Track,
+        Trade,
         TwoPulseOptions,
+        Verified,
         compare,
+        disperse,
         example,
+        export,
         load,
         load_schedule,
         plan,
         read,
+        trade,
+        verify,
     )
 
 __all__ = [
     "Comparison",
+    "Dispersion",
     "Flight",
     "FourPulseOptions",
     "HalfConeOptions",
@@ -43,15 +51,21 @@ __all__ = [
     "RhumbLineOptions",
     "Spacecraft",
     "Track",
+    "Trade",
     "TwoPulseOptions",
+    "Verified",
     "__version__",
     "compare",
+    "disperse",
     "errors",
     "example",
+    "export",
     "load",
     "load_schedule",
     "plan",
     "read",
+    "trade",
+    "verify",
 ]
 
 __version__ = "0.2.0"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from os import PathLike, fspath
 from typing import Any, TypeVar
@@ -68,3 +69,25 @@ def rows(value: Any) -> int:
     if is_count(value) and value >= 2:
         return int(value)
     raise BadRequest(f"samples = {shown(value)}: expected a whole number of at least 2")
+
+
+def count(name: str, value: Any) -> int:
+    """A whole number of at least 1; raises BadRequest."""
+    if is_count(value) and value >= 1:
+        return int(value)
+    raise BadRequest(f"{name} = {shown(value)}: expected a whole number of at least 1")
+
+
+def shifts(value: Any) -> tuple[float, ...]:
+    """Angles in rad, infinite where any will do; raises BadRequest."""
+    angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
+    if angles and all((is_number(one) or one == math.inf) and one >= 0.0 for one in angles):
+        return tuple(map(float, angles))
+    raise BadRequest(f"allow = {shown(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)")
+
+
+def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
+    """One of the ``names``; raises BadRequest."""
+    if isinstance(value, str) and value in names:
+        return value
+    raise BadRequest(f"{name} = {shown(value)}: expected one of {', '.join(names)}")

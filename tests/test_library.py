@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -344,6 +345,25 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
         lambda craft, _: nutdamp.plan(craft, np.zeros(2)),  # type: ignore[arg-type]
         "there is no scheme a numpy.ndarray; there are one-pulse",
     ),
+    "no points": (lambda craft, _: nutdamp.trade(craft, 0), "points = 0: expected a whole number of at least 1"),
+    "one angle": (lambda craft, _: nutdamp.trade(craft, allow=0.1), "allow = 0.1: expected angles of at least 0"),  # type: ignore[arg-type]
+    "a negative shift": (lambda craft, _: nutdamp.trade(craft, allow=[-0.1]), "expected angles of at least 0, in rad"),
+    "least time": (
+        lambda craft, _: nutdamp.trade(craft, least="time"),
+        "least = 'time': expected one of propellant, impulse",
+    ),
+    "a scheme to verify": (
+        lambda *_: nutdamp.verify("two-pulse"),  # type: ignore[arg-type]
+        "plan: expected a Plan, as nutdamp.plan gives it, got 'two-pulse'",
+    ),
+    "no dispersions": (
+        lambda *_: nutdamp.disperse(nutdamp.plan(nutdamp.read(TILTED), "none")),
+        "the spacecraft has no dispersions",
+    ),
+    "an unknown format": (
+        lambda _, plan: nutdamp.export(plan, "oem", "x"),
+        "format = 'oem': expected one of apm, aem, stk, basilisk, json",
+    ),
     "an end as text": (lambda _, plan: plan.fly(until="3"), "until = '3': expected a time after t = 0, in s"),
     "half a sample": (lambda _, plan: plan.fly(samples=2.5), "samples = 2.5: expected a whole number of at least 2"),
     "a number as output": (lambda _, plan: plan.to_csv(3), "path: expected the name of a file, got 3"),
@@ -375,6 +395,51 @@ def test_an_unknown_scheme_is_refused_without_nutation_too() -> None:
     for call in (planning.plan, planning.alternatives):
         with pytest.raises(KeyError):
             call(calm.core, "three-pulse")
+
+
+@pytest.fixture
+def dispersed(tmp_path: Path) -> Path:
+    shutil.copy(ROOT / "configs" / "single-thruster.yaml", tmp_path / "spacecraft.yaml")
+    return tmp_path
+
+
+def test_studies_have_the_numbers_of_the_commands(run: Run, dispersed: Path) -> None:
+    craft = nutdamp.load(dispersed / "spacecraft.yaml")
+    chosen = nutdamp.compare(craft).recommended
+    assert chosen is not None
+    chosen.to_csv(dispersed / "pulses.csv")
+    held = nutdamp.load_schedule(dispersed / "pulses.csv", craft)
+    for command, made in (
+        (("disperse", "--samples", "200", "--seed", "3"), nutdamp.disperse(chosen, 200, seed=3).to_dict()),
+        (("verify",), nutdamp.verify(chosen).to_dict()),
+        (("verify", "--schedule", "pulses.csv"), {**nutdamp.verify(held).to_dict(), "scheme": "pulses.csv"}),
+    ):
+        done = run(*command, "--json", "own.json")
+        assert done.returncode in (0, 4), done.stderr
+        assert json.loads((dispersed / "own.json").read_text()) == json.loads(json.dumps(made, allow_nan=False))
+
+
+def test_a_trade_has_the_numbers_of_the_command(run: Run, tmp_path: Path, craft: nutdamp.Spacecraft) -> None:
+    done = run("trade", "--points", "2", "--allow", "0", "--least", "impulse", "--json", "trade.json")
+    assert done.returncode == 0, done.stderr
+    found = nutdamp.trade(craft, points=2, allow=(0.0,), least="impulse")
+    assert json.loads(json.dumps(found.to_dict(), allow_nan=False)) == json.loads((tmp_path / "trade.json").read_text())
+    assert len(found.plans) == len(found.fronts[0].points) > 0
+    assert all(one.feasible for one in found.plans)
+
+
+def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
+    timed = ("--set", "attitude={quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}")
+    craft = nutdamp.example().with_(
+        attitude={"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+    )
+    plan = nutdamp.plan(craft, "two-pulse")
+    for form, name in (("stk", "x.a"), ("basilisk", "x.py"), ("json", "x.json"), ("aem", "x.xml"), ("apm", "x.apm")):
+        run("export", "--format", form, "--scheme", "two-pulse", *timed, "-o", f"command-{name}")
+        nutdamp.export(plan, form, tmp_path / name)
+        texts = [(tmp_path / one).read_text() for one in (name, f"command-{name}")]
+        mine, its = (re.sub(r"(CREATION_DATE|MESSAGE_ID)( *= *|>)[^<\n]*", r"\1", text) for text in texts)
+        assert mine == its
 
 
 class _Tags(HTMLParser):

@@ -15,7 +15,7 @@ from builders import cross, spinner
 from checker import violations
 from process import Run
 
-from nutdamp import trade
+from nutdamp import fronts
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Spacecraft
 
@@ -28,15 +28,15 @@ def body() -> Spacecraft:
 
 
 @pytest.fixture(scope="module")
-def found(body: Spacecraft) -> tuple[trade.Front, ...]:
-    return trade.fronts(body, OptimalOptions(), count=4, shifts=(trade.EVERYWHERE, 0.0, HALF_DEGREE))
+def found(body: Spacecraft) -> tuple[fronts.Front, ...]:
+    return fronts.fronts(body, OptimalOptions(), count=4, shifts=(fronts.EVERYWHERE, 0.0, HALF_DEGREE))
 
 
-def test_fronts_go_from_strict_to_free(found: tuple[trade.Front, ...]) -> None:
+def test_fronts_go_from_strict_to_free(found: tuple[fronts.Front, ...]) -> None:
     assert [front.shift for front in found] == [0.0, HALF_DEGREE, math.inf]
 
 
-def test_later_points_are_cheaper(found: tuple[trade.Front, ...]) -> None:
+def test_later_points_are_cheaper(found: tuple[fronts.Front, ...]) -> None:
     for front in found:
         assert len(front.points) >= 2
         for one, two in itertools.pairwise(front.points):
@@ -44,7 +44,7 @@ def test_later_points_are_cheaper(found: tuple[trade.Front, ...]) -> None:
             assert one.cost > two.cost
 
 
-def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[trade.Front, ...]) -> None:
+def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[fronts.Front, ...]) -> None:
     for front in found:
         for point in front.points:
             assert violations(body, point.plan.pulses) == []
@@ -64,8 +64,8 @@ def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: 
             for one in body.channels
         ),
     )
-    (front,) = trade.fronts(fuelled, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
-    (known,) = trade.fronts(fuelled, OptimalOptions(), count=3, shifts=(0.0,))
+    (front,) = fronts.fronts(fuelled, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
+    (known,) = fronts.fronts(fuelled, OptimalOptions(), count=3, shifts=(0.0,))
     assert {point.bounds.unit for point in front.points} == {"N m s"}
     assert {point.bounds.unit for point in known.points} == {"kg"}
     assert len(front.points) == len(known.points) >= 2
@@ -73,16 +73,16 @@ def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: 
         assert by_impulse.cost == pytest.approx(by_propellant.plan.pulses.total_impulse, rel=1e-6)
 
 
-def test_what_is_allowed_more_costs_no_more(found: tuple[trade.Front, ...]) -> None:
+def test_what_is_allowed_more_costs_no_more(found: tuple[fronts.Front, ...]) -> None:
     for strict, free in itertools.pairwise(found):
         for point in strict.points:
             later = [other for other in free.points if other.plan.pulses.end <= point.plan.pulses.end + 1e-9]
-            assert min(other.cost for other in later) <= point.cost * (1 + 2 * trade.SAVES)
+            assert min(other.cost for other in later) <= point.cost * (1 + 2 * fronts.SAVES)
 
 
 def test_no_schedule_within_the_horizon_is_said_with_its_reason() -> None:
     body = spinner(channels=cross(8.0)[:1], limits=Limits(horizon=0.2))
-    front = trade.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))[0]
+    front = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))[0]
     assert front.points == ()
     assert front.why is not None
     assert "horizon" in front.why

@@ -82,10 +82,10 @@ def command(
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
-    from nutdamp import trade
+    from nutdamp import fronts
     from nutdamp.files.trade_files import schedule_files, schedule_path
 
-    shifts = allow or (0.0, trade.EVERYWHERE)
+    shifts = allow or (0.0, fronts.EVERYWHERE)
     most = points * len(set(shifts))
     written = [] if schedules is None else [schedule_path(schedules, index) for index in range(1, most + 1)]
     silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot, schedules=written)
@@ -99,7 +99,7 @@ def command(
     from nutdamp.cli.progress import progress
 
     with progress("searching", most, quiet=quiet) as step:
-        found = trade.fronts(body, chosen, count=points, shifts=shifts, progress=step)
+        found = fronts.fronts(body, chosen, count=points, shifts=shifts, progress=step)
     outputs: list[Output] = []
     if csv is not None or json is not None:
         from nutdamp.files.output import json_text

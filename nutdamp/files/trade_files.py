@@ -11,8 +11,8 @@ from nutdamp import __version__
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import plan_json, spacecraft_json
 from nutdamp.files.pulses_csv import pulses_csv
+from nutdamp.fronts import Front, Point, numbered
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.trade import Front, Point, numbered
 
 HEADER = (
     "point",

@@ -16,12 +16,14 @@ from nutdamp.flight import Residual
 from nutdamp.library.calls import compare, load_schedule, plan
 from nutdamp.library.craft import Spacecraft, example, load, read
 from nutdamp.library.results import Comparison, Flight, Plan
+from nutdamp.library.studies import Dispersion, Trade, Verified, disperse, export, trade, verify
 from nutdamp.schemes import Options
 from nutdamp.schemes.options import FourPulseOptions, HalfConeOptions, OptimalOptions, RhumbLineOptions, TwoPulseOptions
 from nutdamp.track import Track
 
 __all__ = [
     "Comparison",
+    "Dispersion",
     "Flight",
     "FourPulseOptions",
     "HalfConeOptions",
@@ -32,11 +34,17 @@ __all__ = [
     "RhumbLineOptions",
     "Spacecraft",
     "Track",
+    "Trade",
     "TwoPulseOptions",
+    "Verified",
     "compare",
+    "disperse",
     "example",
+    "export",
     "load",
     "load_schedule",
     "plan",
     "read",
+    "trade",
+    "verify",
 ]

@@ -44,4 +44,4 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
     schedule, remarks = read_pulses(name, core)
     for remark in (*remarks, *broken_limits(core, schedule)):
         warnings.warn(remark, stacklevel=2)
-    return Plan(planning.Plan(core, printable(name), schedule), spacecraft.source)
+    return Plan(planning.Plan(core, printable(name), schedule), spacecraft.source, from_file=True)

@@ -103,10 +103,14 @@ class Flight:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
-    """A scheme's schedule for a spacecraft, and how it was judged; an infeasible one says ``why``."""
+    """A scheme's schedule for a spacecraft, and how it was judged; an infeasible one says ``why``.
+
+    ``from_file``: its pulses were read, and no scheme planned them.
+    """
 
     core: planning.Plan
     source: Source | None = None
+    from_file: bool = False
 
     @property
     def spacecraft(self) -> Spacecraft:
@@ -173,7 +177,7 @@ class Plan:
         just before and after each pulse. Raises Infeasible where there is no schedule, BadRequest where no track can
         be made.
         """
-        self._feasible_only()
+        feasible_core(self)
         body, pulses = self.core.spacecraft, self.core.pulses
         end = arguments.end_of_flight(pulses.end + body.inertial_period if until is None else until)
         count = arguments.rows(samples)
@@ -191,7 +195,7 @@ class Plan:
         from nutdamp.files.output import write_whole
         from nutdamp.files.pulses_csv import pulses_csv
 
-        self._feasible_only()
+        feasible_core(self)
         write_whole(arguments.path("path", path), pulses_csv(self.core.flight))
 
     def to_dict(self) -> dict[str, Any]:
@@ -200,10 +204,6 @@ class Plan:
         from nutdamp.files.plan_json import plan_json
 
         return finite(plan_json(self.core))
-
-    def _feasible_only(self) -> None:
-        if not self.feasible:
-            raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
 
     def __repr__(self) -> str:
         left = self.flown
@@ -280,3 +280,11 @@ class Comparison:
         from nutdamp.report.page.sheets import comparison_sheet
 
         return block(comparison_sheet(self.core))
+
+
+def feasible_core(plan: Plan) -> planning.Plan:
+    """What the modules below take; raises BadRequest for what is no `Plan`, Infeasible for one without a schedule."""
+    core = arguments.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it").core
+    if not core.feasible:
+        raise Infeasible(f"{core.scheme} is infeasible: {core.why}")
+    return core

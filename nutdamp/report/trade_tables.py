@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.fronts import Front, numbered
 from nutdamp.report.layout import columns
 from nutdamp.report.plan_tables import header
 from nutdamp.report.text import degrees, mass, moment, quantity
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.trade import Front, numbered
 
 
 def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableType:

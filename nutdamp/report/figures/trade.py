@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nutdamp.fronts import Front
 from nutdamp.report.figures import style
 from nutdamp.report.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.report.trade_tables import front_name
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.trade import Front
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

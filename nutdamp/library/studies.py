@@ -1,0 +1,135 @@
+"""What the commands trade, disperse, verify and export do, for plans in memory; the numbers are those of their JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+from nutdamp import arguments, dispersion, planning, verification
+from nutdamp import fronts as trading
+from nutdamp import spacecraft as craft
+from nutdamp.dispersion.study import Results, run, threads_here
+from nutdamp.errors import BadRequest
+from nutdamp.library.craft import Source, Spacecraft, core_of
+from nutdamp.library.results import Plan, feasible_core
+from nutdamp.schemes.options import LEAST, OptimalOptions
+
+
+@dataclass(frozen=True, eq=False)
+class Trade:
+    """What time costs: ``fronts`` of schedules of the scheme optimal, one for each shift of H allowed."""
+
+    core: craft.Spacecraft
+    fronts: tuple[trading.Front, ...]
+    source: Source | None = None
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plans of all points, front after front, each from its earliest end to its latest."""
+        return tuple(Plan(point.plan, self.source) for _, _, point in trading.numbered(self.fronts))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``trade --json`` gives."""
+        from nutdamp.files.output import finite
+        from nutdamp.files.trade_files import trade_json
+
+        return finite(trade_json(self.core, self.fronts))
+
+
+@dataclass(frozen=True, eq=False)
+class Dispersion:
+    """A schedule flown in many dispersed cases; ``core`` holds the distributions of what they leave."""
+
+    core: Results
+    scheme: str
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of the cases that meet the requirement; None where nothing is required."""
+        return self.core.met_fraction
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether as many cases meet it as the file requires; None where nothing is required."""
+        return self.core.meets_requirement
+
+    def to_dict(self, worst: int = 5) -> dict[str, Any]:
+        """What ``disperse --json`` gives, with as many ``worst`` cases."""
+        from nutdamp.files.dispersion_json import dispersion_json
+        from nutdamp.files.output import finite
+
+        return finite(dispersion_json(self.core, scheme=self.scheme, worst=worst))
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """A schedule flown by independent methods: ``core`` holds them, what is conserved, and the error budget."""
+
+    core: verification.Verification
+    plan: Plan
+
+    @property
+    def agree(self) -> bool:
+        """Whether an independent integration was flown, and all of them confirm the flown motion."""
+        return self.core.agree
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``verify --json`` gives."""
+        from nutdamp.files.output import finite
+        from nutdamp.files.verification_json import verification_json
+
+        return finite(verification_json(self.plan.core.flight, self.plan.scheme, self.core))
+
+
+def trade(
+    spacecraft: Spacecraft,
+    points: int = 10,
+    allow: Iterable[float] = (0.0, math.inf),
+    least: str = "propellant",
+) -> Trade:
+    """Time against propellant (``least="impulse"``: impulse), as ``nutdamp trade`` does; raises BadRequest.
+
+    ``points``: horizons tried for each front; ``allow``: how far from its target H may end, rad, a front for each.
+    """
+    core = core_of(spacecraft)
+    count, shifts = arguments.count("points", points), arguments.shifts(allow)
+    options = OptimalOptions(least=arguments.one_of("least", least, LEAST[:2]))
+    return Trade(core, trading.fronts(core, options, count=count, shifts=shifts), spacecraft.source)
+
+
+def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispersion.SEED) -> Dispersion:
+    """Fly the schedule through its real widths in dispersed cases, as ``nutdamp disperse`` does.
+
+    Raises Infeasible where there is no schedule, BadRequest for a spacecraft without dispersions.
+    """
+    core = feasible_core(plan)
+    if not 0 <= arguments.instance("seed", seed, int, "a whole number") < 2**64:
+        raise BadRequest(f"seed = {seed}: expected a whole number from 0 to 2**64 - 1")
+    study = dispersion.study_of(core.spacecraft, core.pulses, seed=seed)
+    results = Results(study, arguments.count("samples", samples))
+    return Dispersion(run(results, threads=threads_here()), core.scheme)
+
+
+def verify(plan: Plan) -> Verified:
+    """Fly the schedule by independent methods, as ``nutdamp verify`` does; raises Infeasible without a schedule."""
+    core = feasible_core(plan)
+    smooth = None if plan.from_file else planning.unrounded(core)
+    expected = core.options.with_disturbances
+    return Verified(verification.verify(core.spacecraft, core.pulses, smooth, expected=expected), plan)
+
+
+def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float | None = None) -> None:  # noqa: A002 - as --format
+    """Write what ``nutdamp export`` writes: apm, aem, stk, basilisk or json; messages as XML where the name says .xml.
+
+    ``until``: end of an aem or stk track, s. Raises Infeasible, BadRequest or CannotWrite.
+    """
+    from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
+    from nutdamp.files.output import write_whole
+
+    core, form = feasible_core(plan), arguments.one_of("format", format, FORMATS)
+    name = arguments.path("path", path)
+    end = None if until is None else arguments.end_of_flight(until)
+    write_whole(name, export_text(core, form, xml=form in MESSAGES and name.lower().endswith(".xml"), until=end))
