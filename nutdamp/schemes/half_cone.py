@@ -15,8 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable, usable
+from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes import one_pulse

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
+from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.tools import least_squares

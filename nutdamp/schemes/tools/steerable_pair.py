@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.flight import Arc
 from nutdamp.limits import Windows, commandable
+from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, steerable_pulse
 from nutdamp.schemes.tools.reasons import turn_of
