@@ -30,15 +30,16 @@ def _bounds(plan: Plan) -> Iterator[str]:
     spent = plan.pulses.cost_in(bounds.unit)
     scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
     parts = [f"{scale * spent:.4g} {unit}"]
-    if bounds.first_order is not None:
-        gap = 100.0 * (spent / bounds.first_order - 1.0) if bounds.first_order > 0.0 else math.inf
+    # A bound of nothing, where the nutation damps itself, says nothing.
+    if bounds.first_order is not None and bounds.first_order > 0.0:
+        gap = 100.0 * (spent / bounds.first_order - 1.0)
         rest = plan.flight.residual.nutation > TELLING
         holds = "that leaves no nutation" if rest else "that holds for small angles"
         beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: {holds}"
         parts.append(
             f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
         )
-    if bounds.rigorous is not None:
+    if bounds.rigorous is not None and bounds.rigorous > 0.0:
         least = f"{_down(scale * bounds.rigorous):.4g} {unit}"
         parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
     if len(parts) > 1:

@@ -147,6 +147,14 @@ def test_a_bound_is_never_told_rounded_up() -> None:
         assert any(f"takes less than {told} N m s" in text for text in said)
 
 
+def test_a_bound_of_nothing_is_not_told() -> None:
+    """Where the nutation damps itself schedules may cost next to nothing; a share of nothing is no number."""
+    body = spinner(channels=cross(8.0))
+    made = plan(body, "one-pulse").pulses
+    said = remarks(Plan(body, "one-pulse", replace(made, bounds=Bounds(0.0, 0.0, "N m s", 60.0))))
+    assert not any("least" in text or "takes less" in text or "inf" in text for text in said)
+
+
 def two_impulses_by_way_of_the_spin(body: Spacecraft, faster: float) -> tuple[float, float]:
     """Spin thruster at t = 0 by ``faster`` rad/s, then +1 where it opposes ω: (cost, nutation left in rad), flown."""
     a, phase = body.inertia.a, math.atan2(body.omega0[1], body.omega0[0])
