@@ -126,5 +126,12 @@ class MissingExtra(NutdampError):
         return f"{self.purpose} needs the extra '{self.extra}': pip install 'nutdamp[{self.extra}]'"
 
 
+class MissingPandas(NutdampError):
+    """pandas is needed and not installed."""
+
+    def __str__(self) -> str:
+        return "a DataFrame needs pandas: pip install pandas"
+
+
 class Infeasible(NutdampError):
     """A scheme that cannot work with this spacecraft within its limits; the text says why."""

@@ -26,6 +26,7 @@ FAULTS = [Fault("b.yaml", 3, 1, "mass", "zero"), Fault("a.yaml", 0, 0, "", "empt
         errors.CannotRead("in.yaml", "no such file"),
         errors.CannotWrite("out.csv", "permission denied"),
         errors.MissingExtra("plot", "a picture"),
+        errors.MissingPandas(),
         errors.Infeasible("no thrusters"),
     ],
     ids=lambda error: type(error).__name__,

@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import types
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -440,6 +441,21 @@ def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
         texts = [(tmp_path / one).read_text() for one in (name, f"command-{name}")]
         mine, its = (re.sub(r"(CREATION_DATE|MESSAGE_ID)( *= *|>)[^<\n]*", r"\1", text) for text in texts)
         assert mine == its
+
+
+def test_tables_become_data_frames(craft: nutdamp.Spacecraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = nutdamp.plan(craft, "two-pulse")
+    stand_in = types.ModuleType("pandas")
+    stand_in.DataFrame = dict  # type: ignore[attr-defined]
+    for made in (plan, plan.fly(samples=20)):
+        monkeypatch.setitem(sys.modules, "pandas", stand_in)
+        frame, rows = made.to_pandas(), made.to_numpy()
+        assert tuple(frame) == rows.dtype.names
+        for name in rows.dtype.names:
+            assert np.array_equal(frame[name], rows[name])
+        monkeypatch.setitem(sys.modules, "pandas", None)
+        with pytest.raises(nutdamp.NutdampError, match="needs pandas: pip install pandas"):
+            made.to_pandas()
 
 
 class _Tags(HTMLParser):

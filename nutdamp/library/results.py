@@ -15,7 +15,7 @@ from nutdamp import flight as flights
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight import Residual
 from nutdamp.library.craft import Source, Spacecraft
-from nutdamp.library.notebook import block
+from nutdamp.library.notebook import block, data_frame
 from nutdamp.outcome import seen_at
 from nutdamp.remarks import remarks
 from nutdamp.report.text import degrees
@@ -23,6 +23,7 @@ from nutdamp.track import Track, in_file_axes, in_pieces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 Table = NDArray[np.void]
 """A structured array: one row a pulse or a sample, fields named as the columns of the CSV files."""
@@ -61,6 +62,10 @@ class Flight:
         from nutdamp.files.track_csv import track_array
 
         return track_array(self.sampled, self.core.spacecraft.inertia)
+
+    def to_pandas(self) -> DataFrame:
+        """`to_numpy` as a DataFrame; raises MissingPandas where pandas is not installed."""
+        return data_frame(self.to_numpy())
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the track as ``simulate --csv`` does; raises CannotWrite."""
@@ -189,6 +194,10 @@ class Plan:
         from nutdamp.files.pulses_csv import pulses_array
 
         return pulses_array(self.core.flight)
+
+    def to_pandas(self) -> DataFrame:
+        """`to_numpy` as a DataFrame; raises MissingPandas where pandas is not installed."""
+        return data_frame(self.to_numpy())
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the pulses as ``plan --csv`` does; raises CannotWrite, and Infeasible where there is no schedule."""
