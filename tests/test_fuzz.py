@@ -22,7 +22,7 @@ import pytest
 from nutdamp.cli import main
 
 SEEDS, QUICK = 2000, 40
-CHECKED, BLOCKS = 1000, 25
+CHECKED, BLOCKS = 500, 20
 """How many of them run with the slow tests, for the time they take, and in how many tests."""
 STATUSES = (0, 2, 3, 4)
 SCHEMES = ("one-pulse", "two-pulse", "four-pulse", "half-cone", "rhumb-line")
