@@ -282,11 +282,11 @@ class Descent:
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
         there = line.tried(step)
-        if len(k := line.todo):  # the equations are curved: from there back onto them
+        if len(k := line.active):  # the equations are curved: from there back onto them
             back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
             line.tried(step[k] + back)
-        if len(line.todo):
-            line.shortened(step[line.todo])
+        if len(line.active):
+            line.shortened(step[line.active])
         x, slack, misses = line.x, line.slack, line.misses
         slopes = self.task.slopes(which, x, scale, misses, self.kicks)
         curvature = _curved(old.curvature, (x - old.x) / scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices))
@@ -312,21 +312,21 @@ class _Line:
         self.price, self.scale, self.rows = descent.price[at], descent.scale[at], descent.rows[at]
         self.old, self.penalty, self.slope = old, penalty, np.minimum(slope, 0.0)
         self.x, self.slack, self.misses = old.x.copy(), old.slack.copy(), old.misses.copy()
-        self.todo = np.arange(len(at))
-        self.before = self._merit(old.x, old.slack, old.misses, self.todo)
+        self.active = np.arange(len(at))
+        self.before = self._merit(old.x, old.slack, old.misses, self.active)
         self.stuck = np.zeros(len(at), dtype=bool)
 
     def tried(self, step: Vector) -> Vector:
         """Take the scaled ``step`` (k, v) of those still to do where it falls enough; the misses where it does not."""
-        k = self.todo
+        k = self.active
         x, slack, misses, enough = self._trial(k, step, 1.0)
         self._take(k[enough], x[enough], slack[enough], misses[enough])
-        self.todo = k[~enough]
+        self.active = k[~enough]
         return misses[~enough]
 
     def shortened(self, step: Vector) -> None:
         """Take the first of the `SHARES` of the ``step`` (k, v) of those still to do that falls enough, or the last."""
-        k, count = self.todo, len(SHARES)
+        k, count = self.active, len(SHARES)
         share = np.repeat(SHARES, len(k))
         x, slack, misses, enough = self._trial(np.tile(k, count), share[:, None] * np.tile(step, (count, 1)), share)
         x, slack, misses = (part.reshape(count, len(k), -1) for part in (x, slack, misses))
