@@ -1,6 +1,6 @@
 """What keeps a schedule from leaving less nutation: disturbances, limits of the file, or the scheme itself.
 
-It gives data; `nutdamp.remarks` and `nutdamp.report.verdicts` have the words.
+It gives data; `nutdamp.remarks` and `nutdamp.presentation.verdicts` have the words.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Which of several plans to fly: the rule, on what the plans leave when flown and on what they cost.
 
-It gives data; `nutdamp.report.verdicts` has the words.
+It gives data; `nutdamp.presentation.verdicts` has the words.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
 
-The plan gives the data; what is said of several plans together is in `nutdamp.report.verdicts`.
+The plan gives the data; what is said of several plans together is in `nutdamp.presentation.verdicts`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from nutdamp.dispersion.study import Study
 from nutdamp.files.plan_json import residual_json, spacecraft_json
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.report.figures.motion import title
+from nutdamp.presentation.figures.motion import title
 from nutdamp.schedule import Schedule, channel_pulse
 
 ROWS = 4001

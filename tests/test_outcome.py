@@ -22,7 +22,7 @@ from nutdamp import flight, planning
 from nutdamp.compliance import Part
 from nutdamp.flight import Flight
 from nutdamp.outcome import ANGLE, deviations, seen_at, tolerated
-from nutdamp.report.figures.motion import title
+from nutdamp.presentation.figures.motion import title
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement, Spacecraft, Steerable
 

@@ -16,9 +16,9 @@ from nutdamp.compliance import Part
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.planning import Comparison, Plan, compare
+from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.remarks import remarks
-from nutdamp.report import verdicts
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Goal, Inertia, Limits, Requirement
 

@@ -10,8 +10,8 @@ import pytest
 from builders import Outcome, aimed, channel, spinner
 
 from nutdamp.planning import Comparison, Plan, compare, usual
+from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Standing
-from nutdamp.report import verdicts
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft, Steerable
 

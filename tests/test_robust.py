@@ -17,7 +17,7 @@ from nutdamp.dispersion.single import flown_outputs
 from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
-from nutdamp.report import verdicts
+from nutdamp.presentation import verdicts
 from nutdamp.schemes import CLASSIC, four_pulse
 from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
 from nutdamp.tolerances import Dispersions, Tolerance

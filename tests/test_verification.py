@@ -22,7 +22,7 @@ from nutdamp.cli.verify import command as verify_command
 from nutdamp.errors import MissingExtra
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.report.verify_tables import verdict
+from nutdamp.presentation.verify_tables import verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft

@@ -22,9 +22,9 @@ from process import Run
 from nutdamp import planning, rounding
 from nutdamp.files.plan_json import final_json, plan_json, target_json
 from nutdamp.physics import attitude
-from nutdamp.report.figures import timeline_figure
-from nutdamp.report.plan_tables import channel_text, pulse_table
-from nutdamp.report.text import longitude, steering, vector
+from nutdamp.presentation.figures import timeline_figure
+from nutdamp.presentation.plan_tables import channel_text, pulse_table
+from nutdamp.presentation.text import longitude, steering, vector
 from nutdamp.schedule import Schedule, steerable_pulse
 from nutdamp.spacecraft import Attitude, Steerable
 

@@ -59,7 +59,7 @@ def command(
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
     expect_outputs(spacecraft, schedule, output=output)
-    from nutdamp.report.figures import animation
+    from nutdamp.presentation.figures import animation
 
     animation.film_format(output)
     remark = remarks(quiet)

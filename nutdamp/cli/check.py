@@ -72,7 +72,7 @@ def _looked_into(
     """
     from nutdamp.errors import Fault, FaultyFile, NutdampError
     from nutdamp.files.check_json import checked_json
-    from nutdamp.report.check_tables import check_screen
+    from nutdamp.presentation.check_tables import check_screen
 
     spacecraft = load(given, remark, doubts=doubts)
     try:

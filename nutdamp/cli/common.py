@@ -118,7 +118,7 @@ def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
         if figure != FIGURES[0]:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
         return
-    from nutdamp.report import figures
+    from nutdamp.presentation import figures
 
     figures.ending(path)
 
@@ -188,7 +188,7 @@ def plan_or_read(
         if scheme:
             plan: Plan | None = planning.plan(body, scheme, options)
         else:
-            from nutdamp.report import verdicts
+            from nutdamp.presentation import verdicts
 
             compared = planning.compare(body, planning.usual(body), options)
             plan = compared.recommended

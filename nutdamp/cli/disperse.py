@@ -131,12 +131,12 @@ def command(
 
         outputs.append((json, json_text(dispersion_json(results, scheme=plan.scheme, worst=worst))))
     if plot is not None:
-        from nutdamp.report import figures
+        from nutdamp.presentation import figures
 
         outputs.append((plot, figures.rendered(figures.dispersion_figure(results, scheme=plan.scheme), plot)))
     screens: list[RenderableType] = []
     if not silent:
-        from nutdamp.report.dispersion_tables import dispersion_screen
+        from nutdamp.presentation.dispersion_tables import dispersion_screen
 
         screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal))
     deliver(outputs, *screens, unsaved=unsaved)
@@ -242,7 +242,7 @@ def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bo
         )
     screens: list[RenderableType] = []
     if not silent:
-        from nutdamp.report.dispersion_tables import case_screen
+        from nutdamp.presentation.dispersion_tables import case_screen
 
         flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
         screens.append(case_screen(study, case, draws, flown, scheme=scheme))

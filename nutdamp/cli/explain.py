@@ -28,7 +28,7 @@ def command(topic: tuple[str, ...]) -> None:
     TOPIC is a scheme; a number such as 17, K7 or 24.4, or `equations` for all; `nutation`, `dissipation`, `figures`;
     `file`, `file.thrusters`, `units`. Without it the topics are listed.
     """
-    from nutdamp.report import explain_tables
+    from nutdamp.presentation import explain_tables
 
     asked = " ".join(topic)
     if not asked.strip():

@@ -98,7 +98,7 @@ def command(
     if json is not None:
         from nutdamp.files.output import json_text
         from nutdamp.files.plan_json import comparison_json
-        from nutdamp.report import verdicts
+        from nutdamp.presentation import verdicts
 
         data = comparison_json(compared, verdicts.spoken(compared))
         if dispersed is not None:
@@ -111,7 +111,7 @@ def command(
 
         outputs.append((csv, pulses_csv(chosen.flight)))
     if plot is not None and chosen is not None:
-        from nutdamp.report import figures
+        from nutdamp.presentation import figures
 
         outputs.append((plot, figures.plan_picture(figure, chosen, plot)))
     for path in (csv, plot):
@@ -119,15 +119,15 @@ def command(
             say(f"{path} was not written: no plan is feasible")
     screens: list[RenderableType] = []
     if not silent and dispersed is not None:
-        from nutdamp.report.robust_tables import robust_screen
+        from nutdamp.presentation.robust_tables import robust_screen
 
         screens.append(robust_screen(dispersed))
     elif not silent:
-        from nutdamp.report.plan_tables import comparison_screen
+        from nutdamp.presentation.plan_tables import comparison_screen
 
         screens.append(comparison_screen(compared))
     else:
-        from nutdamp.report import verdicts
+        from nutdamp.presentation import verdicts
 
         for warning in verdicts.warnings(compared):
             remark(f"warning: {warning}")

@@ -83,7 +83,7 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as HTML. Pictures need the extra plot, a PDF needs Chromium, Chrome or Edge.
     """
-    from nutdamp.report.page.formats import form_of
+    from nutdamp.presentation.page.formats import form_of
 
     form = form_of(output)
     expect_outputs(spacecraft, output=output)
@@ -94,7 +94,7 @@ def command(
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.files.yaml_tree import dotted
     from nutdamp.planning import compare, usual
-    from nutdamp.report.page.content import Repeat, report_page
+    from nutdamp.presentation.page.content import Repeat, report_page
 
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)

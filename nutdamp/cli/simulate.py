@@ -113,22 +113,22 @@ def command(
             (json, json_text(simulation_json(chosen, found, impulses, flown, scheme=plan.scheme, real=real)))
         )
     if plot is not None and track is not None:
-        from nutdamp.report import figures
+        from nutdamp.presentation import figures
 
         outputs.append((plot, figures.picture(figure, chosen, track, plot)))
     screens: list[RenderableType] = []
     if silent:
-        from nutdamp.report.verdicts import model_warnings
+        from nutdamp.presentation.verdicts import model_warnings
 
         for warning in model_warnings(impulses, flown):
             remark(f"warning: {warning}")
     else:
-        from nutdamp.report.simulate_tables import simulation_screen
+        from nutdamp.presentation.simulate_tables import simulation_screen
 
         how = f"{plan.scheme}, propagated by the {'real pulse widths' if real else 'impulse sum (17)'}"
         screens.append(simulation_screen(chosen, found, impulses, flown, how=how, pulses=len(pulses)))
     if track is not None and drawn:
-        from nutdamp.report.terminal import motion_drawing
+        from nutdamp.presentation.terminal import motion_drawing
 
         screens.append(motion_drawing(chosen, track))
     deliver(outputs, *screens)

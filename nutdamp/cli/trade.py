@@ -110,7 +110,7 @@ def command(
         if json is not None:
             outputs.append((json, json_text(trade_json(body, found))))
     if plot is not None:
-        from nutdamp.report import figures
+        from nutdamp.presentation import figures
 
         outputs.append((plot, figures.rendered(figures.trade_figure(body, found), plot)))
     unsaved: list[CannotWrite] = []
@@ -125,7 +125,7 @@ def command(
             unsaved.append(wrong)
     screens: list[RenderableType] = []
     if not silent:
-        from nutdamp.report.trade_tables import trade_screen
+        from nutdamp.presentation.trade_tables import trade_screen
 
         screens.append(trade_screen(body, found))
     deliver(outputs, *screens, unsaved=unsaved)

@@ -76,7 +76,7 @@ def command(
         outputs.append((json, json_text(verification_json(plan.flight, plan.scheme, found))))
     screens: list[RenderableType] = []
     if not silent:
-        from nutdamp.report.verify_tables import verification_screen
+        from nutdamp.presentation.verify_tables import verification_screen
 
         screens.append(verification_screen(body, plan.scheme, found))
     deliver(outputs, *screens)

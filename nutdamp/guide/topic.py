@@ -1,4 +1,4 @@
-"""What a topic of the guide is made of. Texts alone: how they look on a screen is `nutdamp.report.explain_tables`."""
+"""What a topic of the guide is made of. Texts alone; `nutdamp.presentation.explain_tables` lays them out."""
 
 from __future__ import annotations
 

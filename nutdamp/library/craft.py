@@ -16,7 +16,7 @@ from nutdamp import arguments
 from nutdamp import spacecraft as craft
 from nutdamp.errors import BadRequest, Fault
 from nutdamp.library.notebook import block
-from nutdamp.report.text import degrees
+from nutdamp.presentation.text import degrees
 from nutdamp.spacecraft import Inertia
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class Spacecraft:
         return f"<Spacecraft {self.name}: {inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(self.nutation)}>"
 
     def _repr_html_(self) -> str:
-        from nutdamp.report.page.sheets import spacecraft_facts
+        from nutdamp.presentation.page.sheets import spacecraft_facts
 
         return block(spacecraft_facts(self.core, title=self.name))
 

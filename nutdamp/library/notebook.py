@@ -12,12 +12,12 @@ from nutdamp.errors import MissingPandas
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from nutdamp.report.page.document import Block
+    from nutdamp.presentation.page.document import Block
 
 
 def block(content: Block) -> str:
     """A block of a report page as HTML."""
-    from nutdamp.report.page.html import block_html
+    from nutdamp.presentation.page.html import block_html
 
     return block_html(content)
 

@@ -17,8 +17,8 @@ from nutdamp.flight import Residual
 from nutdamp.library.craft import Source, Spacecraft
 from nutdamp.library.notebook import block, data_frame
 from nutdamp.outcome import seen_at
+from nutdamp.presentation.text import degrees
 from nutdamp.remarks import remarks
-from nutdamp.report.text import degrees
 from nutdamp.track import Track, in_file_axes, in_pieces
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Flight:
 
         Raises BadRequest for other names, MissingExtra without matplotlib.
         """
-        from nutdamp.report import figures
+        from nutdamp.presentation import figures
 
         arguments.instance("name", name, str, "the name of a figure")
         try:
@@ -101,7 +101,7 @@ class Flight:
         )
 
     def _repr_html_(self) -> str:
-        from nutdamp.report.page.sheets import residual_sheet
+        from nutdamp.presentation.page.sheets import residual_sheet
 
         return block(residual_sheet(f"{self.spacecraft.name}: {self._summary}", self.residual))
 
@@ -223,8 +223,8 @@ class Plan:
         )
 
     def _repr_html_(self) -> str:
-        from nutdamp.report.page.document import Prose
-        from nutdamp.report.page.sheets import pulse_sheet
+        from nutdamp.presentation.page.document import Prose
+        from nutdamp.presentation.page.sheets import pulse_sheet
 
         return block(pulse_sheet(self.core) if self.feasible else Prose(repr(self)[1:-1]))
 
@@ -249,14 +249,14 @@ class Comparison:
     @property
     def reason(self) -> str:
         """Why that one."""
-        from nutdamp.report import verdicts
+        from nutdamp.presentation import verdicts
 
         return verdicts.reason(self.core)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the recommended plan does not reach, and what stands in the way."""
-        from nutdamp.report import verdicts
+        from nutdamp.presentation import verdicts
 
         return verdicts.warnings(self.core)
 
@@ -276,7 +276,7 @@ class Comparison:
         """What ``plan --json`` gives."""
         from nutdamp.files.output import finite
         from nutdamp.files.plan_json import comparison_json
-        from nutdamp.report import verdicts
+        from nutdamp.presentation import verdicts
 
         return finite(comparison_json(self.core, verdicts.spoken(self.core)))
 
@@ -286,7 +286,7 @@ class Comparison:
         return f"<Comparison of {', '.join(one.scheme for one in self.core.plans)}: {verdict}>"
 
     def _repr_html_(self) -> str:
-        from nutdamp.report.page.sheets import comparison_sheet
+        from nutdamp.presentation.page.sheets import comparison_sheet
 
         return block(comparison_sheet(self.core))
 

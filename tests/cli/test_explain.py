@@ -29,7 +29,7 @@ from nutdamp.guide.kreisel import KREISEL
 from nutdamp.guide.magnus import MAGNUS
 from nutdamp.guide.motion import FIGURES
 from nutdamp.guide.topic import Commands
-from nutdamp.report.explain_tables import WIDEST
+from nutdamp.presentation.explain_tables import WIDEST
 from nutdamp.schemes import NAMES, SCHEMES
 from nutdamp.schemes.options import names_of
 from nutdamp.tolerances import KINDS as TOLERANCE_KINDS

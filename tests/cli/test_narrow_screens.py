@@ -9,7 +9,7 @@ import pytest
 from process import Run
 from rich.console import Console
 
-from nutdamp.report.layout import NARROW, columns
+from nutdamp.presentation.layout import NARROW, columns
 
 COMMANDS = [
     ("plan",),

@@ -12,7 +12,7 @@ from process import Run
 
 from nutdamp import __version__
 from nutdamp.errors import CannotWrite
-from nutdamp.report.page import pdf
+from nutdamp.presentation.page import pdf
 
 IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
 

@@ -19,7 +19,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.exchange import export_text
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.planning import Plan
-from nutdamp.report.text import degrees
+from nutdamp.presentation.text import degrees
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Disturbance
 

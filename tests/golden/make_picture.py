@@ -11,7 +11,7 @@ from pathlib import Path
 
 from nutdamp import planning
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
-from nutdamp.report import figures
+from nutdamp.presentation import figures
 
 FILE = Path(__file__).with_name("two-pulse.png")
 

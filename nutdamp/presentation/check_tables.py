@@ -1,0 +1,131 @@
+"""The screen of ``check``: derived quantities, what each channel can do, and the mounting angle for two pulses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp import survey
+from nutdamp.presentation.layout import columns
+from nutdamp.presentation.plan_tables import header
+from nutdamp.presentation.text import degrees, duration, quantity, vector
+from nutdamp.spacecraft import Channel, Spacecraft
+
+
+def check_screen(spacecraft: Spacecraft) -> RenderableType:
+    """Everything that ``check`` shows of one valid file."""
+    parts: list[RenderableType] = [header(spacecraft, _spin_axis(spacecraft))]
+    if spacecraft.channels:
+        parts += [Text(), channel_table(spacecraft)]
+    if spacecraft.disturbances:
+        parts += [Text(), disturbance_table(spacecraft)]
+    parts += [Text(), _mounting(spacecraft)]
+    if spacecraft.dispersions is not None:
+        parts += [Text(), *_dispersions(spacecraft)]
+    return Group(*parts)
+
+
+def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    found = survey.spin_axis(spacecraft)
+    stable = f"stable, p² = {found.exponent:.4g} / s²" if found.exponent < 0.0 else "a sphere, no axis is special"
+    warning = " (not under dissipation)" if found.kind == "minimum" else ""
+    yield "spin axis", f"{found.kind} moment of inertia; {stable}{warning}"
+    body, despun, inertial = found.rates
+    yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
+    if not spacecraft.inertia.aligned:
+        yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
+        for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
+            yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
+
+
+def disturbance_table(spacecraft: Spacecraft) -> Table:
+    """The forced tilt, the beat, or the times to reach a cone at resonance."""
+    table = columns("disturbance", "does", text=("does",))
+    for number, found in enumerate(survey.consequences(spacecraft), start=1):
+        name = found.disturbance.name or f"number {number}"
+        table.add_row(name, "; ".join(_consequences(found)))
+    return table
+
+
+def _consequences(found: survey.Consequence) -> list[str]:
+    texts = []
+    if found.resonant or found.tilt is None:
+        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in found.resonant)
+        texts.append(f"resonant with the nutation: drives it to {reached}")
+    elif found.disturbance.transverse != 0.0:
+        texts.append(
+            f"forces a tilt of {degrees(found.tilt)}, precession at {quantity(found.precession, 'rad/s')}; "
+            f"from rest the nutation beats up to {degrees(found.beat)} "
+            f"every {duration(found.beat_period)}"
+        )
+    if found.spin_rate != 0.0:
+        texts.append(f"changes the spin by {found.spin_rate:.4g} rad/s²")
+    return texts
+
+
+def channel_table(spacecraft: Spacecraft) -> Table:
+    """What each channel can do."""
+    torque = "torque, file axes\nN m"
+    table = columns("channel\n", torque, "on-time\n", "smallest step\ndeg", "largest step\ndeg", text=(torque,))
+    for steps in survey.channel_steps(spacecraft):
+        channel = steps.channel
+        table.add_row(
+            channel.name,
+            vector(spacecraft.inertia.in_file(channel.torque)),
+            _on_times(channel),
+            "any" if steps.smallest == 0.0 else degrees(steps.smallest).removesuffix(" deg"),
+            degrees(steps.largest).removesuffix(" deg"),
+        )
+    return table
+
+
+def _on_times(channel: Channel) -> str:
+    most = "any" if math.isinf(channel.max_on_time) else duration(channel.max_on_time)
+    return f"{duration(channel.min_on_time)} to {most}"
+
+
+def _mounting(spacecraft: Spacecraft) -> RenderableType:
+    """Magnus' two fixed actuators, and which channels come nearest to them."""
+    angle = survey.mounting_angle(spacecraft)
+    lines = [
+        f"Two fixed actuators, each pushing both ways, give both half pulses if mounted {math.degrees(angle):.2f} deg "
+        "apart about axis 3, from the first fired to the second."
+    ]
+    pair = survey.nearest_pair(spacecraft)
+    if pair is not None:
+        lines.append(
+            f"Of the channels {pair.first.name} then {pair.second.name} come nearest to that half a nutation turn "
+            f"apart: the second is {abs(math.degrees(pair.miss)):.2f} deg off. `plan` may wait longer or shorter, and "
+            "the second is then off by another angle."
+        )
+    idle = [channel.name for channel in spacecraft.channels if not channel.damps]
+    if idle:
+        lines.append(f"Never fired for damping, more axial than transverse: {', '.join(idle)}.")
+    return Text("\n".join(lines))
+
+
+def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
+    """How far the truth may be off, and which tolerances touch nothing that can fire."""
+    from nutdamp.dispersion.inputs import reachable  # few files have dispersions
+    from nutdamp.presentation.dispersion_tables import size_text, unused_table
+
+    inputs, unused = reachable(spacecraft)
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for entry in inputs:
+        names = alike.setdefault((entry.tolerance.replace("_", " "), entry.kind, size_text(entry)), [])
+        by_thruster = getattr(spacecraft.dispersions, entry.tolerance)
+        rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
+        if isinstance(by_thruster, Mapping):
+            names += [name for name in by_thruster if name in (rest, rest[:-2]) and name not in names]
+    table = columns("dispersion", "distribution", "one sigma or bias", "thrusters", text=("distribution", "thrusters"))
+    for (tolerance, kind, size), names in alike.items():
+        table.add_row(tolerance, kind, size, ", ".join(names))
+    yield table
+    if unused:
+        yield Text()
+        yield Text("Dispersions that touch nothing that can fire", style="bold")
+        yield unused_table(unused)

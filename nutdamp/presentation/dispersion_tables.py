@@ -1,0 +1,251 @@
+"""The screens of ``disperse``: percentiles, requirement, tolerance budget, worst cases; and one single case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.dispersion.inputs import Input, Unused
+from nutdamp.dispersion.outputs import OUTPUTS, aim_output
+from nutdamp.dispersion.statistics import Array, cases_to_show
+from nutdamp.dispersion.study import EARLY, Results, Study
+from nutdamp.flight import Flight
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.text import MISSING, quantity
+
+PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
+NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
+SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
+SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "m": ("mm", 1e3), "s": ("ms", 1e3)}
+"""Units that people read for those of inputs, and the factor."""
+
+MOST_ROWS = 12
+"""Inputs that the budget names; the rest is summed up."""
+
+TINY = 1e-300
+
+ROUNDING = 1e-12
+"""rad; what varies by less does not vary."""
+
+
+def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
+    """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
+    parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
+    if not results.exact:
+        parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
+    if nominal is not None:
+        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal)]
+    parts += [Text(), *_requirement(results), Text(), *_budget(results)]
+    if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
+        parts += [Text(), *_worst(results, worst)]
+    unused = results.study.model.inputs.unused
+    if unused:
+        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(unused)]
+    return Group(*parts)
+
+
+def _title(results: Results, scheme: str) -> Text:
+    study = results.study
+    how = "real widths and true tensor" if study.flown else "the impulse sum (17)"
+    drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
+    if results.redrawn:
+        drawn += f", {results.redrawn:,} unphysical ones drawn again"
+    return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, flown by {how}, {drawn}")
+
+
+def _percentiles(results: Results) -> Table:
+    table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "max")
+    nominal = results.study.outputs_of({})
+    for output, name, scale, plan in zip(OUTPUTS, NAMES, SCALES, nominal, strict=True):
+        found = results.distribution(output)
+        if found is None:
+            table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
+            continue
+        values = [float(plan), *found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
+        largest = scale * max(abs(found.minimum), abs(found.maximum))
+        table.add_row(Text(name, style="dim"), *(_beside(scale * value, largest) for value in values))
+    for column in table.columns[1:]:
+        column.no_wrap = True
+    return table
+
+
+def _beside(value: float, largest: float) -> str:
+    """A number with the decimals that show four digits of the ``largest`` beside it."""
+    if largest < 1e-9:
+        return "0"  # but for rounding
+    if not 1e-5 <= largest < 1e6:
+        return f"{value:.2e}"
+    return f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
+
+
+def _requirement(results: Results) -> list[RenderableType]:
+    share, probability = results.met_fraction, results.probability
+    if share is None:
+        return [Text("The file has no requirement to meet.")]
+    low, high = results.interval
+    asked = verdicts.required(results.study.model.spacecraft)
+    verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
+    interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
+    text = Text.assemble(("Requirement ", "bold"), f"({asked}) ", verdict, f"; 95 % interval {interval}.")
+    if results.meets_requirement and low < probability:
+        few = cases_to_show(probability)
+        hint = f" It takes at least {few:,}." if results.done < few else ""
+        level = verdicts.exact_percent(probability)
+        text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
+    return [text]
+
+
+def _budget(results: Results) -> list[RenderableType]:
+    """Shares of the variance by input, by first order and by the cases, and which tolerance dominates."""
+    study = results.study
+    inputs = study.model.inputs.drawn
+    if not any(entry.sigma for entry in inputs):
+        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
+    first, sampled = study.first_order, results.shares
+    budgeted = _budgeted(study)
+    shares = {output: first.shares(output) for output, _ in budgeted}
+    effects = tuple(np.degrees(first.effects(output)) for output, _ in budgeted)
+    weight = np.max([first.effects(output) / max(first.sigma(output), TINY) for output, _ in budgeted], axis=0)
+    order = np.argsort(-weight, kind="stable")
+    aim = "H shift" if study.model.spacecraft.goal.axis is None else "axis err"
+    heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
+    table = columns("input\n", "one sigma\nor bias", *heads)
+
+    def cells(rows: Sequence[int]) -> list[str]:
+        texts = []
+        for (output, _), effect in zip(budgeted, effects, strict=True):
+            spread = math.sqrt(float((effect[list(rows)] ** 2).sum()))
+            seen = math.fsum(sampled.get(inputs[row].name, {}).get(output, 0.0) for row in rows)
+            varies = any(inputs[row].sigma for row in rows)
+            both = (_share(float(shares[output][list(rows)].sum())), _share(seen)) if varies else ("bias", "")
+            texts += [f"{spread:.3g}", *both]
+        return texts
+
+    listed = [int(row) for row in order]
+    named = listed if len(listed) <= MOST_ROWS + 1 else listed[:MOST_ROWS]
+    for row in named:
+        table.add_row(Text(inputs[row].name, style="dim"), size_text(inputs[row]), *cells([row]))
+    rest = listed[len(named) :]
+    if rest:
+        table.add_row(Text(f"{len(rest)} others", style="dim"), "", *cells(rest))
+    remainder = [
+        1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
+        for output, _ in budgeted
+    ]
+    texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
+    table.add_row(Text("together", style="dim"), "", *texts)
+    count = min(results.done, EARLY)
+    note = (
+        f"Effect of each input alone on the nutation and on the {_budgeted(study)[1][1]}, and its share of their "
+        f"variance: linear by analytic derivatives, cases as the first {count:,} cases show it (first-order Sobol "
+        "index)."
+    )
+    return [Text("Tolerance budget", style="bold"), table, Text(note, style="dim"), *_dominating(results)]
+
+
+def _dominating(results: Results) -> list[RenderableType]:
+    """The tolerances of the file with the largest shares, by name."""
+    first = results.study.first_order
+    lines: list[RenderableType] = []
+    for output, name in _budgeted(results.study):
+        sums: dict[str, float] = {}
+        for entry, share in zip(first.inputs, first.shares(output).tolist(), strict=True):
+            sums[entry.tolerance] = sums.get(entry.tolerance, 0.0) + share
+        ranked = sorted(sums.items(), key=lambda one: -one[1])
+        leading = [f"{key} ({_percent(share)})" for key, share in ranked if share >= 0.1] or [ranked[0][0]]
+        verb = "dominates" if len(leading) == 1 else "dominate"
+        told = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
+        if any(sums.values()):
+            lines.append(Text.assemble(f"The {name}: ", (told, "bold"), f" {verb}."))
+    return lines
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.1f}" if share >= 5e-4 else "0"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if share >= 5e-4 else "0"
+
+
+def size_text(entry: Input) -> str:
+    """One sigma, or the bias, as the file might have it."""
+    if entry.unit == "":
+        return f"{100 * (entry.sigma or entry.size):.3g} %"
+    unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
+    return quantity(scale * (entry.sigma or entry.size), unit, 3)
+
+
+def _worst(results: Results, count: int) -> list[RenderableType]:
+    """The worst cases, each with the inputs that count most in it."""
+    study = results.study
+    table = columns(
+        "case",
+        "nutation\ndeg",
+        "shift of H\ndeg",
+        "axis error\ndeg",
+        "what counts most, in sigmas",
+        text=("what counts most, in sigmas",),
+    )
+    effects = np.hypot(study.first_order.effects("nutation"), study.first_order.effects(_budgeted(study)[1][0]))
+    cases = results.worst.cases[:count].tolist()
+    for case in cases:
+        draws = study.draws_of(case)
+        outputs = np.degrees(study.outputs_of(draws)[:3])
+        sigmas = [draws[entry.name] / entry.sigma if entry.sigma else 0.0 for entry in study.model.inputs.drawn]
+        order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
+        told = ", ".join(f"{study.model.inputs.drawn[row].name} {sigmas[row]:+.1f}" for row in order if sigmas[row])
+        table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), told)
+    again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
+    return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
+
+
+def unused_table(unused: Iterable[Unused]) -> Table:
+    """Names that share a reason stand together."""
+    table = facts()
+    reasons: dict[str, list[str]] = {}
+    for name, reason in unused:
+        reasons.setdefault(reason, []).append(name)
+    for reason, names in reasons.items():
+        table.add_row(", ".join(names), reason)
+    return table
+
+
+def case_screen(
+    study: Study, case: int, draws: dict[str, float], flown: tuple[Array, Array], *, scheme: str
+) -> RenderableType:
+    """One case (from 0): every input, and how it and the nominal one end by the impulse sum and through real widths.
+
+    ``flown``: the outputs (5,) through real widths, of the nominal case and of this one.
+    """
+    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
+    for entry in study.model.inputs.drawn:
+        unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
+        draw = draws[entry.name]
+        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
+        off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
+        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
+        inputs.add_row(Text(entry.name, style="dim"), estimate, truth, off, sigmas)
+    ways = "impulses", "flown"
+    outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
+    closed = Study(study.model, study.seed)
+    ends = (closed.outputs_of({}), closed.outputs_of(draws), *flown)
+    for name, scale, *values in zip(NAMES, SCALES, *ends, strict=True):
+        largest = scale * float(np.max(np.abs(values)))
+        cells = (MISSING if math.isnan(value) else _beside(scale * value, largest) for value in values)
+        outcome.add_row(Text(name, style="dim"), *cells)
+    title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
+    note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
+    return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"))
+
+
+def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
+    """The outputs of the tolerance budget, and what people call them."""
+    return ("nutation", "nutation"), aim_output(study.model.spacecraft)

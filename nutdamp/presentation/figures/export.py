@@ -1,0 +1,69 @@
+"""Figures as files and as inline SVG."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nutdamp.errors import BadRequest
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.style import INK
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "svg", "pdf")
+
+# No dates in the file, so that the same flight gives the same picture.
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": "nutdamp"},
+    "svg": {"Date": None, "Creator": "nutdamp"},
+    "pdf": {"CreationDate": None, "Creator": "nutdamp"},
+}
+
+
+def ending(path: str) -> str:
+    """The format of a picture by the ending of its file, png for standard output.
+
+    Raises BadRequest for other endings, MissingExtra without matplotlib.
+    """
+    found = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if found not in FORMATS:
+        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
+    return found
+
+
+@style.styled
+def rendered(figure: Figure, path: str) -> bytes:
+    """The figure as the content of a file, vector or not by the ending of ``path``; raises BadRequest for others."""
+    kind = ending(path)
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind, metadata=_METADATA[kind])
+    return stream.getvalue()
+
+
+@style.styled
+def svg(figure: Figure) -> str:
+    """The figure as an inline ``<svg>`` element, as wide as what holds it, on no background.
+
+    Text and frames take the colour of the text around it, so that it suits light and dark pages. Its ids begin with a
+    digest of its content: several may stand in one page.
+    """
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    # What matplotlib says of all elements would hold for the whole page, and its metadata are no part of the picture.
+    text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
+    text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
+    ours = '<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt" '
+    text = text.replace("<svg ", ours, 1).replace(INK, "currentColor")
+    # Roles of labels end up as ids, several times over: only ids that something refers to stay.
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+    text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)
+    mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
+    return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)

@@ -1,0 +1,168 @@
+"""The two plane pictures of the motion: pole curve in the body, axis track in space."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.presentation import geometry
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.spacecraft import Channel, Vector
+from nutdamp.track import Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ALIKE = math.radians(2.0)
+"""Channels whose torques point within this angle share one arrow."""
+
+LONGEST_NAME = 40
+"""Characters of a name that fit above a picture."""
+
+
+@style.styled
+def motion_figure(flight: Flight, track: Track) -> Figure:
+    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
+    track = geometry.drawn(flight, track)
+    figure = style.sheet(7.4, 4.3)
+    body, space = figure.subplots(1, 2)
+    pole_curve(body, flight, track)
+    axis_track(space, flight, track)
+    style.legend(figure, [body, space])
+    figure.suptitle(title(flight))
+    style.settle(figure)
+    return figure
+
+
+def title(flight: Flight) -> str:
+    """What every sheet is headed with."""
+    count = len(flight.schedule)
+    start, left = (f"{angle:.3g}°" if angle > 1e-6 else "0°" for angle in _nutations(flight))
+    swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
+    change = f"{start} → {left}" if count or left != start else start
+    pulses = ", no pulse" if not count else " by 1 pulse" if count == 1 else f" by {count} pulses"
+    return f"{short_name(flight)}: nutation {swings}{change}{pulses}"
+
+
+def _nutations(flight: Flight) -> tuple[float, float]:
+    """Nutation angle at t = 0 and at the end, degrees."""
+    return math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
+
+
+def short_name(flight: Flight) -> str:
+    """The name of the spacecraft, cut where it is too long for a heading."""
+    name = " ".join(flight.spacecraft.name.split())
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
+
+
+def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), pulses and channels marked."""
+    track = geometry.drawn(flight, track)
+    rates = geometry.pole_path(track)
+    size = float(np.hypot(*rates.T).max())
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.5)
+    _path(axes, flight, track, rates)
+    named = _directions(axes, flight, size)
+    style.square(axes, rates, margin=0.45 if named else 0.12, centre=True)
+    body = flight.spacecraft
+    told = "" if body.inertia.aligned else ", principal axes"
+    told += ", spin about −3" if body.spin < 0.0 else ""
+    axes.set(xlabel=f"ω1, deg/s{told}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
+
+
+def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8)."""
+    track = geometry.drawn(flight, track)
+    path, momentum = geometry.sky_paths(flight, track)
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.5)
+    _path(axes, flight, track, path)
+    axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    stations = [momentum[:1]]
+    for stretch in geometry.stretches(flight, track):
+        if stretch.pulse is not None:
+            moved = _refined(momentum[stretch.first : stretch.last + 1])
+            stations.append(moved[-1:])
+            if np.hypot(*(moved[-1] - moved[0])) > 0.08 * np.ptp(path, axis=0).max():
+                style.heads(axes, moved, _halfway(moved), MOMENTUM)
+    axes.plot(*np.vstack(stations).T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
+    target = geometry.sky_target(flight, track)
+    if len(target):
+        axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none", label="target")
+    x, y = geometry.sky_names(flight)
+    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    axes.set(xlabel=x, ylabel=y, title="Axis track: spin axis in space")
+
+
+def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
+    """A path (n, 2) with its beginning, its sense, and its pulses: numbered where there is room."""
+    coasts, firings = [], []
+    width = float(np.ptp(points, axis=0).max())
+    numbered = style.thinned(len(flight.schedule), 16)
+    for stretch in geometry.stretches(flight, track):
+        rows = points[stretch.first : stretch.last + 1]
+        if stretch.pulse is None:
+            coasts.append(rows)
+            style.heads(axes, rows, _halfway(rows), MOTION)
+            continue
+        firings.append(rows)
+        fine = _refined(rows)
+        if np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
+            style.heads(axes, fine, [len(fine) - 1], PULSE)
+        if stretch.pulse in numbered:
+            style.label(axes, str(stretch.pulse + 1), fine[len(fine) // 2], PULSE)
+    axes.plot(*style.joined(coasts).T, color=MOTION, label="path")
+    if firings:
+        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=2.2, label="pulse")
+        axes.plot(*np.array([rows[0] for rows in firings]).T, ".", color=PULSE, markersize=5)
+    axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
+    axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
+    style.label(axes, "t = 0", points[0], INK, role="vital")
+
+
+def _refined(rows: Vector) -> Vector:
+    """A path of some rows at least: an impulse has only its two ends."""
+    return rows if len(rows) > 2 else np.linspace(rows[0], rows[-1], 21)
+
+
+def _halfway(rows: Vector) -> list[int]:
+    """Where on a stretch an arrowhead goes: half a turn into it at most."""
+    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rows, axis=0).T))])
+    width = float(np.ptp(rows, axis=0).max())
+    if steps[-1] <= 0.0:
+        return []
+    return [int(np.searchsorted(steps, min(0.5 * float(steps[-1]), 1.3 * width)))]
+
+
+def _directions(axes: Axes, flight: Flight, size: float) -> bool:
+    """Torque directions of the channels, as arrows outside the curve; whether there are any."""
+    used = {pulse.channel for pulse in flight.schedule}
+    channels = [one for one in flight.spacecraft.channels if one.damps and (one.name in used or not used)]
+    channels = channels or [one for one in flight.spacecraft.channels if one.name in used]
+    groups: list[list[Channel]] = []
+    for channel in channels:
+        group = next((one for one in groups if _apart(one[0], channel) < ALIKE), None)
+        if group is None:
+            groups.append([channel])
+        else:
+            group.append(channel)
+    for group in groups:
+        torque = group[0].transverse / abs(group[0].transverse)
+        way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
+        axes.plot(*np.outer(way, [1.1, 1.28]), color=GREY, linewidth=1.2)
+        style.heads(axes, np.outer([1.1, 1.3], way), [1], GREY)
+        names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
+        style.label(axes, names, 1.2 * way, INK, role="vital")
+    if groups:
+        axes.plot([], [], color=GREY, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
+    return bool(groups)
+
+
+def _apart(one: Channel, other: Channel) -> float:
+    return abs(float(np.angle(one.transverse * other.transverse.conjugate())))

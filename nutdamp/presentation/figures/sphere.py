@@ -1,0 +1,230 @@
+"""The spherical view: body cone rolling on space cone, spin axis and angular momentum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.presentation import geometry
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.motion import title
+from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.geometry import Cones
+from nutdamp.spacecraft import Vector
+from nutdamp.track import Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ELEVATION = math.radians(28.0)
+"""From where the sphere is seen: above the plane square to H(0)."""
+
+ASIDE = math.radians(65.0)
+"""The spin axis leans to the right at t = 0, this far round from the viewer."""
+
+WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
+"""Below the first angle from H(0) everything is magnified, to the second one at most."""
+
+SPACE, BODY = 0.28, 0.15
+"""How dense the cones are filled: told apart in grey print too."""
+
+MARKS = "+os"
+"""Of H, ω and the spin axis in the plane picture."""
+
+STEPS = (1.0, 2.0, 3.0, 5.0)
+
+
+@dataclass(frozen=True)
+class View:
+    """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
+
+    ``magnified`` stretches what lies square to H(0): straight lines, tangents and coplanar lines stay what they are.
+    """
+
+    plane: Vector
+    azimuth: float
+    magnified: float
+
+    def seen(self, directions: Vector) -> tuple[Vector, Vector]:
+        """Places on paper (n, 2), and heights towards the viewer (n,)."""
+        local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
+        turn, rise = self.azimuth, ELEVATION
+        right = np.array([-math.sin(turn), math.cos(turn), 0.0])
+        near = np.array([math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), math.sin(rise)])
+        up = np.cross(near, right)
+        return np.column_stack([local @ right, local @ up]), np.asarray(local @ near, dtype=np.float64)
+
+
+def view(flight: Flight, track: Track) -> View:
+    """The view in which everything that moves on ``track`` has its place."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    first = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    local = first.axis @ plane.T
+    shown = np.vstack([track.axis, track.momentum, first.body, first.space])
+    angles = np.radians(np.hypot(*geometry.on_sky(plane, shown).T))
+    return View(plane, math.atan2(local[1], local[0]) - ASIDE, magnification(float(angles.max())))
+
+
+def magnification(widest: float) -> float:
+    """How much angles from H(0) are stretched where the ``widest`` is so many rad: 1, 2, 5, 10, …"""
+    if widest >= WIDE or widest < geometry.NO_CONE:
+        return 1.0
+    room = math.tan(DRAWN) / math.tan(widest)
+    decade = 10.0 ** math.floor(math.log10(room))
+    return decade * max(step for step in STEPS if step * decade <= room * (1.0 + 1e-12))
+
+
+@style.styled
+def sphere_figure(flight: Flight, track: Track) -> Figure:
+    """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
+    track = geometry.drawn(flight, track)
+    figure = style.sheet(7.4, 4.3)
+    space, plan = figure.subplots(1, 2)
+    sphere(space, flight, track)
+    along_momentum(plan, flight, track)
+    style.legend(figure, [space, plan])
+    figure.suptitle(title(flight))
+    style.settle(figure)
+    return figure
+
+
+def sphere(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 and the path of the spin axis, seen from outside."""
+    track = geometry.drawn(flight, track)
+    looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_ground(axes, looked, track)
+    draw_path(axes, looked, flight, track)
+    draw_cones(axes, looked, found)
+    for direction, _, name in _directions(found):
+        style.label(axes, name, looked.seen(direction)[0][0])
+    name_cones(axes)
+    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum]))
+    much = looked.magnified
+    axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
+
+
+def draw_ground(axes: Axes, looked: View, track: Track) -> None:
+    """The sphere, where nothing is magnified, and the path of H."""
+    if looked.magnified == 1.0:
+        turn = np.linspace(0.0, 2 * math.pi, 181)
+        axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.7)
+        for height in (0.0, 0.5, math.sqrt(0.75)):
+            radius = math.sqrt(1.0 - height * height)
+            ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
+            draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
+    momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
+    axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+
+
+def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
+    """The path of the spin axis, with the firings in it."""
+    for stretch in geometry.stretches(flight, track):
+        rows = slice(stretch.first, stretch.last + 1)
+        colour, width = (MOTION, 1.0) if stretch.pulse is None else (PULSE, 1.8)
+        draw_line(axes, looked, track.axis[rows], colour, width)
+
+
+def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
+    """Space cone, body cone, and the three directions that lie in one plane."""
+    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
+        if len(rim):
+            _cone(axes, looked, rim, colour, alpha)
+    for direction, colour, _ in _directions(found):
+        tip = looked.seen(direction)[0][0]
+        axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
+        style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
+
+
+def name_cones(axes: Axes) -> None:
+    """The two cones for the legend."""
+    for colour, alpha, name in ((MOMENTUM, SPACE, "space cone"), (MOTION, BODY, "body cone")):
+        axes.fill([], [], facecolor=colour, alpha=alpha, label=name)
+
+
+def name_directions(axes: Axes) -> None:
+    """The marks of `draw_circles` for the legend."""
+    named = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"), ("D", MOTION, "body axis 1"))
+    for mark, colour, name in named:
+        axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
+
+
+def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
+    return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
+
+
+def _cone(axes: Axes, looked: View, rim: Vector, colour: str, alpha: float) -> None:
+    """A cone from the centre to its rim: outline filled, rim drawn."""
+    points, _ = looked.seen(rim)
+    way = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=alpha, edgecolor="none")
+    axes.plot(*points.T, color=colour, linewidth=1.0)
+    if abs(way[-1] - way[0]) < math.pi:  # the centre is outside the rim: the cone is seen from its side
+        for row in (int(np.argmin(way)), int(np.argmax(way))):
+            axes.plot([0.0, points[row, 0]], [0.0, points[row, 1]], color=colour, linewidth=0.8)
+
+
+def _outline(points: Vector, way: Vector) -> Vector:
+    """The rim, and the centre where the cone is seen from its side."""
+    if abs(way[-1] - way[0]) >= math.pi:
+        return points
+    low, high = int(np.argmin(way)), int(np.argmax(way))
+    ring = np.roll(points[:-1], -low, axis=0) if np.allclose(points[0], points[-1]) else points
+    far = (high - low) % max(len(points) - 1, 1)
+    one, other = ring[: far + 1], ring[far:]
+    outer = one if np.hypot(*one.mean(axis=0)) > np.hypot(*other.mean(axis=0)) else other
+    return np.vstack([[0.0, 0.0], outer, [0.0, 0.0]])
+
+
+def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
+    """A line on the sphere: where it runs behind it, dotted, or not at all."""
+    points, height = looked.seen(directions)
+    front = height >= 0.0 if looked.magnified == 1.0 else np.ones(len(height), dtype=bool)
+    axes.plot(*np.where(front[:, None], points, np.nan).T, color=colour, linewidth=width)
+    if back and not front.all():
+        axes.plot(*np.where(front[:, None], np.nan, points).T, color=colour, linewidth=0.7 * width, linestyle=":")
+
+
+def frame(axes: Axes, looked: View, directions: Vector) -> None:
+    """Equal scales, and room for the centre and all ``directions`` (n, 3); no ticks: it has no scale to read."""
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    points = np.vstack([[[0.0, 0.0]], looked.seen(unit)[0]])
+    if looked.magnified == 1.0:
+        points = np.vstack([points, [[-1.0, -1.0], [1.0, 1.0]]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.56 * float((high - low).max())
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+
+
+def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 seen along H(0), true to scale along every radius."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_circles(axes, plane, found)
+    for direction, _, name in _directions(found):
+        style.label(axes, name, geometry.on_sky(plane, direction[None])[0])
+    name_cones(axes)
+    shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
+    style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
+    x, y = geometry.sky_names(flight)
+    axes.set(xlabel=x, ylabel=y, title="The same, seen along H")
+
+
+def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
+    """Rims of the cones with their axes and where they touch, on the sky."""
+    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
+        if len(rim):
+            ring = geometry.on_sky(plane, rim)
+            axes.fill(*ring.T, facecolor=colour, alpha=alpha, edgecolor="none")
+            axes.plot(*ring.T, color=colour, linewidth=1.0)
+    places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
+    axes.plot(*places.T, color=GREY, linewidth=0.8)
+    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
+        axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

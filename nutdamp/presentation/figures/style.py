@@ -1,0 +1,242 @@
+"""The one style of all figures: colours, sizes, marks, labels that make room for each other."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from functools import wraps
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from nutdamp.errors import MissingExtra
+from nutdamp.presentation.geometry import room
+from nutdamp.spacecraft import Vector
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
+
+# Okabe & Ito's palette, told apart by colour-blind readers and, with the line styles, in grey print
+# (jfly.uni-koeln.de/color).
+MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
+"""Spin axis, body cone and what moves; firings; angular momentum and space cone."""
+
+INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
+"""Text and ω; marks; grid lines."""
+
+LINE, THIN = 1.3, 0.7
+"""Line widths, points."""
+
+SMALL = 7.5
+"""Size of labels inside a panel, points."""
+
+_SETTINGS: dict[str, Any] = {
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
+    "font.size": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.facecolor": "none",
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "figure.titlesize": 10.5,
+    "figure.titleweight": "bold",
+    "figure.facecolor": "white",
+    "grid.color": FAINT,
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": LINE,
+    "lines.solid_capstyle": "round",
+    "text.color": INK,
+    "text.parse_math": False,  # names may hold a dollar sign
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "svg.hashsalt": "nutdamp",  # the same flight gives the same file
+}
+
+
+def require() -> None:
+    """Raises MissingExtra where matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise MissingExtra("plot", "a picture")
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Draws in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+
+    @wraps(draw)
+    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        require()
+        from matplotlib import style
+
+        with style.context(["default", _SETTINGS]), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing from")  # a name in another script is drawn as boxes
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure, inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=200, layout="constrained")
+
+
+def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
+    """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
+    look = {
+        "arrowstyle": "-|>",
+        "color": colour,
+        "linewidth": 0.0,
+        "mutation_scale": 9.0,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+    }
+    for row in places:
+        if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
+            (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
+            axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
+
+
+def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
+    """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
+    middle, half = room(points, margin, centre=centre)
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(nbins=6)
+    axes.grid()
+
+
+def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str = "label") -> None:
+    """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
+
+    ``label`` goes anywhere around its point and may be left out, as may ``above``, which stays above it; ``number``
+    stays where it is put, along the edge of a panel; ``vital`` is never left out.
+    """
+    note = axes.annotate(
+        text,
+        (float(place[0]), float(place[1])),
+        xytext=(0, 0),
+        textcoords="offset points",
+        color=colour,
+        fontsize=SMALL,
+        ha="center",
+        va="bottom" if role in ("above", "number") else "center_baseline",
+        annotation_clip=False,
+    )
+    note.set_label(f"_{role}")  # begins so that no legend shows it
+
+
+_AROUND = [
+    (step * x, step * y)
+    for step in (7.0, 11.0, 16.0)
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1), (1.3, 0), (-1.3, 0), (0, 1.3), (0, -1.3))
+]
+_OFFSETS = {
+    "_vital": _AROUND,
+    "_label": _AROUND[:16],
+    "_above": [(0.0, 2.5), (3.0, 2.5), (-3.0, 2.5)],
+    "_number": [(0.0, 3.0)],
+}
+_COVERED = {"_vital": np.inf, "_label": 12.0, "_above": 2.0, "_number": np.inf}
+"""Points of curves, 4 pixels apart, that a label may cover."""
+
+
+def settle(figure: Figure) -> None:
+    """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
+    figure.draw_without_rendering()
+    order = list(_OFFSETS)
+    for axes in figure.axes:
+        notes: list[Any] = sorted(
+            (note for note in axes.texts if note.get_label() in order),
+            key=lambda note: order.index(str(note.get_label())),
+        )
+        curves = _inked(axes) if notes else np.empty((0, 2))
+        taken: list[Bbox] = []
+        for note in notes:
+            _settle(note, taken, curves, axes.get_window_extent(), figure.dpi / 72.0)
+
+
+def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> None:
+    """One label; ``window`` is that of its panel, ``points`` how many pixels a point is."""
+    role = str(note.get_label())
+    here = note.get_window_extent().padded(1.5 * points)
+    best, least = None, np.inf
+    for x, y in _OFFSETS[role]:
+        # Sideways offsets are counted from the edge of the text, so that long names stand as near as short ones.
+        offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
+        box = here.translated(offset[0] * points, offset[1] * points)
+        inside = (curves[:, 0] > box.x0) & (curves[:, 0] < box.x1) & (curves[:, 1] > box.y0) & (curves[:, 1] < box.y1)
+        covered = float(np.count_nonzero(inside)) + 0.04 * float(np.hypot(x, y))
+        out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
+        out = 0.0 if role == "_number" else out
+        if out > 0.0 or any(box.overlaps(other) for other in taken):
+            if role != "_vital":
+                continue
+            covered += 1e3 * (1.0 + out)
+        if covered < min(least, _COVERED[role]):
+            best, least = (offset, box), covered
+    if best is None:
+        note.set_visible(False)
+        return
+    note.set_position(best[0])
+    taken.append(best[1])
+
+
+def joined(pieces: Sequence[Vector]) -> Vector:
+    """Paths (n, 2) as one, with a gap between them."""
+    gap = np.full((1, 2), np.nan)
+    parts = [part for piece in pieces for part in (piece, gap)]
+    return np.concatenate(parts[:-1]) if parts else np.empty((0, 2))
+
+
+def _inked(axes: Axes) -> Vector:
+    """Points of all curves and bars in pixels, close enough together that none passes a label unseen."""
+    points = [np.empty((0, 2))]
+    outlines = [np.asarray(line.get_transform().transform(line.get_xydata())) for line in axes.lines]
+    for bars in axes.collections:
+        outlines += [np.asarray(bars.get_transform().transform(path.vertices)) for path in bars.get_paths()]
+    for path in outlines:
+        path = path[np.isfinite(path).all(axis=1)]
+        if len(path) > 1:
+            steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+            even = np.linspace(0.0, steps[-1], min(int(steps[-1] / 4.0) + 2, 20_000))
+            points.append(np.column_stack([np.interp(even, steps, column) for column in path.T]))
+    return np.concatenate(points)
+
+
+def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -> None:
+    """One legend under all panels, each name once, where no curve can run into it."""
+    found: dict[str, Artist] = {}
+    for one in axes:
+        for handle, name in zip(*one.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    if found:
+        figure.legend(
+            list(found.values()), list(found), loc="outside lower center", ncols=columns, handlelength=2.2,
+            borderpad=0.2, columnspacing=1.4,
+        )  # fmt: skip
+
+
+def thinned(count: int, most: int = 60) -> range:
+    """Which of ``count`` numbered things to try a label for; those that find no room are left out by `settle`."""
+    return range(0, count, max(1, -(-count // most)))

@@ -1,0 +1,277 @@
+"""The screen of ``plan``: the spacecraft, the schemes compared, the recommendation, its pulses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp import compliance
+from nutdamp.compliance import Bound, Part
+from nutdamp.flight import Residual
+from nutdamp.planning import NO_NUTATION, Comparison, Plan
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, steering
+from nutdamp.remarks import remarks
+from nutdamp.schedule import STEERABLE, Pulse
+from nutdamp.spacecraft import Spacecraft
+
+
+def comparison_screen(compared: Comparison) -> RenderableType:
+    """Everything that ``plan`` shows."""
+    parts: list[RenderableType] = [header(compared.spacecraft), Text()]
+    needless = verdicts.needless(compared)
+    if needless is not None:
+        parts += [Text.assemble(("No pulse needed: ", "bold"), f"{needless}."), Text()]
+    parts.append(_comparison(compared))
+    parts.extend(_reasons(compared))
+    chosen, reason = compared.recommended, verdicts.reason(compared)
+    if chosen is None:
+        parts += [Text(), Text(f"No recommendation: {reason}.", style="bold")]
+        return Group(*parts)
+    parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {reason}.")]
+    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in verdicts.warnings(compared)]
+    parts += [Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)]
+    if len(chosen.pulses):
+        parts += [Text(), pulse_table(chosen), Text(), end_table(chosen.flight)]
+    return Group(*parts)
+
+
+def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
+    """Name and derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    return Group(Text(spacecraft.name, style="bold"), derived_table(spacecraft, more))
+
+
+def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
+    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    inertia = spacecraft.inertia
+    found = spacecraft.widest
+    table = facts()
+    moments = f"A = {quantity(inertia.A, 'kg m²')}, C = {quantity(inertia.C, 'kg m²')}"
+    table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
+    if not inertia.symmetric:
+        first, second, _ = inertia.moments
+        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on a symmetric body alike")
+    table.add_row("spin", spin_text(spacecraft.spin))
+    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
+    cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
+    table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
+    still = math.isinf(spacecraft.body_period)
+    in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
+    table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
+    if spacecraft.dissipation is not None:
+        table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
+    beyond = _beyond_floors(spacecraft)
+    floor = f"no least impulse with {beyond}" if beyond else "no schedule needs less"
+    name = "impulse" if beyond else "least impulse"
+    table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
+    if spacecraft.goal.axis is not None:
+        turning = quantity(_turning(spacecraft), "N m s")
+        least = "" if beyond else ", the least to turn H"
+        table.add_row("target", direction_text(spacecraft, spacecraft.goal.axis))
+        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}{least}")
+    if spacecraft.goal.spin is not None:
+        table.add_row("final spin", spin_text(spacecraft.goal.spin))
+    table.add_row("actuators", _actuators(spacecraft))
+    for line, text in enumerate(_requirement(spacecraft)):
+        table.add_row("" if line else "requirement", text)
+    for name, value in more:
+        table.add_row(name, value)
+    return table
+
+
+def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
+    """What is required, and where it is not what the key of the file says."""
+    bounds = compliance.required(spacecraft)
+    if bounds:
+        yield verdicts.required(spacecraft)
+    if any(bound.part is Part.DISTANCE for bound in bounds):
+        yield "momentum_shift bounds the axis error: H from the target"
+
+
+def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
+    """What energy dissipation does to the nutation, and whether it is as slow as the model of it takes for granted."""
+    if spacecraft.growth == 0.0:
+        return "none: a sphere has no energy to lose"
+    what = "grows" if spacecraft.growth > 0.0 else "decays"
+    slow = time_constant >= spacecraft.inertial_period
+    rough = "" if slow else "; less than one inertial period: results are rough"
+    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
+
+
+def _beyond_floors(spacecraft: Spacecraft) -> str:
+    """What the floors A|ω0| and C|ω3|β do not hold with, in words; empty where they hold."""
+    found = [
+        *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
+    return " and ".join(found)
+
+
+def _turning(spacecraft: Spacecraft) -> float:
+    """C |ω3| β in N m s; 0 where H points at the target already, but for rounding."""
+    return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
+
+
+def _actuators(spacecraft: Spacecraft) -> str:
+    torquer = spacecraft.torquer
+    texts = []
+    if torquer is not None:
+        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
+        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
+        texts.append(f"steerable torquer, {strength}{assumed}")
+    if spacecraft.channels:
+        texts.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
+    return "; ".join(texts)
+
+
+MILLISECONDS = 3
+"""Digits of a second that a table of pulses shows of a date."""
+
+Cell = Callable[[Plan], str]
+
+NOT = "✗"
+"""Stands before what is more than required."""
+
+SHORT_NAMES = ("RA", "dec")
+"""Right ascension and declination, where there is little room."""
+
+
+def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
+    """What the comparison shows of each feasible plan."""
+    least = compared.spacecraft.least_impulse
+
+    def ratio(plan: Plan) -> str:
+        return f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING
+
+    rows: list[tuple[str, Cell]] = [
+        ("pulses", lambda plan: str(len(plan.pulses))),
+        ("ends at", lambda plan: moment(plan.pulses.end)),
+        ("impulse", lambda plan: quantity(plan.pulses.total_impulse, "N m s")),
+        ("  × A|ω0|" if _beyond_floors(compared.spacecraft) else "  × least impulse", ratio),
+        ("propellant", lambda plan: mass(plan.pulses.propellant)),
+        ("by impulses (17):", lambda _: ""),
+        ("  nutation left", lambda plan: _angle(plan.residual, "nutation")),
+        ("  shift of H", lambda plan: _angle(plan.residual, "momentum_shift")),
+        ("flown, real widths:", lambda _: ""),
+        ("  nutation left", lambda plan: _angle(plan.flown, "nutation")),
+        ("  body cone", lambda plan: _angle(plan.flown, "body_cone")),
+        ("  space cone", lambda plan: _angle(plan.flown, "space_cone")),
+        ("  shift of H", lambda plan: _angle(plan.flown, "momentum_shift")),
+        ("  spin change", lambda plan: quantity(plan.spin_change, "rad/s")),
+    ]
+    first, second = SHORT_NAMES if compared.spacecraft.attitude is not None else angle_names(compared.spacecraft)
+    rows[-1:-1] = [
+        (f"  axis: {first}", lambda plan: angle_texts(plan.spacecraft, plan.flight.final.axis)[0]),
+        (f"  axis: {second}", lambda plan: angle_texts(plan.spacecraft, plan.flight.final.axis)[1]),
+    ]
+    goal = compared.spacecraft.goal
+    if goal.axis is not None:
+        rows.insert(-1, ("  off the target", lambda plan: _angle(plan.flown, "axis_error")))
+        turning = _turning(compared.spacecraft)
+        rows.insert(
+            4, ("  × C|ω3|β", lambda plan: f"{plan.pulses.total_impulse / turning:.4f}" if turning else MISSING)
+        )
+    if goal.spin is not None:
+        rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
+    if any(plan.delta_v is not None for plan in compared.plans):
+        rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
+    if compliance.required(compared.spacecraft):
+        rows.append(("requirement:", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
+        rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
+    return rows
+
+
+def _part(bound: Bound) -> tuple[str, Cell]:
+    """The row of one thing that is required: its bound, and what the plans leave of it."""
+
+    def cell(plan: Plan) -> str:
+        (found,) = (one for one in plan.held if one.bound == bound)
+        text = quantity(found.left, "rad/s") if bound.part is Part.SPIN else degrees(found.left)
+        return text if found.met else f"{NOT} {text}"
+
+    most = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else degrees(bound.most)
+    return f"  {verdicts.PARTS[bound.part]} ≤ {most}", cell
+
+
+def _angle(left: Residual | None, name: str) -> str:
+    return MISSING if left is None else degrees(getattr(left, name))
+
+
+def _final_spin(plan: Plan) -> float | None:
+    return None if plan.spin_change is None else plan.spacecraft.spin + plan.spin_change
+
+
+def _speed(plan: Plan) -> float | None:
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
+
+
+def _comparison(compared: Comparison) -> Table:
+    """Quantities down, schemes across: so three schemes fit a screen of 80 columns."""
+    table = columns("", *(plan.scheme for plan in compared.plans))
+    rows = _rows(compared) if any(plan.feasible for plan in compared.plans) else _rows(compared)[:1]
+    for name, cell in rows:
+        cells = [cell(plan) if plan.feasible else "" for plan in compared.plans]
+        if name == "pulses":
+            cells = [text or verdicts.no_plan(plan) for text, plan in zip(cells, compared.plans, strict=True)]
+        table.add_row(Text(name, style="dim"), *cells)
+    return table
+
+
+def _reasons(compared: Comparison) -> list[RenderableType]:
+    """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
+    said: dict[str, list[str]] = {}
+    for plan in compared.plans:
+        for remark in (plan.why,) if plan.why is not None else remarks(plan):
+            said.setdefault(remark, []).append(plan.scheme)
+    lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in said.items()]
+    return [Text(), *lines] if lines else []
+
+
+def pulse_table(plan: Plan) -> Table:
+    """One row a pulse: when, how long, which channel, and the nutation before and after.
+
+    With an epoch the start in UTC takes the room of the centre.
+    """
+    before, after = plan.flight.around_pulses()
+    pulses, body = plan.pulses, plan.spacecraft
+    day, clocks = _clocks([body.utc(pulse.start, MILLISECONDS) for pulse in pulses])
+    second = (f"UTC\n{day}", clocks) if clocks else ("centre\ns", [f"{pulse.t:.4f}" for pulse in pulses])
+    cells: list[tuple[str, list[str]]] = [
+        ("pulse\n", [str(index + 1) for index in range(len(pulses))]),
+        ("start\ns", [f"{pulse.start:.4f}" for pulse in pulses]),
+        second,
+        ("on-time\ns", ["ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}" for pulse in pulses]),
+        ("channel\n", [channel_text(pulse, body) for pulse in pulses]),
+        ("impulse\nN m s", [f"{pulse.magnitude:.4g}" for pulse in pulses]),
+        ("nutation\ndeg", [degrees(angle).removesuffix(" deg") for angle in before.nutation.tolist()]),
+        ("after\ndeg", [degrees(angle).removesuffix(" deg") for angle in after.nutation.tolist()]),
+    ]
+    table = columns(*(name for name, _ in cells), text=("channel\n",))
+    for row in zip(*(column for _, column in cells), strict=True):
+        table.add_row(*row)
+    return table
+
+
+def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
+    """The day that all dates share, and of each the rest; nothing where one is not known."""
+    known = [date.removesuffix("Z").split("T") for date in dates if date is not None]
+    if not known or len(known) < len(dates):
+        return "", []
+    clocks = [time for _, time in known]
+    if len({day for day, _ in known}) == 1:
+        return known[0][0], clocks
+    return "", [f"{day} {clock}" for (day, _), clock in zip(known, clocks, strict=True)]
+
+
+def channel_text(pulse: Pulse, body: Spacecraft) -> str:
+    """The channel of a pulse; a steerable one is named by the angle of its torque too."""
+    if pulse.channel != STEERABLE:
+        return pulse.channel
+    return f"{STEERABLE} {steering(body.inertia.in_file(pulse.impulse).tolist())}"

@@ -1,0 +1,72 @@
+"""The screen of ``plan --robust``: candidates by how many cases comply, the one to fly and what it costs."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from nutdamp import compliance
+from nutdamp.planning import Plan
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.layout import columns
+from nutdamp.presentation.plan_tables import header, pulse_table
+from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.robust import RobustComparison
+
+MOST_ROWS = 12
+"""Candidates that the table names."""
+
+
+def robust_screen(found: RobustComparison) -> RenderableType:
+    """Everything that ``plan --robust`` shows."""
+    parts: list[RenderableType] = [header(found.comparison.spacecraft), Text()]
+    infeasible = [plan for plan in found.comparison.plans if plan.why is not None]
+    reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
+    chosen, reason = found.chosen, verdicts.robust_reason(found)
+    if chosen is None:
+        return Group(*parts, *reasons, Text(f"No recommendation: {reason}.", style="bold"))
+    how = "flown through real widths" if found.flown else "by the impulse sum (17)"
+    parts.append(Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"))
+    parts += [Text(), _candidates(found), *reasons, Text()]
+    parts.append(Text.assemble("Robust plan: ", (f"{chosen.plan.scheme}, {chosen.variant}", "bold"), f" – {reason}."))
+    if chosen.met is not None:
+        asked = verdicts.required(found.comparison.spacecraft)
+        verdict = verdicts.cases_verdict(chosen.met, found.probability)
+        parts.append(Text.assemble(("Requirement ", "bold"), f"({asked}) {verdict}."))
+    parts.append(Text(verdicts.robust_cost(found)))
+    if len(chosen.plan.pulses):
+        parts += [Text(), pulse_table(chosen.plan), Text(), end_table(chosen.plan.flight)]
+    return Group(*parts)
+
+
+def _why(plan: Plan) -> str:
+    return f"infeasible: {plan.why}" if plan.failure is None else f"{plan.why}"
+
+
+def _candidates(found: RobustComparison) -> RenderableType:
+    level = verdicts.exact_percent(found.probability)
+    requirement = bool(compliance.required(found.comparison.spacecraft))
+    propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
+    cost = "propellant\ng" if propellant else "impulse\nN m s"
+    heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg")
+    table = columns(*heads, *["cases that\ncomply"] * requirement, text=("variant\n",))
+    named = list(found.candidates[:MOST_ROWS])
+    named += [one for one in (found.chosen, found.usual) if one is not None and one not in named]
+    for one in named:
+        plan, pulses = one.plan, one.plan.pulses
+        spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse
+        table.add_row(
+            Text(plan.scheme, style="bold" if one is found.chosen else ""),
+            one.variant + " *" * (one is found.usual),
+            f"{pulses.end:.3f}",
+            f"{spent:.4g}",
+            *(degrees(angle).removesuffix(" deg") for angle in (one.nominal, one.left)),
+            *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * requirement,
+        )
+    what = verdicts.left_name(found.comparison.spacecraft)
+    rest = len(found.candidates) - len(named)
+    more = f"{rest} more plans are worse. " if rest else ""
+    note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
+    star = " * is recommended for nominal values." if found.usual is not None else ""
+    return Group(table, Text(note + star, style="dim"))

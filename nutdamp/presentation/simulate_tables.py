@@ -1,0 +1,95 @@
+"""The screen of ``simulate``: cone angles around each pulse, residuals, extremes of the axis track."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.flight import Flight
+from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.plan_tables import channel_text, header
+from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
+from nutdamp.presentation.verdicts import model_warnings
+from nutdamp.track import Extremes
+
+
+def simulation_screen(
+    flight: Flight, found: Extremes, impulses: Flight, flown: Flight, *, how: str, pulses: int
+) -> RenderableType:
+    """Everything that ``simulate`` shows; ``how`` names what was propagated: a schedule of so many ``pulses``.
+
+    All three flights as `outcome.seen_at` the end of the track; ``flight`` is one of the others.
+    """
+    parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
+    if len(flight.schedule) < pulses:
+        begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
+        parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
+    if len(flight.schedule):
+        parts += [Text(), _pulses(flight)]
+    parts += [Text(), _ends(impulses, flown, found.until)]
+    if flight.spacecraft.attitude is None:
+        parts.append(Text(f"{FRAME_N}.", style="dim"))
+    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
+    parts += [Text(), _extremes(found, flight)]
+    return Group(*parts)
+
+
+def _pulses(flight: Flight) -> Table:
+    before, after = flight.around_pulses()
+    names = ("pulse", "centre", "on-time", "channel", "", "nutation", "body cone", "space cone")
+    units = ("", "s", "s", "", "", "deg", "deg", "deg")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
+    for index, pulse in enumerate(flight.schedule):
+        on_time = "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}"
+        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
+        for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
+            cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
+            table.add_row(*cells, when, *(degrees(cone).removesuffix(" deg") for cone in cones))
+    return table
+
+
+def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
+    """What both models leave, and where they point, at ``until`` s."""
+    body = flown.spacecraft
+    table = columns(f"at {moment(until)}", "by impulses (17)", "flown, real widths")
+    rows = [
+        ("nutation", "nutation"),
+        ("body cone", "body_cone"),
+        ("space cone", "space_cone"),
+        ("shift of H", "momentum_shift"),
+    ]
+    if body.goal.axis is not None:
+        rows.append(("off the target", "axis_error"))
+    both = (impulses, flown)
+    for name, key in rows:
+        table.add_row(Text(name, style="dim"), *(degrees(getattr(one.residual, key)) for one in both))
+    for what, key in (("spin axis", "axis"), ("H", "momentum")):
+        angles = (angle_texts(body, getattr(one.final, key)) for one in both)
+        for name, *texts in zip(angle_names(body), *angles, strict=True):
+            table.add_row(Text(f"{what}: {name}", style="dim"), *texts)
+    table.add_row(Text("spin", style="dim"), *(quantity(one.final.spin, "rad/s", 6) for one in both))
+    return table
+
+
+def _extremes(found: Extremes, flight: Flight) -> Table:
+    table = facts()
+    far, near = found.farthest, found.nearest
+    table.add_row(
+        "spin axis from H(0)", f"{degrees(near[0])} at {moment(near[1])} to {degrees(far[0])} at {moment(far[1])}"
+    )
+    table.add_row("spin axis in x, in y", f"{_range(found.x)}, {_range(found.y)} of the inertial frame")
+    given = flight.spacecraft.attitude
+    if given is not None:
+        frame = given.frame or "the frame of the file"
+        west, east = map(longitude, found.right_ascension)
+        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
+        table.add_row("declination", _range(found.declination))
+    table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
+    return table
+
+
+def _range(values: tuple[float, float]) -> str:
+    low, high = map(pointing, values)
+    return f"{low.removesuffix(' deg')} to {high}"

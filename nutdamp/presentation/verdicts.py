@@ -1,0 +1,335 @@
+"""Verdicts in words: which plan is recommended and why, what is not met, what stands in the way, how many cases comply.
+
+The floors below give data; all sentences about them are here, so that every screen and page says the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from nutdamp import compliance, outcome, schemes
+from nutdamp.compliance import Bound, Part
+from nutdamp.flight import Flight
+from nutdamp.hindrance import Obstacle
+from nutdamp.planning import Comparison, Plan
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity
+from nutdamp.recommendation import Ground, Standing
+from nutdamp.schemes.registry import OPTIMAL
+from nutdamp.spacecraft import Spacecraft
+
+if TYPE_CHECKING:  # few runs look for a robust plan
+    from nutdamp.robust import RobustComparison
+
+VERDICT = {True: "met", False: "not met", None: MISSING}
+"""What `Plan.meets_requirement` says of the requirement."""
+
+PARTS = {Part.NUTATION: "nutation", Part.SHIFT: "shift of H", Part.DISTANCE: "axis error", Part.SPIN: "spin off"}
+"""What the parts of a requirement are called."""
+
+
+def no_plan(plan: Plan) -> str:
+    """What stands in the column of a scheme that has no plan."""
+    if plan.failure is None:
+        return "infeasible"
+    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+
+
+def needless(compared: Comparison) -> str | None:
+    """That nothing has to be done, where that is so."""
+    body = compared.spacecraft
+    if not compliance.unaided(body):
+        return None
+    there = [f"the nutation of {degrees(body.nutation)} at t = 0"]
+    if body.goal.axis is not None:
+        there.append(f"the {degrees(body.to_turn)} between H and the target")
+    count = "" if len(there) > 1 else "s"
+    if compliance.required(body):
+        verdict = f"already meet{count} the requirement ({required(body)})"
+    else:
+        verdict = f"already count{count} as damped"
+    lasting = f", up to the horizon of {duration(body.horizon)} too" if body.growth > 0.0 else ""
+    plans = "; the plans below reduce it further" if any(len(one.pulses) for one in compared.plans) else ""
+    return f"{' and '.join(there)} {verdict}{lasting}{plans}"
+
+
+def reason(compared: Comparison) -> str:
+    """Why the recommended plan, or none."""
+    found, body = compared.recommendation, compared.spacecraft
+    if found.plan is None:
+        untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
+        return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}"
+    if found.ground is Ground.ONLY:
+        return _only(compared)
+    cost = "propellant" if found.by_propellant else "impulse"
+    if found.standing is Standing.COMPLIES:
+        among = f"of the {found.count} plans that {_those(body)}"
+        return {
+            Ground.SHIFT: f"least {cost} {among}, within 0.1 %; of these least shift of H",
+            Ground.END: f"least {cost} {among}, within 0.1 %; of these it ends first",
+        }.get(found.ground or Ground.COST, f"least {cost} {among}")
+    meeting = found.standing is Standing.MEETS
+    among = f"of the {found.count} {'plans that meet the requirement' if meeting else 'feasible plans'}"
+    least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
+    if found.ground is Ground.NEAREST:
+        return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
+    then = {
+        Ground.COST: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}",
+        Ground.SHIFT: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then least shift of H",
+        Ground.END: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then it ends first",
+    }
+    return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
+
+
+def _only(compared: Comparison) -> str:
+    """Why a plan that had no rival of its standing."""
+    found, body = compared.recommendation, compared.spacecraft
+    verdict = {
+        Standing.COMPLIES: _those(body, plural=False),
+        Standing.MEETS: "meets the requirement",
+        Standing.MISSES: "",
+    }[found.standing or Standing.MISSES]
+    if len(compared.plans) == 1:
+        return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
+    return f"the only plan that {verdict}" if verdict else "the only feasible plan"
+
+
+def _those(body: Spacecraft, *, plural: bool = True) -> str:
+    """What the plans do that comply."""
+    if compliance.required(body):
+        return f"meet{'s' * (not plural)} the requirement"
+    if body.goal.axis is None:
+        return f"damp{'s' * (not plural)}"
+    return f"reach{'es' * (not plural)} the target"
+
+
+def warnings(compared: Comparison) -> tuple[str, ...]:
+    """What the recommended plan does not reach, and what stands in the way; nothing for one that complies."""
+    found = compared.recommendation
+    if found.plan is None or found.standing is Standing.COMPLIES:
+        return ()
+    body, chosen = compared.spacecraft, found.plan
+    required = found.standing is Standing.MISSES and bool(compliance.required(body))
+    what = "nutation" if body.goal.axis is None else "target"
+    if len(compared.plans) > 1:
+        verb = (
+            "meets the requirement"
+            if required
+            else {"nutation": "damps the nutation", "target": "reaches the target"}[what]
+        )
+        head = f"none of the {len(compared.plans)} schemes compared {verb}"
+    else:
+        verb = (
+            "meet the requirement"
+            if required
+            else {"nutation": "damp the nutation", "target": "reach the target"}[what]
+        )
+        head = f"{chosen.scheme} does not {verb}"
+    missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
+    it = chosen.scheme if len(compared.plans) > 1 else "It"
+    return (" ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared))),)
+
+
+def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
+    """How far the impulse sum (17) ends from real widths, where that is more than may be."""
+    apart = outcome.deviations(impulses, flown)
+    if not apart:
+        return ()
+    required = {bound.part for bound in compliance.required(flown.spacecraft)}
+    parts = []
+    for one in apart:
+        most = "a tenth of the requirement" if one.part in required else degrees(one.most)
+        parts.append(f"{one} (more than {most})")
+    return (f"the impulse sum (17) and real widths differ by {' and '.join(parts)}. What is flown counts.",)
+
+
+def shortfall(plan: Plan, bound: Bound) -> str:
+    """One thing that a plan misses: how much is left, and how much may be."""
+    left = plan.left
+    assert left is not None
+    value = compliance.left_of(bound.part, left, plan.spacecraft)
+    if bound.part is Part.SPIN:
+        goal = plan.spacecraft.goal.spin or 0.0
+        return f"the spin at {_rpm(left.spin)} ({_rpm(goal)} required)"
+    what = {
+        Part.NUTATION: "of nutation",
+        Part.SHIFT: "of shift of H",
+        Part.DISTANCE: "between H and the target",
+    }[bound.part]
+    allowed = "required" if bound.required else "would count as damped"
+    return f"{degrees(value)} {what} ({degrees(bound.most)} {allowed})"
+
+
+def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
+    """What stands in the way of less, in sentences; what cures it first."""
+    body, limits = plan.spacecraft, plan.spacecraft.limits
+    parts = {bound.part for bound in plan.shortfalls}
+    if body.disturbances and not plan.options.with_disturbances:
+        yield _unplanned(compared)
+    if Part.NUTATION in parts and plan.hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
+        yield {
+            Obstacle.STEADY_TILT: f"Under the disturbances a tilt of {degrees(plan.hindrance.steady_tilt)} stays.",
+            Obstacle.MAX_PULSES: f"limits.max_pulses = {limits.max_pulses} allows no more pulses.",
+            Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less.",
+        }.get(plan.hindrance.obstacle, _spent(plan))
+    if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
+        yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
+    if _optimal_untried(compared) and parts != {Part.SPIN}:
+        more = "can fire several pulses of a channel in each half turn" if plan.hindrance.full else "may reach more"
+        yield f"--scheme optimal was not compared; it {more}."
+
+
+def _optimal_untried(compared: Comparison) -> bool:
+    """Whether there are channels that it can fire, and it was not compared."""
+    able = any(channel.damps for channel in compared.spacecraft.channels)
+    return able and OPTIMAL.name not in {one.scheme for one in compared.plans}
+
+
+def _unplanned(compared: Comparison) -> str:
+    """What planning with the disturbances would change."""
+    one, body = len(compared.plans) == 1, compared.spacecraft
+    made = f"The plan{' was' if one else 's were'} made without the disturbances of the file"
+    aware = compared.with_disturbances
+    if aware is not None and aware.standing is Standing.COMPLIES:
+        return f"--with-disturbances is the cure: {aware.scheme} then {_those(body, plural=False)}. {made}."
+    plans = f"{made}; --with-disturbances plans with them"
+    if aware is None:
+        return f"{plans}."
+    return f"{plans}, but then too {'it does not ' if one else 'no scheme compared '}{_those(body, plural=one)}."
+
+
+def _spent(plan: Plan) -> str:
+    """How much of what damping takes the pulses give, and what ends them."""
+    body, pulses = plan.spacecraft, plan.pulses
+    count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
+    width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.hindrance.full else ""
+    if plan.hindrance.shortest:
+        width = ", and min_on_time allows no shorter ones"
+    last = "The last one" if len(pulses) != 1 else "It"
+    blackout = ", with blackout windows" if body.limits.blackout else ""
+    return (
+        f"Its {count} {quantity(pulses.total_impulse, 'N m s')}{width}; damping takes "
+        f"{quantity(body.least_impulse, 'N m s')}. {last} ends at {moment(pulses.end)} of a horizon of "
+        f"{duration(body.horizon)}{blackout}."
+    )
+
+
+def hints(compared: Comparison) -> tuple[str, ...]:
+    """What the reader may prefer: a plan that keeps H much better for little more."""
+    found = compared.recommendation
+    chosen, steadier = found.plan, found.steadier
+    if chosen is None or steadier is None or chosen.flown is None or steadier.flown is None:
+        return ()
+    if found.by_propellant:
+        more, less = steadier.pulses.propellant or 0.0, chosen.pulses.propellant or 0.0
+        extra = f"{mass(more - less)} more propellant"
+    else:
+        more, less = steadier.pulses.total_impulse, chosen.pulses.total_impulse
+        extra = f"{quantity(more - less, 'N m s')} more impulse"
+    return (
+        f"{steadier.scheme} shifts H by {degrees(steadier.flown.momentum_shift)} instead of "
+        f"{degrees(chosen.flown.momentum_shift)}, for {extra} ({100.0 * (more / less - 1.0):.2g} %).",
+    )
+
+
+def spoken(compared: Comparison) -> dict[str, Any]:
+    """The words of a comparison for JSON files."""
+    return {
+        "no_pulse_needed": compliance.unaided(compared.spacecraft),
+        "reason": reason(compared),
+        "warnings": list(warnings(compared)),
+        "hints": list(hints(compared)),
+    }
+
+
+def robust_reason(found: RobustComparison) -> str:
+    """Why the robust plan, or none."""
+    chosen, count = found.chosen, len(found.candidates)
+    if chosen is None:
+        return "no scheme is feasible"
+    if chosen.met is None:
+        level = exact_percent(found.probability)
+        best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
+        as_good = f"{found.equals} leave about as little"
+    else:
+        best = f"most cases comply, of {count} plans"
+        as_good = f"{found.equals} comply equally often within the sampling error"
+    if count == 1:
+        return "the scheme named" if len(found.comparison.plans) == 1 else "the only plan"
+    cost = "propellant" if found.by_propellant else "impulse"
+    then = {
+        Ground.COST: f"least {cost}",
+        Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
+        Ground.END: f"least {cost} within 0.1 %, and first to end",
+    }
+    return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
+
+
+def robust_cost(found: RobustComparison) -> str:
+    """The robust plan against the one that is recommended for nominal values."""
+    chosen, usual, cost = found.chosen, found.usual, found.cost
+    if chosen is None or usual is None or cost is None:
+        return "There is nothing to compare it with."
+    if chosen is usual:
+        return "It is the plan that is recommended for nominal values too."
+    if cost.propellant is None:
+        spent = _more(cost.impulse, quantity(abs(cost.impulse), "N m s"), "impulse")
+    else:
+        spent = _more(cost.propellant, mass(abs(cost.propellant)), "propellant")
+    when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
+    level = exact_percent(found.probability)
+    what = left_name(found.comparison.spacecraft)
+    gained = f"{degrees(chosen.left)} instead of {degrees(usual.left)} of {what} in {level} of the cases"
+    if chosen.met is not None and usual.met is not None:
+        shares = (percent(one.met or 0.0, found.probability) for one in (chosen, usual))
+        gained = f"{' instead of '.join(shares)} of cases comply"
+    return f"Against {usual.plan.scheme}, recommended for nominal values: {gained}; it takes {spent} and ends {when}."
+
+
+def left_name(spacecraft: Spacecraft) -> str:
+    """What a plan is to leave least of."""
+    return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
+
+
+def _more(difference: float, shown: str, what: str) -> str:
+    if difference == 0.0:
+        return f"as much {what}"
+    return f"{shown} {'more' if difference > 0 else 'less'} {what}"
+
+
+def required(spacecraft: Spacecraft) -> str:
+    """What is required, on one line; empty where nothing is."""
+    texts = []
+    for bound in compliance.required(spacecraft):
+        if bound.part is Part.SPIN:
+            tolerance = 100.0 * compliance.SPIN_TOLERANCE
+            texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
+        else:
+            texts.append(f"{PARTS[bound.part]} within {degrees(bound.most)}")
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 2 else texts)
+
+
+def cases_verdict(share: float, probability: float) -> str:
+    """Whether enough cases comply: "met: 99.9 % of cases comply (99.7 % required)"."""
+    verdict = "met" if share >= probability else "NOT met"
+    return f"{verdict}: {percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
+
+
+def percent(share: float, *others: float) -> str:
+    """A share in percent to one decimal; to more where it would be taken for one of the ``others``, or for all."""
+    distinct = [other for other in (*others, 0.0, 1.0) if other != share]
+    for digits in range(1, 12):
+        text = f"{100.0 * share:.{digits}f}"
+        if all(float(text) != float(f"{100.0 * other:.10g}") for other in distinct):
+            return f"{text} %"
+    return f"{100.0 * share:.12g} %"
+
+
+def exact_percent(share: float) -> str:
+    """A share that a file gives, in percent as it was written."""
+    return f"{100.0 * share:.10g} %"
+
+
+def _rpm(spin: float) -> str:
+    return f"{spin * 30.0 / math.pi:.5g} rpm"

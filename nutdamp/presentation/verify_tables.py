@@ -1,0 +1,93 @@
+"""The screen of ``verify``: methods side by side, conservation, and what each imperfection costs."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.presentation.layout import columns
+from nutdamp.presentation.plan_tables import header
+from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.verification import AGREE, WITHOUT, Verification
+
+
+def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
+    """Everything that ``verify`` shows of the schedule called ``name``."""
+    missing = [Text(f"{method.name}: {method.missing}") for method in found.methods if method.missing]
+    return Group(
+        header(spacecraft),
+        Text(),
+        Text(f"{name}, flown by independent means", style="bold"),
+        Text(),
+        methods_table(found),
+        *missing,
+        Text(),
+        Text(verdict(found)),
+        Text(conservation(spacecraft, found)),
+        Text(),
+        Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
+        Text(),
+        budget_table(spacecraft, found),
+        *[Text(note, style="dim") for note in (budget_note(found),) if note],
+    )
+
+
+def verdict(found: Verification) -> str:
+    """Whether the integrations from outside confirm the flown motion, in a sentence."""
+    if not found.checks:
+        return "NOT CONFIRMED: no independent integration was flown to the end."
+    names = found.checks if found.agree else found.disagreeing
+    how = f"agree (within {AGREE:g} rad)" if found.agree else f"DO NOT AGREE (within {AGREE:g} rad)"
+    return f"The flown motion and {' and '.join(names)} {how}."
+
+
+def conservation(spacecraft: Spacecraft, found: Verification) -> str:
+    """How far |H| and the energy change on coasts, in a sentence."""
+    drifts = f"|H| by at most {found.momentum_drift:.1e}, the energy by {found.energy_drift:.1e} of itself"
+    if spacecraft.disturbances or spacecraft.growth != 0.0:
+        return f"On coasts disturbances or dissipation change {drifts}."
+    return f"On coasts, where both should stay, rounding changes {drifts}."
+
+
+def methods_table(found: Verification) -> Table:
+    """One row a way to fly the schedule: what it leaves, and how far it differs from the flown motion."""
+    names = ("method", "nutation", "shift of H", "axis", "H", "rates")
+    units = ("", "left, deg", "deg", "differs, rad", "rad", "relative")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)))
+    for method in found.methods:
+        if not method.missing:
+            differences = (method.axis, method.momentum, method.rate)
+            table.add_row(
+                method.name,
+                degrees(method.nutation).removesuffix(" deg"),
+                degrees(method.momentum_shift).removesuffix(" deg"),
+                *map(_difference, differences),
+            )
+    return table
+
+
+def _difference(value: float | None) -> str:
+    if value is None:
+        return MISSING
+    return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+
+
+def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
+    """One row an imperfection: what it leaves, alone; then what is left without something that plans reckon with."""
+    aimed = spacecraft.goal.axis is not None
+    table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
+    for row in found.budget:
+        angles = (row.nutation, row.axis_error)
+        table.add_row(row.name, *(degrees(angle).removesuffix(" deg") for angle in angles))
+    return table
+
+
+def budget_note(found: Verification) -> str:
+    """Why leaving something out leaves more, in a sentence; empty where nothing is left out."""
+    names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
+    if not names:
+        return ""
+    subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    return f"Plans reckon with {subject}; a row 'without' shows what the same pulses leave in a body that lacks it."

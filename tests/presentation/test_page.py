@@ -1,0 +1,269 @@
+"""The page of `report`, without a browser: what stands on it, that nothing breaks out of it, that it needs nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from markup import Node, parsed
+
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.study import Results, run
+from nutdamp.files.plan_json import comparison_json
+from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.planning import Comparison, compare
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.html import number_in, page_html
+from nutdamp.presentation.page.markdown import page_markdown
+from nutdamp.presentation.page.sheets import spacecraft_facts
+from nutdamp.schemes import CLASSIC
+
+PAGE = Path(__file__).parents[2] / "nutdamp" / "presentation" / "page"
+
+NASTY = """# </pre><script>alert(1)</script> and `ticks` ``` in a comment
+name: '<b>&"|*'
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+thrusters:
+  - {name: '<i>"[x](y)', torque: [8, 0, 0], isp: 220, lever_arm: 1}
+  - {name: 'a|b', torque: [-8, 0, 0], isp: 220, lever_arm: 1}
+  - {name: "'&amp;", torque: [0, 8, 0], isp: 220, lever_arm: 1}
+  - {name: '$D$', torque: [0, -8, 0], isp: 220, lever_arm: 1}
+disturbances:
+  - {name: <u>wind, torque: [0.001, 0, 0]}
+requirement: {nutation: 0.5 deg}
+"""
+
+
+def compared(text: str, names: tuple[str, ...] = CLASSIC) -> Comparison:
+    return compare(read_spacecraft(text, "craft.yaml"), names)
+
+
+def page(text: str, *, pictured: bool = False) -> str:
+    repeat = Repeat("nutdamp report 'a <b>.yaml'", "a <b>.yaml", text)
+    return page_html(report_page(compared(text), repeat, pictured=pictured))
+
+
+@pytest.fixture(scope="module")
+def example() -> str:
+    return page(built_in_example_text(), pictured=True)
+
+
+@pytest.fixture(scope="module")
+def nasty() -> str:
+    return page(NASTY, pictured=True)
+
+
+def sheet(tree: Node, section: str, place: int = 0) -> tuple[list[str], list[list[Node]]]:
+    """Headings and rows of a table of a section."""
+    (found,) = (node for node in tree.all("section") if node.attributes["id"] == section)
+    table = [node for node in found.all("table") if "sheet" in node.attributes["class"].split()][place]
+    rows = [[cell for cell in row if cell.tag in ("th", "td")] for row in table.all("tr")]
+    return [cell.text for cell in rows[0]], rows[1:]
+
+
+@pytest.mark.parametrize("name", ["example", "nasty"])
+def test_it_is_well_formed_and_needs_no_network(name: str, request: pytest.FixtureRequest) -> None:
+    text = request.getfixturevalue(name)
+    assert text.startswith("<!DOCTYPE html>\n<html lang=")
+    tree = parsed(text.removeprefix("<!DOCTYPE html>"))
+    ids = [node.attributes["id"] for node in tree if "id" in node.attributes]
+    assert len(ids) == len(set(ids))
+    for node in tree:
+        for key, value in node.attributes.items():
+            if key in ("href", "src", "xlink:href", "data", "srcset", "action"):
+                assert value.startswith(("#", "data:,"))
+                assert not value.startswith("#") or value[1:] in ids
+            if not key.startswith("xmlns"):
+                assert "//" not in value or key == "aria-label"
+        for used in re.findall(r"url\((.*?)\)", " ".join(node.attributes.values())):
+            assert used.strip("'\"").removeprefix("#") in ids
+    (style_sheet,) = tree.all("style")
+    assert "@import" not in style_sheet.text
+    assert "url(" not in style_sheet.text
+
+
+def test_every_table_has_a_caption_and_headings(example: str) -> None:
+    tables = parsed(example).all("table")
+    assert len(tables) >= 6
+    for table in tables:
+        assert len(table.all("caption")) == 1
+        assert table.all("caption")[0].text
+        for row in table.all("tr"):
+            heads = [node for node in row if node.tag == "th"]
+            assert heads
+            assert all(head.attributes["scope"] in ("col", "row") and head.text for head in heads)
+        widths = {len([cell for cell in row if cell.tag in ("th", "td")]) for row in table.all("tr")}
+        assert len(widths) == 1
+
+
+def test_what_a_file_says_stays_text(nasty: str) -> None:
+    tree = parsed(nasty.removeprefix("<!DOCTYPE html>"))
+    assert tree.all("h1")[0].text.startswith('<b>&"|*: damping 5 deg')
+    for tag in ("b", "i", "u"):
+        assert all(node.text.rstrip(":") in CLASSIC or "Basilisk" in node.text for node in tree.all(tag))
+    assert len(tree.all("script")) == 1
+    assert '<i>"[x](y)' in {row[0].text for row in sheet(tree, "spacecraft")[1]}
+    assert "<u>wind" in {row[0].text for row in sheet(tree, "spacecraft", 1)[1]}
+    assert tree.all("pre")[0].text == "nutdamp report 'a <b>.yaml'"
+
+
+def test_the_input_file_stands_there_to_the_letter(nasty: str, example: str) -> None:
+    for text, source in ((nasty, NASTY), (example, built_in_example_text())):
+        shown = parsed(text.removeprefix("<!DOCTYPE html>")).all("pre")[1].text
+        assert shown == source.rstrip("\n")
+
+
+def test_no_other_script_may_run(example: str) -> None:
+    tree = parsed(example.removeprefix("<!DOCTYPE html>"))
+    digest = base64.b64encode(hashlib.sha256(tree.all("script")[0].text.encode()).digest()).decode()
+    (policy,) = (node.attributes["content"] for node in tree.all("meta") if "http-equiv" in node.attributes)
+    assert policy.split("; ")[:3] == [
+        "default-src 'none'",
+        "style-src 'unsafe-inline'",
+        f"script-src 'sha256-{digest}'",
+    ]
+
+
+def test_the_same_input_gives_the_same_page(example: str) -> None:
+    assert page(built_in_example_text(), pictured=True) == example
+
+
+def test_the_comparison_says_what_the_json_says(example: str) -> None:
+    data = comparison_json(compared(built_in_example_text()), {})
+    heads, rows = sheet(parsed(example), "schemes")
+    assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
+    for row, plan in zip(rows, data["plans"], strict=True):
+        for head, expected in {
+            "ends at s": plan["end_s"],
+            "impulse N m s": plan["total_impulse_Nms"],
+            "propellant g": 1e3 * plan["propellant_kg"],
+            "nutation left deg": plan["flown"]["nutation_deg"],
+            "shift of H deg": plan["flown"]["momentum_shift_deg"],
+            "ΔV m/s": math.hypot(*plan["delta_v_m_s"]),
+        }.items():
+            shown = float(row[heads.index(head)].attributes["data-value"])
+            assert shown == pytest.approx(expected, rel=1e-3, abs=1e-9)
+        verdict = {True: "met", False: "not met"}[plan["meets_requirement"]]
+        assert row[heads.index("requirement")].text == verdict
+    marks = [row.attributes.get("class") for row in parsed(example).all("tr")]
+    assert marks.count("mark") == 1
+
+
+def test_the_requirement_is_given_once() -> None:
+    names = [name for name, _ in spacecraft_facts(read_spacecraft(built_in_example_text(), "example")).rows]
+    assert names.count("requirement") == 1
+    assert names[-1] == "horizon"
+
+
+def test_the_schedule_is_the_recommended_one(example: str) -> None:
+    chosen = compared(built_in_example_text()).recommended
+    assert chosen is not None
+    heads, rows = sheet(parsed(example), "schedule")
+    assert len(rows) == len(chosen.pulses)
+    for row, pulse in zip(rows, chosen.pulses, strict=True):
+        assert row[heads.index("channel")].text == pulse.channel
+        assert float(row[heads.index("start s")].text) == pytest.approx(pulse.start, abs=1e-4)
+        assert float(row[heads.index("on-time s")].text) == pytest.approx(pulse.on_time, abs=1e-4)
+
+
+def test_pictures_are_inside_and_described(example: str) -> None:
+    pictures = [node for node in parsed(example).all("svg") if node.attributes.get("role") == "img"]
+    assert len(pictures) == 4
+    for picture in pictures:
+        assert picture.attributes["aria-label"]
+        assert "viewbox" in picture.attributes
+
+
+def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
+    lightened = set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", (PAGE / "page.css").read_text(encoding="utf-8")))
+    assert lightened == {colour.lower() for colour in (style.MOTION, style.PULSE, style.MOMENTUM)}
+
+
+def test_without_a_feasible_plan_the_page_says_why() -> None:
+    text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n").replace("two-pulse", "")
+    assert "No recommendation" not in text
+    only = compared("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n", ("four-pulse",))
+    made = report_page(only, Repeat("", "", ""), pictured=True)
+    assert not made.good
+    assert [section.name for section in made.sections] == ["spacecraft", "schemes", "repeat"]
+    tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+    assert sheet(tree, "schemes")[1][0][1].text == "infeasible"
+    assert "the file names no thrusters" in tree.text
+
+
+def test_without_nutation_there_is_nothing_to_fire() -> None:
+    text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n", pictured=True)
+    assert "No pulse is needed." in text
+    assert parsed(text.removeprefix("<!DOCTYPE html>")).all("svg")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("5", 5.0), ("< 1e-9", 1e-9), ("-0.25", -0.25), ("–", None), ("ideal", None), ("", None)]
+)
+def test_numbers_are_found_in_cells(text: str, value: float | None) -> None:
+    assert number_in(text) == value
+
+
+def test_markdown_holds_the_same_tables_and_nothing_of_html() -> None:
+    made = report_page(compared(NASTY), Repeat("nutdamp report", "a.yaml", NASTY), pictured=False)
+    text = page_markdown(made)
+    outside = re.sub(r"(`{3,}).*?\n\1", "", text, flags=re.DOTALL)
+    assert set(re.findall(r"</?[a-z]+", outside)) == {"<details", "</details", "<summary", "</summary", "<sub", "</sub"}
+    assert "![" not in text
+    for name in (r"&lt;b&gt;&amp;\"\|\*", r"&lt;i&gt;\"\[x\](y)", r"a\|b", r"'&amp;amp;", r"\$D\$"):
+        assert name.replace(r"\"", '"') in outside
+    (listing,) = re.findall(r"(````+)yaml\n(.*?)\n\1", text, re.DOTALL)
+    assert listing[1] == NASTY.rstrip("\n")
+    tables = re.findall(r"(?:^\|.*\|\n)+", outside, re.MULTILINE)
+    assert len(tables) >= 6
+    for table in tables:
+        widths = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(widths) == 1
+        assert re.fullmatch(r"\|( (:---|---:) \|)+", table.splitlines()[1])
+
+
+DISPERSED = """name: Wide
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+steerable: {torque: 20 N m}
+requirement: {nutation: 0.5 deg, probability: 90 %}
+dispersions: {A: {normal: SIGMA}}
+"""
+
+
+@pytest.mark.parametrize(("sigma", "good"), [("0.1 %", True), ("5 %", False)])
+def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
+    found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))
+    assert found.recommended is not None
+    assert found.recommended.meets_requirement
+    results = Results(study_of(found.spacecraft, found.recommended.pulses, flown=True), 1000)
+    run(results, threads=1)
+    made = report_page(found, Repeat("", "", ""), pictured=True, dispersed=results)
+    assert made.good == good
+    assert results.met_fraction is not None
+    share = f"{100 * results.met_fraction:.1f} % of cases comply (90 % required)"
+    said = f"met: {share}" if good else f"NOT met: {share}"
+    assert made.verdict.endswith(f" {said}.")
+    assert dict(made.figures)["requirement"] == said  # the tile does not contradict the page
+    tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+    heads, rows = sheet(tree, "dispersion")
+    assert heads[:2] == ["quantity", "nominal"]
+    shown = dict(zip(heads, (cell.text for cell in rows[0]), strict=True))
+    assert shown["quantity"] == "nutation, deg"
+    distribution = results.distribution("nutation")
+    assert distribution is not None
+    assert float(shown["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
+    assert float(shown["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
+    (section,) = (node for node in tree.all("section") if node.attributes["id"] == "dispersion")
+    tables = [node.attributes["class"] for node in section.all("table")]
+    assert tables[0] == "sheet"  # each row has a unit of its own: nothing to sort
+    assert "sheet sortable" in tables
+    assert section.all("svg")
+    assert "A" in {row[0].text for row in sheet(tree, "dispersion", 1)[1]}
