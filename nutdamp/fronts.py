@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.planning import Plan, plan
+from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Bounds
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.schemes.registry import OPTIMAL
@@ -103,7 +104,7 @@ def _front(
     fastest = plan(spacecraft, OPTIMAL.name, replace(options, least="time"))
     progress(1)
     if fastest.schedule is None or fastest.schedule.bounds is None:
-        return Front(shift, (), fastest.why or "there is nothing to do")
+        return Front(shift, (), infeasibility(fastest) or "there is nothing to do")
     points = [Point(fastest, spacecraft.horizon)]
     begin, end = spacecraft.limits.earliest, fastest.pulses.end
     for index, share in enumerate(np.linspace(0.0, 1.0, count)[1:], start=2):

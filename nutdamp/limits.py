@@ -1,24 +1,26 @@
 """All that a schedule must keep: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
 
-`Windows` says when a pulse may be on; `keeps_limits` and `broken_limits` judge whole schedules: the first
-by start and end alone, for the schemes, the second by everything, for the reader.
+`Windows` says when a pulse may be on; `breaches` judges whole schedules, for the schemes and for the judge alike. It
+gives data; `nutdamp.remarks` has the words.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, touching
+from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, channel_pulse, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
-SLACK = 1e-9
-"""Seconds by which rounding may overstep a limit; far below any command resolution."""
+OFF_TICK = 1e-6
+"""Share of a tick by which starts and on-times may be off their ticks: the rounding of files."""
 
 
 class Windows:
@@ -36,26 +38,30 @@ class Windows:
             return None
         begins, over = self._merged()
         # The first window that is not over when the pulse starts is the only one that it can touch first.
-        following = int(np.searchsorted(over, start + SLACK, side="right"))
-        touched = following < len(over) and start + on_time > begins[following] + SLACK
+        slack = touching(start + on_time)
+        following = int(np.searchsorted(over, start + slack, side="right"))
+        touched = following < len(over) and start + on_time > begins[following] + slack
         return float(over[following]) if touched else None
 
     def allows(self, start: float, on_time: float, ready: float) -> bool:
         """Whether a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
+        slack = touching(start + on_time)
         return (
-            start >= ready - SLACK
-            and start + on_time <= self.horizon + SLACK
+            start >= ready - slack
+            and start + on_time <= self.horizon + slack
             and self.blocked_until(start, on_time) is None
         )
 
     def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
         """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""
         ends = starts + on_times
-        free = (starts >= np.maximum(ready, 0.0) - SLACK) & (ends <= self.horizon + SLACK)
+        with np.errstate(invalid="ignore"):
+            slack = np.maximum(TOUCHING, np.spacing(ends))  # `touching`
+        free = (starts >= np.maximum(ready, 0.0) - slack) & (ends <= self.horizon + slack)
         if self.limits.blackout:
             begins, over = self._merged()
-            following = np.searchsorted(over, starts + SLACK, side="right")  # as in `blocked_until`
-            free &= ends <= np.append(begins, np.inf)[following] + SLACK
+            following = np.searchsorted(over, starts + slack, side="right")  # as in `blocked_until`
+            free &= ends <= np.append(begins, np.inf)[following] + slack
         return np.asarray(free)
 
     def _merged(self) -> tuple[Vector, Vector]:
@@ -93,20 +99,20 @@ class Windows:
     def tick_after(self, time: float) -> float:
         """First commandable time not before ``time``, but for rounding."""
         tick = self.limits.tick
-        return time if tick is None else math.ceil((time - 0.5 * SLACK) / tick) * tick
+        return time if tick is None else math.ceil((time - 0.5 * TOUCHING) / tick) * tick
 
     def ticks_after(self, times: Vector) -> Vector:
         """`tick_after` of many times (n,)."""
         tick = self.limits.tick
-        return times if tick is None else np.ceil((times - 0.5 * SLACK) / tick) * tick
+        return times if tick is None else np.ceil((times - 0.5 * TOUCHING) / tick) * tick
 
     def on_time(self, wanted: float, shortest: float, longest: float) -> float:
         """Commandable on-time nearest to ``wanted`` s within the bounds, and not zero."""
         tick = self.limits.tick
         if tick is None:
             return min(max(wanted, shortest), longest)
-        least = max(math.ceil((shortest - SLACK) / tick), 1)
-        most = math.inf if math.isinf(longest) else math.floor((longest + SLACK) / tick)
+        least = max(math.ceil((shortest - TOUCHING) / tick), 1)
+        most = math.inf if math.isinf(longest) else math.floor((longest + TOUCHING) / tick)
         return float(min(max(round(wanted / tick), least), most)) * tick
 
 
@@ -132,8 +138,8 @@ def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, 
     """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two is halved."""
     limits, ready, bounds = spacecraft.limits, spacecraft.limits.earliest, []
     for pulse in pulses:
-        latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - SLACK)])
-        begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + SLACK)])
+        latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - TOUCHING)])
+        begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + TOUCHING)])
         bounds.append([begun, latest])
         ready = pulse.end + limits.gap
     for index in range(len(bounds) - 1):
@@ -146,13 +152,18 @@ def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, 
 
 def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time."""
-    tick, time = spacecraft.limits.tick, spacecraft.horizon - spacecraft.limits.earliest
+    time = spacecraft.horizon - spacecraft.limits.earliest
 
     def has_on_time(channel: Channel) -> bool:
-        least = channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - SLACK) / tick), 1) * tick
-        return least <= min(channel.max_on_time, time) + SLACK
+        return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
 
     return [channel for channel in spacecraft.channels if (channel.damps or axial) and has_on_time(channel)]
+
+
+def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
+    """Shortest on-time that can be commanded, s: the min_on_time, on ticks rounded up to one and not less than one."""
+    tick = spacecraft.limits.tick
+    return channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - TOUCHING) / tick), 1) * tick
 
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
@@ -200,63 +211,77 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
     return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
 
 
-def keeps_limits(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> bool:
-    """Whether pulses, in order, keep earliest start, gap, blackout windows and horizon; on-times are not judged."""
-    windows = Windows(spacecraft)
-    ready = windows.limits.earliest
-    for pulse in pulses:
-        if pulse.start < 0.0 or not windows.allows(pulse.start, pulse.on_time, ready):
-            return False
-        ready = pulse.end + windows.limits.gap
-    return True
+class Limit(Enum):
+    """What a schedule may break; ``limits.…`` are keys of the file."""
+
+    RESOLUTION = "resolution of times"
+    EARLIEST = "limits.earliest"
+    HORIZON = "limits.horizon"
+    GAP = "limits.gap"
+    BLACKOUT = "limits.blackout"
+    MIN_ON_TIME = "min_on_time"
+    MAX_ON_TIME = "max_on_time"
+    START_TICK = "limits.tick of starts"
+    ON_TIME_TICK = "limits.tick of on-times"
+    MAX_PULSES = "limits.max_pulses"
 
 
-def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
-    """What a schedule does that limits or on-times forbid, in words; empty where it keeps them all.
+class Breach(NamedTuple):
+    """A ``limit`` that the pulse with the ``number``, from 1, breaks: its ``bound`` s, exceeded ``by`` so many s.
 
-    Each limit is named once, with the first pulse that breaks it and the number of others that do.
+    For `Limit.MAX_PULSES` both count pulses, and the pulse is the last one. ``window``: the blackout window, s; the
+    pulse would have to end before its begin, the ``bound``, or to start after its end, whichever is nearer.
     """
-    broken: dict[str, list[str]] = {}
-    for limit, text in _breaches(spacecraft, made):
-        broken.setdefault(limit, []).append(text)
-    most = spacecraft.limits.max_pulses
-    if most is not None and len(made) > most:
-        broken["max_pulses"] = [f"{len(made)} pulses are more than {most}"]
-    return [first + _likewise(len(others)) for first, *others in broken.values()]
+
+    limit: Limit
+    number: int
+    pulse: Pulse
+    bound: float
+    by: float
+    window: tuple[float, float] | None = None
 
 
-def _likewise(others: int) -> str:
-    return f"; likewise {others} more pulse{'s' * (others > 1)}" if others else ""
+def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach]:
+    """What ``pulses``, in order, break of the limits and on-times of the file, pulse by pulse.
 
-
-def _breaches(spacecraft: Spacecraft, made: Schedule) -> Iterator[tuple[str, str]]:
-    """Each limit that a pulse breaks, and how, in words."""
-    limits, horizon = spacecraft.limits, spacecraft.horizon
+    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything.
+    """
+    windows, previous_end, number = Windows(spacecraft), -math.inf, 0
     channels = {channel.name: channel for channel in spacecraft.channels}
-    previous_end = -math.inf
-    for number, pulse in enumerate(made, start=1):
-        slack = touching(pulse.end)
-        name = f"pulse {number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s)"
-        if not pulse.resolved:
-            yield "resolution", f"{name} is too short for its time, where times are {math.ulp(pulse.end):.2g} s apart"
-        if pulse.start < min(limits.earliest, 0.0) - slack or pulse.start < limits.earliest - slack:
-            yield "earliest", f"{name} starts before {limits.earliest:.6g} s"
-        if pulse.end > horizon + slack:
-            yield "horizon", f"{name} ends after the horizon of {horizon:.6g} s"
-        if pulse.start < previous_end + limits.gap - slack:
-            yield "gap", f"{name} comes less than {limits.gap:.6g} s after the one before"
-        for begins, ends in limits.blackout:
-            if pulse.start < ends - slack and pulse.end > begins + slack:
-                yield f"blackout {begins}", f"{name} lies in the blackout window {begins:.6g} s to {ends:.6g} s"
-        channel = channels.get(pulse.channel)
-        if channel is not None and pulse.on_time < channel.min_on_time - slack:
-            least = f"less than the shortest on-time of {channel.min_on_time:.6g} s"
-            yield "min_on_time", f"{name} is on for {pulse.on_time:.6g} s, {least}"
-        if channel is not None and pulse.on_time > channel.max_on_time + slack:
-            most = f"more than the longest on-time of {channel.max_on_time:.6g} s"
-            yield "max_on_time", f"{name} is on for {pulse.on_time:.6g} s, {most}"
-        if limits.tick is not None:
-            for value, what in ((pulse.start, "starts"), (pulse.on_time, "is on for a time")):
-                if abs(value - round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick:
-                    yield what, f"{name} {what} off the ticks of {limits.tick:.6g} s"
+    for number, pulse in enumerate(pulses, start=1):
+        for limit, bound, by, allowed in _margins(windows, channels.get(pulse.channel), pulse, previous_end):
+            if by > allowed:
+                yield Breach(limit, number, pulse, bound, by)
+        if windows.blocked_until(pulse.start, pulse.on_time) is not None:
+            for begins, ends in windows.limits.blackout:
+                by = min(ends - pulse.start, pulse.end - begins)
+                if by > touching(pulse.end):
+                    yield Breach(Limit.BLACKOUT, number, pulse, begins, by, (begins, ends))
         previous_end = max(previous_end, pulse.end)
+    most = spacecraft.limits.max_pulses
+    if most is not None and number > most:
+        yield Breach(Limit.MAX_PULSES, number, pulse, most, number - most)
+
+
+def _margins(
+    windows: Windows, channel: Channel | None, pulse: Pulse, previous_end: float
+) -> Iterator[tuple[Limit, float, float, float]]:
+    """Each limit but the blackout windows with its bound, by how much a pulse exceeds it, and by how much it may; s."""
+    limits, slack = windows.limits, touching(pulse.end)
+    if pulse.on_time > 0.0:
+        coarsest = RESOLUTION * pulse.on_time
+        yield Limit.RESOLUTION, coarsest, math.ulp(pulse.end), coarsest
+    yield Limit.EARLIEST, limits.earliest, limits.earliest - pulse.start, 0.0 if pulse.start < 0.0 else slack
+    yield Limit.HORIZON, windows.horizon, pulse.end - windows.horizon, slack
+    yield Limit.GAP, limits.gap, previous_end + limits.gap - pulse.start, slack
+    if channel is not None:
+        yield Limit.MIN_ON_TIME, channel.min_on_time, channel.min_on_time - pulse.on_time, slack
+        yield Limit.MAX_ON_TIME, channel.max_on_time, pulse.on_time - channel.max_on_time, slack
+    if limits.tick is not None:
+        for limit, value in ((Limit.START_TICK, pulse.start), (Limit.ON_TIME_TICK, pulse.on_time)):
+            yield limit, limits.tick, abs(value - windows.nearest_tick(value)), slack + OFF_TICK * limits.tick
+
+
+def keeps_limits(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> bool:
+    """Whether ``pulses``, in order, break nothing: see `breaches`."""
+    return next(breaches(spacecraft, pulses), None) is None

@@ -12,7 +12,7 @@ from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
 from nutdamp.hindrance import Hindrance
-from nutdamp.limits import broken_limits
+from nutdamp.limits import Breach, breaches
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule
@@ -27,17 +27,22 @@ BUG = "internal error, please report"
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A scheme's schedule for a spacecraft, and how it was judged; without one, ``why``.
+    """A scheme's schedule for a spacecraft, and how it was judged.
 
+    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the
+    nutation (rad) that this would leave where that is ``worse`` than without pulses. `nutdamp.remarks` has the
+    words of all three.
     ``failure``: the exception of a scheme that has a bug.
     """
 
     spacecraft: Spacecraft
     scheme: str
     schedule: Schedule | None
-    why: str | None = None
+    refusal: str | None = None
     options: schemes.SchemeOptions = field(default_factory=schemes.SchemeOptions)
     failure: Exception | None = None
+    breach: Breach | None = None
+    worse: float | None = None
 
     @property
     def feasible(self) -> bool:
@@ -192,12 +197,11 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes
         made = made.without_proof
     flown = Plan(spacecraft, scheme, made, options=options)
     left = flown.flown
-    broken = broken_limits(spacecraft, made)
-    if broken:
-        return Plan(spacecraft, scheme, None, f"the only schedule found breaks a limit: {broken[0]}")
+    breach = next(breaches(spacecraft, made), None)
+    if breach is not None:
+        return Plan(spacecraft, scheme, None, breach=breach)
     if scheme in schemes.PLANNED and left is not None and not _helps(flown, left):
-        angle = math.degrees(left.nutation)
-        return Plan(spacecraft, scheme, None, f"the best schedule found would leave {angle:.3g}° of nutation")
+        return Plan(spacecraft, scheme, None, worse=left.nutation)
     return flown
 
 

@@ -1,6 +1,7 @@
 """What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
 
-The plan gives the data; what is said of several plans together is in `nutdamp.presentation.verdicts`.
+Also why there is no schedule, and which limits a schedule breaks. The plan gives the data; what is said of several
+plans together is in `nutdamp.presentation.verdicts`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,10 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.hindrance import Obstacle
+from nutdamp.limits import Breach, Limit, breaches
 from nutdamp.planning import Plan
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft
 
 TELLING = math.radians(1e-6)
 """Nutation angle in rad from which what is left is worth a remark."""
@@ -20,6 +24,56 @@ def remarks(plan: Plan) -> tuple[str, ...]:
     if plan.flown is None or not len(plan.pulses):
         return plan.pulses.notes
     return (*plan.pulses.notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan))
+
+
+def infeasibility(plan: Plan) -> str:
+    """Why there is no schedule; empty where there is one."""
+    if plan.breach is not None:
+        return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
+    if plan.worse is not None:
+        return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
+    return plan.refusal or ""
+
+
+def said(plan: Plan) -> tuple[str, ...]:
+    """Why there is no schedule, or the `remarks` on it."""
+    return remarks(plan) if plan.feasible else (infeasibility(plan),)
+
+
+def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
+    """What a schedule does that limits or on-times forbid, a sentence each; empty where it keeps them all.
+
+    Each limit is named once, with the first pulse that breaks it and the number of others that do.
+    """
+    found: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
+    for breach in breaches(spacecraft, made):
+        found.setdefault((breach.limit, breach.window), []).append(breach)
+    return [_broken(first) + _likewise(len(others)) for first, *others in found.values()]
+
+
+def _likewise(others: int) -> str:
+    return f"; likewise {others} more pulse{'s' * (others > 1)}" if others else ""
+
+
+def _broken(breach: Breach) -> str:
+    """The pulse that breaks a limit, and how."""
+    pulse, bound, limit = breach.pulse, f"{breach.bound:.6g} s", breach.limit
+    if limit is Limit.MAX_PULSES:
+        return f"{breach.number} pulses are more than {breach.bound:.0f}"
+    begins, ends = breach.window or (math.nan, math.nan)
+    on = f"is on for {pulse.on_time:.6g} s"
+    how = {
+        Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
+        Limit.EARLIEST: f"starts before {bound}",
+        Limit.HORIZON: f"ends after the horizon of {bound}",
+        Limit.GAP: f"comes less than {bound} after the one before",
+        Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
+        Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
+        Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",
+        Limit.START_TICK: f"starts off the ticks of {bound}",
+        Limit.ON_TIME_TICK: f"is on for a time off the ticks of {bound}",
+    }[limit]
+    return f"pulse {breach.number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s) {how}"
 
 
 def _bounds(plan: Plan) -> Iterator[str]:

@@ -22,7 +22,7 @@ from nutdamp.dispersion.outputs import aim_output
 from nutdamp.dispersion.statistics import binomial_interval
 from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
-from nutdamp.limits import broken_limits
+from nutdamp.limits import keeps_limits
 from nutdamp.planning import Comparison, Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
@@ -158,7 +158,7 @@ def compare(
         for variant, plan in trial():
             kind = _kind(plan)
             # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
-            if not plan.feasible or kind in found or broken_limits(body, plan.pulses):
+            if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long

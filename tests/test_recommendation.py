@@ -18,7 +18,7 @@ from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.planning import Comparison, Plan, compare
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing, recommend
-from nutdamp.remarks import remarks
+from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Goal, Inertia, Limits, Requirement
 
@@ -250,7 +250,7 @@ def test_a_scheme_that_cannot_set_the_spin_says_so() -> None:
     body = replace(spinner(channels=cross(20.0)), goal=Goal(spin=3.3))
     compared = compare(body, (*schemes.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
-    assert all("cannot set the spin" in (one.why or "") for one in compared.plans)
+    assert all("cannot set the spin" in infeasibility(one) for one in compared.plans)
     assert "optimal" in planning.usual(body)
     assert planning.plan(body, "none").meets_requirement is False
     kept = replace(body, goal=Goal(spin=3.0))
@@ -364,11 +364,11 @@ def test_where_nothing_is_feasible_what_was_not_compared_is_named() -> None:
 
 def test_no_limit_is_named_that_the_file_does_not_set() -> None:
     body = spinner(channels=cross(8.0), limits=Limits(horizon=0.5))
-    assert (planning.plan(body, "two-pulse").why or "").endswith("nutation within the horizon of 0.5 s")
+    assert infeasibility(planning.plan(body, "two-pulse")).endswith("nutation within the horizon of 0.5 s")
     bound = replace(
         body, limits=Limits(horizon=0.5, gap=0.1, blackout=((0.1, 0.2),)), channels=cross(8.0, max_on_time=1.0)
     )
-    assert (planning.plan(bound, "two-pulse").why or "").endswith(
+    assert infeasibility(planning.plan(bound, "two-pulse")).endswith(
         "within the horizon of 0.5 s, on-times, gap and blackout windows"
     )
 
@@ -614,7 +614,7 @@ def test_a_bug_of_one_scheme_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
     compared = compare(body, schemes.CLASSIC)
     (failed,) = compared.failed
     assert failed.scheme == "two-pulse"
-    assert failed.why == "internal error, please report: ZeroDivisionError"
+    assert infeasibility(failed) == "internal error, please report: ZeroDivisionError"
     assert isinstance(failed.failure, ZeroDivisionError)
     for one, other in zip(compared.plans, whole.plans, strict=True):
         assert one.scheme == "two-pulse" or one.pulses.total_impulse == other.pulses.total_impulse
@@ -628,7 +628,7 @@ def test_a_bug_that_shows_when_the_plan_is_judged_counts_too(monkeypatch: pytest
     monkeypatch.setattr(flight, "momentum_gained", broken)
     jet = channel("T", 0.0, 8.0, 0.0, isp=220.0, thrust=10.0, force=(10.0, 0.0, 0.0))
     compared = compare(spinner(channels=(jet,), mass=100.0), ("one-pulse",))
-    assert [one.why for one in compared.failed] == ["internal error, please report: IndexError"]
+    assert [infeasibility(one) for one in compared.failed] == ["internal error, please report: IndexError"]
     assert compared.recommended is None
 
 

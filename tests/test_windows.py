@@ -11,8 +11,8 @@ from builders import channel, fan, spinner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp.limits import SLACK, Windows, commandable, for_pairs, longest_on_time, rooms
-from nutdamp.schedule import channel_pulse, steerable_pulse
+from nutdamp.limits import Windows, commandable, for_pairs, longest_on_time, rooms
+from nutdamp.schedule import TOUCHING, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Limits, Steerable
 
 
@@ -104,13 +104,13 @@ def test_earliest_start_is_allowed_and_nothing_before_it_is(
     start = dark.earliest_start(on_time, ready)
     last = 100.0 - on_time if start is None else start
     if start is not None:
-        assert start >= ready - SLACK
+        assert start >= ready - TOUCHING
         assert dark.allows(start, on_time, ready)
         assert tick is None or abs(start / tick - round(start / tick)) < 1e-9
     step = tick or 0.05
     for index in range(math.ceil(ready / step), math.floor(last / step)):
         earlier = index * step
-        if ready <= earlier < last - 10 * SLACK:
+        if ready <= earlier < last - 10 * TOUCHING:
             assert not dark.allows(earlier, on_time, ready)
 
 

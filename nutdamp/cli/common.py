@@ -173,12 +173,12 @@ def plan_or_read(
     from nutdamp import planning
     from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible, printable
+    from nutdamp.remarks import broken_limits, infeasibility
     from nutdamp.remarks import remarks as sentences
 
     expect_read(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
         from nutdamp.files.schedule_file import read_pulses
-        from nutdamp.limits import broken_limits
 
         pulses, warnings = read_pulses(schedule, body)
         for warning in (*warnings, *broken_limits(body, pulses)):
@@ -197,8 +197,8 @@ def plan_or_read(
                 remark(f"warning: {warning}")
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
-    if plan.why is not None:
-        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
+    if not plan.feasible:
+        raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
     for text in sentences(plan):
         remark(text)
     return plan

@@ -31,5 +31,5 @@ def show_failures(compared: Comparison) -> bool:
             import traceback
 
             say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
-        say(f"nutdamp: {plan.scheme}: {plan.why} (--debug shows the traceback)")
+        say(f"nutdamp: {plan.scheme}: {plan.refusal} (--debug shows the traceback)")
     return bool(compared.failed)

@@ -10,7 +10,7 @@ from nutdamp import __version__
 from nutdamp.compliance import Part
 from nutdamp.flight import Flight, Residual
 from nutdamp.planning import Comparison, Plan
-from nutdamp.remarks import remarks
+from nutdamp.remarks import infeasibility, remarks
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -58,7 +58,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
     return {
         "scheme": plan.scheme,
         "feasible": plan.feasible,
-        "why": plan.why,
+        "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
         "requirement": requirement_json(plan),
         "pulses": [pulse_json(pulse, body) for pulse in plan.pulses],

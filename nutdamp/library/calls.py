@@ -10,7 +10,7 @@ from nutdamp import arguments, planning
 from nutdamp.errors import printable
 from nutdamp.library.craft import Spacecraft, core_of
 from nutdamp.library.results import Comparison, Plan
-from nutdamp.limits import broken_limits
+from nutdamp.remarks import broken_limits
 from nutdamp.schemes import Choice
 
 

@@ -18,7 +18,7 @@ from nutdamp.library.craft import Source, Spacecraft
 from nutdamp.library.notebook import block, data_frame
 from nutdamp.outcome import seen_at
 from nutdamp.presentation.text import degrees
-from nutdamp.remarks import remarks
+from nutdamp.remarks import infeasibility, remarks
 from nutdamp.track import Track, in_file_axes, in_pieces
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class Plan:
     @property
     def why(self) -> str | None:
         """Why there is no schedule; None where there is one."""
-        return self.core.why
+        return infeasibility(self.core) or None
 
     @property
     def meets_requirement(self) -> bool | None:
@@ -295,5 +295,5 @@ def feasible_core(plan: Plan) -> planning.Plan:
     """What the modules below take; raises BadRequest for what is no `Plan`, Infeasible for one without a schedule."""
     core = arguments.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it").core
     if not core.feasible:
-        raise Infeasible(f"{core.scheme} is infeasible: {core.why}")
+        raise Infeasible(f"{core.scheme} is infeasible: {infeasibility(core)}")
     return core

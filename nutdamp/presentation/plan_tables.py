@@ -17,7 +17,7 @@ from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, steering
-from nutdamp.remarks import remarks
+from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
 
@@ -226,11 +226,11 @@ def _comparison(compared: Comparison) -> Table:
 
 def _reasons(compared: Comparison) -> list[RenderableType]:
     """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
-    said: dict[str, list[str]] = {}
+    schemes_of: dict[str, list[str]] = {}
     for plan in compared.plans:
-        for remark in (plan.why,) if plan.why is not None else remarks(plan):
-            said.setdefault(remark, []).append(plan.scheme)
-    lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in said.items()]
+        for remark in said(plan):
+            schemes_of.setdefault(remark, []).append(plan.scheme)
+    lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in schemes_of.items()]
     return [Text(), *lines] if lines else []
 
 

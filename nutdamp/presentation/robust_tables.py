@@ -12,6 +12,7 @@ from nutdamp.presentation.end_tables import end_table
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header, pulse_table
 from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison
 
 MOST_ROWS = 12
@@ -21,7 +22,7 @@ MOST_ROWS = 12
 def robust_screen(found: RobustComparison) -> RenderableType:
     """Everything that ``plan --robust`` shows."""
     parts: list[RenderableType] = [header(found.comparison.spacecraft), Text()]
-    infeasible = [plan for plan in found.comparison.plans if plan.why is not None]
+    infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
     chosen, reason = found.chosen, verdicts.robust_reason(found)
     if chosen is None:
@@ -41,7 +42,7 @@ def robust_screen(found: RobustComparison) -> RenderableType:
 
 
 def _why(plan: Plan) -> str:
-    return f"infeasible: {plan.why}" if plan.failure is None else f"{plan.why}"
+    return f"infeasible: {infeasibility(plan)}" if plan.failure is None else f"{infeasibility(plan)}"
 
 
 def _candidates(found: RobustComparison) -> RenderableType:

@@ -202,20 +202,29 @@ def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[S
     """
     if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
         for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
-            yield made
+            if keeps_limits(spacecraft, made.pulses):
+                yield made
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
-    """The smallest flown residual of the most promising candidates wins, exact ones in order."""
+    """The smallest flown residual of the most promising candidates wins, exact ones in order.
+
+    Where every one breaks a limit, the first of them: the judge says which.
+    """
     best: tuple[float, Schedule] | None = None
+    broken: Schedule | None = None
     for made, left in _shortlist(spacecraft, channels, options):
-        if best is None or left < CLEARLY * best[0]:
+        if not keeps_limits(spacecraft, made.pulses):
+            broken = broken or made
+        elif best is None or left < CLEARLY * best[0]:
             best = left, made
             if left <= EXACT:
                 break
-    if best is None:
+    if best is not None:
+        return best[1]
+    if broken is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
-    return best[1]
+    return broken
 
 
 def _shortlist(
@@ -234,9 +243,7 @@ def _shortlist(
     near.sort(key=lambda found: found.end)
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
-        made, left = _trimmed(spacecraft, candidate, options.literal)
-        if keeps_limits(spacecraft, made.pulses):
-            yield made, left
+        yield _trimmed(spacecraft, candidate, options.literal)
 
 
 def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:

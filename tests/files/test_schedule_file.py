@@ -20,6 +20,7 @@ from nutdamp.files import schedule_file
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.files.schedule_file import read_pulses
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Pulse, Schedule, overlapping
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
@@ -220,7 +221,7 @@ def test_schemes_plan_no_pulse_that_the_clock_cannot_tell(late: float) -> None:
     for scheme in ("one-pulse", "two-pulse", "four-pulse"):
         made = planning.plan(body, scheme)
         assert not made.feasible
-        assert "too short for its time, where times are" in str(made.why)
+        assert "too short for its time, where times are" in str(infeasibility(made))
 
 
 # --- size ------------------------------------------------------------------------------------------------------------

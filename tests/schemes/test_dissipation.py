@@ -17,6 +17,7 @@ from process import Run
 from nutdamp import flight, planning
 from nutdamp.physics import rigid
 from nutdamp.planning import plan
+from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
@@ -85,7 +86,7 @@ def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
 def test_targets_are_reached(steerable: Steerable, scheme: str, C: float) -> None:
     body = aimed(replace(spinner(A=100.0, C=C, steerable=steerable), dissipation=40.0), 20.0, 70.0)
     one = plan(body, scheme)
-    assert one.flown is not None, one.why
+    assert one.flown is not None, infeasibility(one)
     assert one.flown.nutation < NEARLY_NOTHING
     assert one.flown.axis_error < NEARLY_NOTHING
 
@@ -176,7 +177,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
     jets = tuple(channel(name, *torque) for name, torque in names.items())
     body = replace(spinner(A=80.0, C=120.0, channels=jets, limits=Limits(horizon=600.0)), dissipation=20.0)
     one = plan(body, "optimal")
-    assert one.flown is not None, one.why
+    assert one.flown is not None, infeasibility(one)
     assert one.flown.nutation < NEARLY_NOTHING
     assert all(pulse.resolved for pulse in one.pulses)
     assert one.pulses.total_impulse < 1e-3 * body.least_impulse
@@ -215,7 +216,7 @@ def test_a_target_on_the_spin_axis_takes_one_impulse() -> None:
     body = aimed(replace(spinner(steerable=Steerable()), dissipation=1000.0), 5.0, 0.0)
     for scheme in ("two-pulse", "half-cone"):
         one = plan(body, scheme)
-        assert one.flown is not None, one.why
+        assert one.flown is not None, infeasibility(one)
         assert len(one.pulses) == 1
         assert max(one.flown.nutation, one.flown.axis_error) < 1e-12
 

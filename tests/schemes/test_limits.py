@@ -10,6 +10,7 @@ from builders import channel, cross, fan, spinner, within
 from checker import violations
 
 from nutdamp import planning
+from nutdamp.remarks import infeasibility
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
 
@@ -104,11 +105,11 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         plan = planning.plan(body, scheme, options)
         figures = (plan.residual, plan.flown, plan.delta_v, plan.spin_change, plan.meets_requirement)
     if not plan.feasible:
-        assert plan.why
+        assert infeasibility(plan)
         assert len(plan.pulses) == 0
         assert figures == (None,) * 5
         return
-    assert plan.why is None
+    assert infeasibility(plan) == ""
     assert violations(body, plan.pulses) == []
     assert len(plan.pulses) > 0
     assert plan.flown is not None
@@ -224,5 +225,5 @@ def test_torquer_on_a_body_of_three_different_moments_keeps_the_limits(
     """Going from the symmetric model to the body changes on-times, and must not move starts out of the limits."""
     body = spinner(moments=moments, steerable=Steerable(torque), limits=limit)
     made = planning.plan(body, *asked)
-    assert made.feasible, made.why
+    assert made.feasible, infeasibility(made)
     assert violations(body, made.pulses) == []

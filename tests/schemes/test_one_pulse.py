@@ -12,7 +12,7 @@ from builders import Outcome, channel, cross, fan, spinner, transverse
 from checker import violations
 
 from nutdamp import flight, planning
-from nutdamp.remarks import remarks
+from nutdamp.remarks import infeasibility, remarks
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
 NANODEGREE = math.radians(1e-9)
@@ -22,7 +22,7 @@ BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 20.0)]
 
 def feasible(spacecraft: Spacecraft) -> planning.Plan:
     plan = planning.plan(spacecraft, "one-pulse")
-    assert plan.feasible, plan.why
+    assert plan.feasible, infeasibility(plan)
     assert violations(spacecraft, plan.pulses) == []
     return plan
 
@@ -35,8 +35,7 @@ def left(plan: planning.Plan) -> flight.Residual:
 def infeasible(spacecraft: Spacecraft) -> str:
     plan = planning.plan(spacecraft, "one-pulse")
     assert not plan.feasible
-    assert plan.why is not None
-    return plan.why
+    return infeasibility(plan)
 
 
 # --- steerable -------------------------------------------------------------------------------------------------------
@@ -240,7 +239,7 @@ def test_the_horizon_that_is_named_is_long_enough(scheme: str, torque: float, mi
     """What ends there is the pulse that it takes, not the shortest that there is."""
     body = spinner(degrees=5.0, channels=(channel("T", torque, 0.0, 0.0, min_on_time=min_on_time),))
     short = planning.plan(replace(body, limits=Limits(horizon=0.3)), scheme)
-    found = re.search(r"would end at (\S+) s: set limits.horizon beyond that", short.why or "")
-    assert found is not None, short.why
+    found = re.search(r"would end at (\S+) s: set limits.horizon beyond that", infeasibility(short))
+    assert found is not None, infeasibility(short)
     longer = planning.plan(replace(body, limits=Limits(horizon=float(found[1]) * (1.0 + 1e-5))), scheme)
-    assert longer.feasible, longer.why
+    assert longer.feasible, infeasibility(longer)

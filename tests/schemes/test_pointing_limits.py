@@ -12,6 +12,7 @@ from checker import violations
 from test_limits import HARD, PATIENCE, random_spacecraft
 
 from nutdamp import planning
+from nutdamp.remarks import infeasibility
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Steerable
 
@@ -35,7 +36,7 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         plan = planning.plan(body, scheme, options)
         left = plan.flown
     if not plan.feasible:
-        assert plan.why
+        assert infeasibility(plan)
         assert len(plan.pulses) == 0
         return
     assert left is not None
@@ -75,7 +76,7 @@ def test_most_unlimited_cases_end_on_the_target(scheme: str, spin: float) -> Non
         body = spinner(120.0, C, spin, float(rng.uniform(0.0, 10.0)), channels=cross(400.0))
         body = aimed(body, float(rng.uniform(1.0, 40.0)), float(rng.uniform(-180.0, 180.0)))
         plan = planning.plan(body, scheme)
-        assert plan.feasible, plan.why
+        assert plan.feasible, infeasibility(plan)
         assert plan.flown is not None
         assert max(plan.flown.nutation, plan.flown.axis_error) < math.radians(1e-7)
 
@@ -92,5 +93,5 @@ TRUE_BODIES = {
 def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
     for body in (replace(true_body, channels=cross(60.0)), replace(true_body, steerable=Steerable(60.0))):
         plan = planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True))
-        assert plan.flown is not None, plan.why
+        assert plan.flown is not None, infeasibility(plan)
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9

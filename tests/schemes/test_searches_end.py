@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from nutdamp import flight, planning
 from nutdamp.errors import Infeasible
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.limits import SLACK, Windows
-from nutdamp.remarks import remarks
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.limits import Windows
+from nutdamp.remarks import infeasibility, remarks
+from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC, Options
 from nutdamp.schemes.tools import steerable_pair
 from nutdamp.schemes.tools.impulse_builder import MOST_PULSES, ImpulseBuilder
@@ -107,7 +107,7 @@ def test_the_next_alignment_is_found_or_given_up() -> None:
                     pulse = builder.align(one, on_time)
                 if pulse is None:
                     break
-                assert pulse.start >= builder.ready - SLACK, seed
+                assert pulse.start >= builder.ready - TOUCHING, seed
                 assert not builder.pulses or pulse.t > builder.now, seed
                 assert builder.windows.allows(pulse.start, pulse.on_time, builder.ready), seed
                 found += 1
@@ -124,7 +124,7 @@ def test_windows_that_end_beside_a_tick_are_left_behind(
     ready: float, tick: float, holes: list[tuple[int, float]]
 ) -> None:
     """An end a slack beside a tick is where rounding may call the tick neither before it nor after it."""
-    blackout = tuple((number * tick, (number + 3) * tick + part * SLACK) for number, part in holes)
+    blackout = tuple((number * tick, (number + 3) * tick + part * TOUCHING) for number, part in holes)
     windows = Windows(spinner(limits=Limits(horizon=1e9, tick=tick, blackout=blackout)))
     with within(20_000):
         start = windows.earliest_start(0.5 * tick, ready)
@@ -170,7 +170,7 @@ def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
             with within(10 * PLENTY):
                 plan = planning.plan(aimed(body, 30.0, 10.0) if scheme not in CLASSIC else body, scheme)
                 left = plan.flown
-            assert (left is None) == (plan.why is not None)
+            assert (left is None) == (infeasibility(plan) != "")
 
 
 def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> None:

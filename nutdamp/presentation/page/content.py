@@ -30,7 +30,7 @@ from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet, spac
 from nutdamp.presentation.text import degrees, mass, moment, quantity
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
-from nutdamp.remarks import remarks as remarks_of
+from nutdamp.remarks import said
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 
@@ -133,11 +133,7 @@ def _spacecraft(body: Spacecraft) -> Section:
 
 def _schemes(compared: Comparison) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
-    remarks = tuple(
-        (plan.scheme, remark)
-        for plan in compared.plans
-        for remark in ((plan.why,) if plan.why is not None else remarks_of(plan))
-    )
+    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
     note = Prose(
         "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "
         "integrate Euler's equations through the real widths; recommendation and requirement go by them."

@@ -31,7 +31,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.limits import SLACK, free_windows, usable
+from nutdamp.limits import free_windows, usable
+from nutdamp.schedule import TOUCHING
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -152,7 +153,7 @@ def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) ->
 
 def _slackened(windows: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The windows with what rounding may overstep."""
-    return [(begin - SLACK, end + SLACK) for begin, end in windows]
+    return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
 
 
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import usable
+from nutdamp.limits import keeps_limits, usable
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.spacecraft import Spacecraft
@@ -43,7 +43,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
             every = [made] if isinstance(made, Schedule) else list(made)
         except Infeasible:
             continue
-        yield from every
+        yield from (one for one in every if keeps_limits(spacecraft, one))
 
 
 def _trains(body: Spacecraft) -> Iterator[RhumbLineOptions]:

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from nutdamp.limits import SLACK, Windows
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.limits import Windows
+from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.spacecraft import Channel, Spacecraft
 
@@ -94,11 +94,11 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     divided = False
     for row, channel in enumerate(program.channels):
         long = sorted((one for one in burns if one.channel is channel and _too_long(one)), key=lambda one: one.t)
-        window = math.floor(channel.max_on_time / program.width + SLACK) if long else 0
+        window = math.floor(channel.max_on_time / program.width + TOUCHING) if long else 0
         if window == 0:
             continue
         divided = True
-        pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - SLACK), 1)
+        pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - TOUCHING), 1)
         middles = np.searchsorted(program.centres, [one.t for one in long])
         nearest = np.searchsorted(0.5 * (middles[1:] + middles[:-1]), every)
         pieces = np.array([math.ceil(one.on_time / (window * program.width)) for one in long])
@@ -113,7 +113,7 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
 
 
 def _too_long(burn: Burn) -> bool:
-    return burn.on_time > burn.channel.max_on_time + SLACK
+    return burn.on_time > burn.channel.max_on_time + TOUCHING
 
 
 def _broken(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
@@ -128,7 +128,7 @@ def _broken(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel
         if burn.on_time < 0.5 * shortest:
             yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
     for one, two in itertools.pairwise(burns):
-        if two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - SLACK:
+        if two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - TOUCHING:
             less = min(one, two, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
             yield less.channel, less.t - reach, less.t + reach

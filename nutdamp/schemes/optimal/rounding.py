@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.flight import Flight
-from nutdamp.limits import SLACK, Windows
-from nutdamp.schedule import Schedule
+from nutdamp.limits import Windows
+from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal.pulse_parameters import PulseParameters
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -77,8 +77,8 @@ class _Lattice:
         """Pulses (k,) that keep their limits, and are near enough for a linear model."""
         start, on_time = self.tick * ticks.T
         near = np.abs(ticks - self.exact).max(axis=1) < REACH
-        inside = near & (start >= self.room[0] - SLACK) & (start + on_time <= self.room[1] + SLACK)
-        bounded = (on_time >= self.bounds[0] - SLACK) & (on_time <= self.bounds[1] + SLACK)
+        inside = near & (start >= self.room[0] - TOUCHING) & (start + on_time <= self.room[1] + TOUCHING)
+        bounded = (on_time >= self.bounds[0] - TOUCHING) & (on_time <= self.bounds[1] + TOUCHING)
         return np.asarray(inside & bounded & (on_time > 0.5 * self.tick))
 
     def stepped(self, ticks: Vector, missing: Vector, slopes: Vector) -> Vector:

@@ -111,7 +111,7 @@ def _fewest(search: _Search) -> Schedule:
                 made = two_pulse.schedule(body, TwoPulseOptions())
         except Infeasible:
             made = Schedule()
-        if made.pulses and search.left(flight.flown(body, made)) <= LEFT:
+        if made.pulses and keeps_limits(body, made) and search.left(flight.flown(body, made)) <= LEFT:
             return search.with_bounds(made)
     return search.schedule()
 

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from nutdamp.limits import SLACK, Windows
+from nutdamp.limits import Windows
 from nutdamp.physics import damping, energy_sink, forced, rates
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft, Steerable
 
 ALIGNED = 1e-9
@@ -176,7 +176,7 @@ class ImpulseBuilder:
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
         first = turn / (self.a * self.spin)  # and the times below: as long as it takes at the present spin
         # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
-        slack = min(SLACK, 1e-3 * on_time) if self.pulses else 0.0
+        slack = min(TOUCHING, 1e-3 * on_time) if self.pulses else 0.0
 
         def alignment(ready: float) -> float:
             """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""

@@ -12,8 +12,8 @@ from builders import Outcome, cross, spinner
 from cases_dir import case
 
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.limits import broken_limits
 from nutdamp.planning import compare, plan
+from nutdamp.remarks import broken_limits, infeasibility
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.optimal import repair
 from nutdamp.schemes.optimal.linear_program import Burn, Program
@@ -40,7 +40,7 @@ def test_several_short_pulses_in_each_half_turn_damp(changed: str, most: float) 
     """Pulses of 0.2 s, where 0.4 s are needed in each half turn: one at a time leaves 4 of 8 deg."""
     body = read_spacecraft(NOTHING_DAMPS + changed, "nothing-damps.yaml")
     made = plan(body, "optimal")
-    assert made.feasible, made.why
+    assert made.feasible, infeasibility(made)
     assert broken_limits(body, made.pulses) == []
     outcome = Outcome(body, made.pulses)
     resolved = 1e-4 if body.limits.tick else 1e-8
@@ -85,6 +85,6 @@ def windows_about(program: Program, burn: Burn) -> float:
 def test_what_no_pulses_can_do_is_said() -> None:
     """At 25 deg the channels cannot do it at all: divided pulses are no way round the program."""
     far = read_spacecraft(NOTHING_DAMPS.replace("8 deg", "25 deg"), "nothing-damps.yaml")
-    assert "cannot take out the nutation" in (plan(far, "optimal").why or "")
+    assert "cannot take out the nutation" in infeasibility(plan(far, "optimal"))
     few = replace(far, limits=Limits(max_pulses=20))
     assert not plan(few, "optimal").feasible

@@ -14,6 +14,7 @@ from checker import violations
 
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.planning import plan
+from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import starting_points
@@ -49,7 +50,7 @@ def task_of(spacecraft: Spacecraft, equations: Equations | None = None) -> Task:
 def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
     spacecraft = load_spacecraft(case(f"{name}.yaml"))
     made = plan(spacecraft, "optimal")
-    assert made.schedule is not None, made.why
+    assert made.schedule is not None, infeasibility(made)
     assert made.pulses.total_impulse <= 1.001 * impulse_of(name)
     assert violations(spacecraft, made.pulses) == []
     assert Outcome(spacecraft, made.pulses).nutation < TEN_NANODEGREE
@@ -59,7 +60,7 @@ def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
 def test_pulses_of_two_channels_may_stand_side_by_side() -> None:
     spacecraft = load_spacecraft(case("optimal-not-found.yaml"))
     made = plan(spacecraft, "optimal", Options(free_axis=True))
-    assert made.schedule is not None, made.why
+    assert made.schedule is not None, infeasibility(made)
     assert made.pulses.total_impulse <= impulse_of("optimal-not-found")
     assert violations(spacecraft, made.pulses) == []
     assert Outcome(spacecraft, made.pulses).nutation < TEN_NANODEGREE
@@ -70,7 +71,7 @@ def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
     spacecraft = load_spacecraft(case("spin-up.yaml"))
     spacecraft = replace(spacecraft, goal=Goal(spin=rpm * math.pi / 30.0))
     made = plan(spacecraft, "optimal")
-    assert made.schedule is not None, made.why
+    assert made.schedule is not None, infeasibility(made)
     assert made.schedule.bounds is not None
     assert made.schedule.propellant is not None
     assert made.schedule.bounds.first_order is not None
@@ -94,7 +95,7 @@ def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
 def test_every_limit_is_kept(limits: Limits) -> None:
     spacecraft = strong(limits=limits)
     made = plan(spacecraft, "optimal")
-    assert made.schedule is not None, made.why
+    assert made.schedule is not None, infeasibility(made)
     assert violations(spacecraft, made.pulses) == []
     left = Outcome(spacecraft, made.pulses)
     coarse = 0.5 * 1e-4 * 2e4 / (80.0 * 3.0) if limits.tick is not None else TEN_NANODEGREE
@@ -108,7 +109,7 @@ def test_on_times_are_none_or_at_least_the_least() -> None:
         free, channels=tuple(channel(one.name, *one.torque, min_on_time=3.0 * least) for one in free.channels)
     )
     made = plan(bounded, "optimal")
-    assert made.schedule is not None, made.why
+    assert made.schedule is not None, infeasibility(made)
     assert violations(bounded, made.pulses) == []
     assert Outcome(bounded, made.pulses).nutation < TEN_NANODEGREE
     assert made.pulses.total_impulse >= plan(free, "optimal").pulses.total_impulse * (1.0 - 1e-6)

@@ -12,7 +12,7 @@ from nutdamp import flight
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import forced
 from nutdamp.planning import Plan, plan
-from nutdamp.remarks import remarks
+from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schemes import CLASSIC, Options
 from nutdamp.schemes.tools.symmetric_model import model_of, steady_omega
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft, Steerable
@@ -29,7 +29,7 @@ def body(moments: tuple[float, float, float], *, steerable: bool = False) -> Spa
 
 
 def left(one: Plan) -> float:
-    assert one.flown is not None, one.why
+    assert one.flown is not None, infeasibility(one)
     return one.flown.nutation
 
 
