@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.schemes.optimal import lp_solver
+from nutdamp.schemes.optimal.columns import Columns, alone
 from nutdamp.schemes.optimal.residual_equations import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -73,31 +73,6 @@ class Burn:
     def impulse(self) -> float:
         """Torque times on-time, N m s."""
         return self.on_time * float(np.linalg.norm(self.channel.torque))
-
-
-class Columns(NamedTuple):
-    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
-
-    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
-    """
-
-    channel: NDArray[np.int_]
-    t: Vector
-    width: Vector
-    burn: NDArray[np.int_]
-
-    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> Columns:
-        """Some of the columns."""
-        return Columns(self.channel[which], self.t[which], self.width[which], self.burn[which])
-
-    def joined(self, other: Columns) -> Columns:
-        """These columns and others."""
-        return Columns(
-            np.concatenate([self.channel, other.channel]),
-            np.concatenate([self.t, other.t]),
-            np.concatenate([self.width, other.width]),
-            np.concatenate([self.burn, other.burn]),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,67 +154,75 @@ class Program:
             return Solution((), 0.0, 0.0, np.zeros(2), nothing)
         generate = columns is None
         chosen = self._first() if columns is None else columns
-        found = self._master(chosen)
+        master = self._master(chosen, self._reach() if columns is None else None)
+        found = master.optimum()
         if found is None:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            unmet = float(found.x[len(chosen.t) :][: 2 * len(nothing)].sum())
+            unmet = self._unmet(found)
             if enough and (unmet <= SOME or self._out_of_reach(found.prices)):
                 break
             new = self._priced(found.prices, chosen, unmet)
-            more = chosen.joined(new)
-            better = self._master(more) if len(new.t) else None
-            if better is None:  # nothing lowers the cost any more, or what would is lost on the solver
+            if not len(new.t):
                 break
-            chosen, found = more, better
+            self._add(master, new)
+            better = master.optimum()
+            if better is None:  # what would lower the cost is lost on the solver
+                break
+            chosen, found = chosen.joined(new), better
         if generate:
             self._pool = chosen
-        count, equations = len(chosen.t), len(nothing)
-        amounts, slack = found.x[:count], found.x[count:]
+        free, amounts = np.split(found.x, [len(found.x) - len(chosen.t)])
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             self._burns(chosen.of(used), on_times),
             float(self.costs[chosen.channel[used]] @ on_times),
-            float(slack[: 2 * equations].sum()),
-            self._off_by(slack[2 * equations :]),
+            self._unmet(found),
+            self._off_by(free[2 * len(nothing) :]),
             found.prices * self._dearest / self._scale,
         )
 
-    def _master(self, columns: Columns) -> lp_solver.Optimum | None:
-        """Amounts (n,) in units of all there is to do, and slacks, of the columns' program; prices (equations,)."""
-        count = len(self.influence.goal)
-        ring = self._ring()
-        matrix = np.hstack([self._coefficients(columns), np.eye(count), -np.eye(count), ring])
-        # Rows and columns to coefficients about one: axial torques may be small beside the transverse ones.
-        level = np.abs(matrix[:, : len(columns.t)]).max(axis=1, initial=TINIEST)
-        cost = np.concatenate(
-            [
-                self._price[columns.channel] / self._dearest * self._dearness(columns.t),
-                np.full(2 * count, SLACK_COST),
-                np.zeros(ring.shape[1]),
-            ]
-        )
+    def _unmet(self, found: lp_solver.Optimum) -> float:
+        """What slacks have to supply, over all there is to do."""
+        return float(found.x[: 2 * len(self.influence.goal)].sum())
+
+    def _master(self, columns: Columns, reach: Vector | None) -> lp_solver.GrowingProgram:
+        """The program of these columns, in units of all there is to do, after slacks and the ring.
+
+        ``reach`` (equations,): the largest coefficients that there can be, where more columns are to come.
+        """
+        count, ring = len(self.influence.goal), self._ring()
+        if reach is None:
+            reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
+        # Where H may end off its target, the shares of the directions add up to no more than `off`.
+        shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
+        limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
+        goal = self.influence.goal / self._scale
+        master = lp_solver.GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
+        rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
+        rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
+        rows[count : count + shares, 2 * count :] = 1.0
+        cost = np.repeat([SLACK_COST, 0.0], [2 * count, ring.shape[1]])
+        master.add(cost, rows, np.full(len(cost), np.inf))
+        self._add(master, columns)
+        return master
+
+    def _add(self, master: lp_solver.GrowingProgram, columns: Columns) -> None:
+        """Let the program have these columns."""
+        cost = self._price[columns.channel] / self._dearest * self._dearness(columns.t)
         most = np.full(len(cost), np.inf)
         wide = np.flatnonzero(columns.width)
         most[wide] = columns.width[wide] / self._unit[columns.channel[wide]]
-        # The shares of the directions in which H may end off its target add up to no more than `off`.
-        shares = np.zeros((min(ring.shape[1], 1), len(cost)))
-        shares[:, len(cost) - ring.shape[1] :] = 1.0
-        longest = np.zeros((0, len(cost)))
-        if columns.burn.max(initial=-1) >= 0:
-            longest = self._longest(columns, len(cost))
-        limits = np.concatenate([np.full(len(shares), self.off / self._scale), np.ones(len(longest))])
-        goal = self.influence.goal / self._scale / level
-        found = lp_solver.least(cost, matrix / level[:, None], goal, most, np.vstack([shares, longest]), limits)
-        return None if found is None else found._replace(prices=found.prices / level)
+        shares = np.zeros((int(self.off > 0.0), len(cost)))
+        master.add(cost, np.vstack([self._coefficients(columns), shares, self._longest(columns)]), most)
 
-    def _longest(self, columns: Columns, count: int) -> Vector:
-        """Rows (burns, ``count``) that hold each burn's on-time, over the longest that its channel may be on."""
+    def _longest(self, columns: Columns) -> Vector:
+        """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
         bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
         numbers, row = np.unique(columns.burn[bounded], return_inverse=True)
-        rows = np.zeros((len(numbers), count))
+        rows = np.zeros((len(numbers), len(columns.t)))
         rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
         return rows
 
@@ -263,12 +246,21 @@ class Program:
         rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
         return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
 
-    def _worth(self, weights: Vector) -> Vector:
-        """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
+    def _slot_rows(self) -> Vector:
+        """What one N m s in each slot adds to the equations, (equations, 3, slots)."""
         if self._grid is None:
             lost = self.influence.widths(np.array([self.width]))[0]
-            self._grid = self.influence.rows(self.centres) * lost[:, None]
-        worth = self._direction @ np.tensordot(weights, self._grid, axes=(0, 1)).T
+            self._grid = np.ascontiguousarray((self.influence.rows(self.centres) * lost[:, None]).transpose(1, 2, 0))
+        return self._grid
+
+    def _reach(self) -> Vector:
+        """The most that one unit of any channel does in each of the equations, (equations,), or a little more."""
+        return np.asarray((np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1))
+
+    def _worth(self, weights: Vector) -> Vector:
+        """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
+        grid = self._slot_rows()
+        worth = self._direction @ (weights @ grid.reshape(len(weights), -1)).reshape(3, -1)
         worth[self.forbidden] = -np.inf
         return np.asarray(worth)
 
@@ -297,7 +289,7 @@ class Program:
         return self._slots(channel[chosen], slot[chosen])
 
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
-        return _alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
+        return alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: Columns, unmet: float) -> Columns:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
@@ -325,7 +317,7 @@ class Program:
         channel, centre = channel[order], self.centres[slot[order]]
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
         times = centre[:, None] + within
-        fives = _alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
+        fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
         cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
         worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
         best = np.argmax(worth, axis=1)
@@ -336,7 +328,7 @@ class Program:
         aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
         t = times[every, inner] + aside * 0.25 * self.width
         good = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best]) > PEAK
-        return _alone(channel[good], t[good], np.zeros(int(good.sum())))
+        return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
         """Neighbouring columns of a channel as one burn about their common centre."""
@@ -363,7 +355,7 @@ class Program:
         """
         owner = np.full(self.forbidden.shape, -1)
         away = np.full(self.forbidden.shape, np.inf)
-        impulses = _alone(np.zeros(0, dtype=int), np.zeros(0), np.zeros(0))
+        impulses = alone(np.zeros(0, dtype=int), np.zeros(0), np.zeros(0))
         half = 0.5 * self.width
         for number, burn in enumerate(burns):
             index = self.channels.index(burn.channel)
@@ -385,8 +377,3 @@ class Program:
         """The slots in which ``times`` (n,) s lie."""
         slot = np.floor((times - self.centres[0]) / self.width + 0.5).astype(int)
         return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
-
-
-def _alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
-    """Columns that belong to no burn."""
-    return Columns(channel, t, width, np.full(len(t), -1))

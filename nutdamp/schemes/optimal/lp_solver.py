@@ -1,20 +1,21 @@
-"""A small linear program, by whichever of the solver's ways gets to its end."""
+"""A small linear program that grows by columns, solved by HiGHS in whichever way gets to its end."""
 
 from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+import highspy
 import numpy as np
 
 from nutdamp.spacecraft import Vector
 
-WAYS: tuple[tuple[Literal["highs-ds", "highs-ipm"], bool, float], ...] = (
-    ("highs-ds", True, 1.0),
-    ("highs-ds", False, 1.0),
-    ("highs-ds", True, 1e3),
-    ("highs-ipm", True, 1.0),
-    ("highs-ds", False, 1e-2),
-    ("highs-ipm", False, 1e3),
+WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
+    ("simplex", True, 1.0),
+    ("simplex", False, 1.0),
+    ("simplex", True, 1e3),
+    ("ipm", True, 1.0),
+    ("simplex", False, 1e-2),
+    ("ipm", False, 1e3),
 )
 """Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
@@ -25,31 +26,81 @@ MOST_STEPS = 100_000
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side costs."""
+    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side of the equations costs."""
 
     x: Vector
     prices: Vector
 
 
-def least(cost: Vector, equal: Vector, right: Vector, most: Vector, below: Vector, limits: Vector) -> Optimum | None:
-    """Least ``cost`` @ x with ``equal`` @ x = ``right``, ``below`` @ x ≤ ``limits``, 0 ≤ x ≤ ``most``.
+class GrowingProgram:
+    """Least cost @ x with equations and upper limits, 0 ≤ x ≤ most; each column added counts from the next solution on.
 
-    None where no way of solving it succeeds.
+    Begins without columns: ``right`` (m,) of the equations, ``limits`` (k,) of the rows that come below them. Equations
+    are divided by their ``level`` (m,), which should be about the largest of their coefficients.
     """
-    from scipy.optimize import linprog  # here, because it takes longer to load than most plans
 
-    bounds = [(0.0, upper) for upper in most.tolist()]
-    for method, presolve, factor in WAYS:
-        found = linprog(
-            factor * cost,
-            A_eq=equal,
-            b_eq=right,
-            A_ub=below,
-            b_ub=limits,
-            bounds=bounds,
-            method=method,
-            options={"presolve": presolve, "maxiter": MOST_STEPS},
-        )
-        if found.success and found.x is not None:
-            return Optimum(np.asarray(found.x), np.asarray(found.eqlin.marginals) / factor)
-    return None
+    def __init__(self, right: Vector, limits: Vector, level: Vector) -> None:
+        self._level = level
+        self._costs = np.zeros(0)
+        self._highs = _silent()
+        least = np.concatenate([right / level, np.full(len(limits), -highspy.kHighsInf)])
+        for lower, upper in zip(least.tolist(), [*(right / level).tolist(), *limits.tolist()], strict=True):
+            self._highs.addRow(lower, upper, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
+
+    def add(self, cost: Vector, rows: Vector, most: Vector) -> None:
+        """More unknowns: ``cost`` (n,), coefficients ``rows`` (m + k, n) and the ``most`` (n,) that they may be."""
+        rows = rows / np.concatenate([self._level, np.ones(len(rows) - len(self._level))])[:, None]
+        column, row = np.nonzero(rows.T)
+        starts = np.searchsorted(column, np.arange(len(cost))).astype(np.int32)
+        values = np.ascontiguousarray(rows.T[column, row])
+        self._costs = np.concatenate([self._costs, cost])
+        zeros = np.zeros(len(cost))
+        self._highs.addCols(len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values)
+
+    @property
+    def steps(self) -> int:
+        """Steps of the simplex on the way to the last optimum."""
+        return int(self._highs.getInfo().simplex_iteration_count)
+
+    def optimum(self) -> Optimum | None:
+        """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
+        found = self._solved(*WAYS[0])  # HiGHS does not presolve where there is a basis
+        for way in WAYS:
+            if found is not None:
+                break
+            self._highs.clearSolver()
+            found = self._solved(*way)
+        return found
+
+    def _solved(self, method: str, presolve: bool, factor: float) -> Optimum | None:
+        highs = self._highs
+        highs.setOptionValue("solver", method)
+        highs.setOptionValue("presolve", "on" if presolve else "off")
+        every = np.arange(len(self._costs), dtype=np.int32)
+        if factor != 1.0:
+            highs.changeColsCost(len(every), every, factor * self._costs)
+        if highs.run() == highspy.HighsStatus.kError:
+            # Threads are set once in a process, by whoever solves first; zero takes what there is.
+            highs.setOptionValue("threads", 0)
+            highs.run()
+        found = None
+        if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+            solution = highs.getSolution()
+            prices = np.array(solution.row_dual)[: len(self._level)]
+            found = Optimum(np.array(solution.col_value), prices / self._level / factor)
+        if factor != 1.0:
+            highs.changeColsCost(len(every), every, self._costs)
+        return found
+
+
+def _silent() -> highspy.Highs:
+    """A solver that prints nothing, on one thread, with a bound on its steps."""
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.setOptionValue("threads", 1)
+    highs.setOptionValue("parallel", "off")
+    highs.setOptionValue("simplex_iteration_limit", MOST_STEPS)
+    highs.setOptionValue("ipm_iteration_limit", MOST_STEPS)
+    highs.setOptionValue("dual_feasibility_tolerance", 1e-9)
+    highs.setOptionValue("primal_feasibility_tolerance", 1e-9)
+    return highs

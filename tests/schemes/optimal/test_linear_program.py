@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -20,9 +21,10 @@ from nutdamp.remarks import infeasibility
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import lp_solver
 from nutdamp.schemes.optimal.linear_program import Program
+from nutdamp.schemes.optimal.lp_solver import GrowingProgram, Optimum
 from nutdamp.schemes.optimal.problem import Problem
 from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Goal, Limits, Spacecraft
+from nutdamp.spacecraft import Goal, Limits, Spacecraft, Vector
 
 MICRODEGREE = math.radians(1e-6)
 
@@ -45,18 +47,26 @@ def test_no_word_of_the_solver_is_shown() -> None:
 class Failing:
     """A solver that fails where ``fails`` says so: of the number of the call and the method."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, fails: Any) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, fails: Callable[[int, str], bool]) -> None:
         self.calls, self.failed = 0, 0
-        solve = scipy.optimize.linprog
+        solved = lp_solver.GrowingProgram._solved
 
-        def linprog(*args: Any, **kwargs: Any) -> Any:
+        def tried(program: GrowingProgram, method: str, presolve: bool, factor: float) -> Optimum | None:
             self.calls += 1
-            if fails(self.calls, kwargs["method"]):
+            if fails(self.calls, method):
                 self.failed += 1
-                return SimpleNamespace(success=False, status=4, x=None, fun=None, message="HiGHS Status 15")
-            return solve(*args, **kwargs)
+                return None
+            return solved(program, method, presolve, factor)
 
-        monkeypatch.setattr(scipy.optimize, "linprog", linprog)
+        monkeypatch.setattr(lp_solver.GrowingProgram, "_solved", tried)
+
+
+def after(last: int) -> Callable[[int, str], bool]:
+    return lambda call, _: call > last
+
+
+def up_to(last: int) -> Callable[[int, str], bool]:
+    return lambda call, _: call <= last
 
 
 def body() -> Spacecraft:
@@ -65,7 +75,7 @@ def body() -> Spacecraft:
 
 def test_interior_points_do_what_the_simplex_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = plan(body(), "optimal")
-    solver = Failing(monkeypatch, lambda _, method: method == "highs-ds")
+    solver = Failing(monkeypatch, lambda _, method: method == "simplex")
     other = plan(body(), "optimal")
     assert solver.failed > 0
     assert other.flown is not None, infeasibility(other)
@@ -77,9 +87,9 @@ def test_a_solver_that_fails_late_keeps_what_was_found(monkeypatch: pytest.Monke
     counted = Failing(monkeypatch, lambda *_: False)
     plan(body(), "optimal")
     monkeypatch.undo()
-    for after in range(3, counted.calls, 3):
+    for last in range(3, counted.calls, 3):
         with monkeypatch.context() as patch:
-            Failing(patch, lambda call, _, after=after: call > after)
+            Failing(patch, after(last))
             made = plan(body(), "optimal")
         if made.flown is None:
             assert "HiGHS" not in infeasibility(made)
@@ -99,28 +109,125 @@ def test_a_solver_that_always_fails_leaves_other_schemes_and_a_plain_reason(monk
     assert found.pulses.bounds.rigorous is not None
 
 
+@dataclass(frozen=True)
+class Small:
+    """A program of 3 equations, 2 upper limits and 12 unknowns, at most 0.8 each."""
+
+    cost: Vector
+    equal: Vector
+    right: Vector
+    below: Vector
+    limits: Vector
+
+    def grown(self, *parts: int, level: float = 1.0, step: Vector | float = 0.0) -> GrowingProgram:
+        """With the columns added in ``parts``, solved after each but the last."""
+        program = GrowingProgram(self.right + step, self.limits, np.full(3, level))
+        for count, part in enumerate(np.split(np.arange(12), parts)):
+            if count:
+                program.optimum()
+            rows = np.vstack([self.equal, self.below])[:, part]
+            program.add(self.cost[part], rows, np.full(len(part), 0.8))
+        return program
+
+    def by_scipy(self) -> float | None:
+        """The least cost, None where there is no solution."""
+        found = scipy.optimize.linprog(
+            self.cost,
+            A_eq=self.equal,
+            b_eq=self.right,
+            A_ub=self.below,
+            b_ub=self.limits,
+            bounds=[(0.0, 0.8)] * 12,
+            method="highs-ds",
+        )
+        return float(found.fun) if found.success and found.fun is not None else None
+
+
+def small(seed: int) -> Small:
+    rng = np.random.default_rng(seed)
+    equal, below = rng.normal(size=(3, 12)), rng.uniform(0.1, 1.0, size=(2, 12))
+    return Small(rng.uniform(1.0, 2.0, 12), equal, equal @ rng.uniform(0.1, 0.4, 12), below, rng.uniform(2.0, 3.0, 2))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_optimum_and_its_prices(seed: int) -> None:
     """Prices are the slopes of the least cost by the right-hand sides, by difference quotients."""
-    rng = np.random.default_rng(seed)
-    equal, below = rng.normal(size=(3, 12)), rng.uniform(0.1, 1.0, size=(2, 12))
-    right, cost, most = equal @ rng.uniform(0.1, 0.4, 12), rng.uniform(1.0, 2.0, 12), np.full(12, 0.8)
-    limits = np.full(2, 10.0)
-    found = lp_solver.least(cost, equal, right, most, below, limits)
+    program = small(seed)
+    found = program.grown().optimum()
     assert found is not None
-    assert equal @ found.x == pytest.approx(right)
+    assert program.equal @ found.x == pytest.approx(program.right)
+    assert (program.below @ found.x < program.limits + 1e-7).all()
+    assert program.cost @ found.x == pytest.approx(program.by_scipy(), rel=1e-7)
     for index in range(3):
         step = np.zeros(3)
         step[index] = 1e-6
-        other = lp_solver.least(cost, equal, right + step, most, below, limits)
+        other = program.grown(step=step).optimum()
         assert other is not None
-        assert (cost @ other.x - cost @ found.x) / 1e-6 == pytest.approx(found.prices[index], rel=1e-3, abs=1e-6)
+        slope = program.cost @ (other.x - found.x) / 1e-6
+        assert slope == pytest.approx(found.prices[index], rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("level", [1.0, 1e-4])
+def test_columns_added_later_count_as_those_from_the_beginning(seed: int, level: float) -> None:
+    """And so whatever the equations are divided by."""
+    program = small(seed)
+    at_once, grown = program.grown().optimum(), program.grown(5, 8, level=level).optimum()
+    assert at_once is not None
+    assert grown is not None
+    assert grown.x == pytest.approx(at_once.x, abs=1e-7)
+    assert grown.prices == pytest.approx(at_once.prices, rel=1e-6)
+
+
+def test_every_way_of_solving_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = small(1)
+    usual = program.grown().optimum()
+    assert usual is not None
+    for number in range(len(lp_solver.WAYS)):
+        with monkeypatch.context() as patch:
+            Failing(patch, up_to(1 + number))
+            other = program.grown().optimum()
+        assert other is not None
+        assert other.x == pytest.approx(usual.x, abs=1e-7)
+        assert other.prices == pytest.approx(usual.prices, rel=1e-6)
+
+
+def test_the_basis_is_kept() -> None:
+    """From the last basis, columns that change nothing take no step; from none they take several."""
+    program = small(2).grown()
+    assert program.optimum() is not None
+    assert program.steps > 0
+    program.add(np.full(12, 100.0), np.vstack([small(2).equal, small(2).below]), np.full(12, 0.8))
+    assert program.optimum() is not None
+    assert program.steps == 0
 
 
 def test_no_way_of_solving_is_no_optimum() -> None:
     """x ≥ 0 cannot be -1."""
-    none = np.zeros((0, 1))
-    assert lp_solver.least(np.ones(1), np.ones((1, 1)), -np.ones(1), np.ones(1), none, np.zeros(0)) is None
+    program = GrowingProgram(-np.ones(1), np.zeros(0), np.ones(1))
+    program.add(np.ones(1), np.ones((1, 1)), np.ones(1))
+    assert program.optimum() is None
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_nothing_is_printed_whoever_used_the_solver_before(threads: int) -> None:
+    """How many threads HiGHS has is settled once in a process: a caller may have chosen another number."""
+    script = f"""
+import highspy
+other = highspy.Highs()
+other.setOptionValue("output_flag", False)
+other.setOptionValue("threads", {threads})
+other.addVar(0.0, 1.0)
+assert other.run() == highspy.HighsStatus.kOk
+import numpy as np
+from nutdamp.schemes.optimal.lp_solver import GrowingProgram
+program = GrowingProgram(np.ones(1), np.zeros(0), np.ones(1))
+program.add(np.array([3.0, 2.0]), np.array([[1.0, 1.0]]), np.array([9.0, 9.0]))
+found = program.optimum()
+assert found is not None and found.x.tolist() == [0.0, 1.0] and found.prices.tolist() == [2.0]
+"""
+    done = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 @pytest.mark.parametrize(
@@ -151,13 +258,13 @@ def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch
     down = math.radians(-20.0)
     body = replace(body, goal=Goal(axis=np.array([0.0, math.cos(down), math.sin(down)])))
     solved: list[int] = []
-    least = lp_solver.least
+    optimum = GrowingProgram.optimum
 
-    def counted(*given: Any) -> lp_solver.Optimum | None:
+    def counted(program: GrowingProgram) -> Optimum | None:
         solved.append(1)
-        return least(*given)
+        return optimum(program)
 
-    monkeypatch.setattr(lp_solver, "least", counted)
+    monkeypatch.setattr(GrowingProgram, "optimum", counted)
     why = infeasibility(plan(body, "optimal"))
     found = re.search(r"set limits.horizon to at least (\S+) s", why)
     assert found, why
