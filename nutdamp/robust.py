@@ -18,8 +18,8 @@ from nutdamp import planning
 from nutdamp.compliance import missed
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
+from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.outputs import aim_output
-from nutdamp.dispersion.statistics import binomial_interval
 from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits

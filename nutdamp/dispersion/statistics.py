@@ -1,4 +1,4 @@
-"""Distributions of an output over many cases: exact while they fit, in constant memory beyond; and binomial intervals.
+"""Distributions of an output over many cases: exact while they fit, in constant memory beyond.
 
 Everything here is the same in whatever order or portions the cases come: exact values have their places, and the
 sketch only counts.
@@ -123,25 +123,6 @@ def _middles() -> Array:
     sizes = low * (1.0 + 0.5 ** (SHARPNESS + 1))
     sizes[0] = 0.0
     return np.concatenate([-sizes[::-1], sizes])
-
-
-def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """The exact interval for a probability of which ``successes`` of ``trials`` were seen, Clopper & Pearson 1934.
-
-    It holds the true probability at least as often as ``confidence`` says, whatever that probability is.
-    """
-    from scipy.special import betaincinv  # the only use of scipy here, and a tenth of a second to load
-
-    tail = 0.5 * (1.0 - confidence)
-    failures = trials - successes
-    low = 0.0 if successes == 0 else float(betaincinv(successes, failures + 1, tail))
-    high = 1.0 if failures == 0 else float(betaincinv(successes + 1, failures, 1.0 - tail))
-    return low, high
-
-
-def cases_to_show(probability: float, confidence: float = 0.95) -> int:
-    """Fewest cases, all good, after which the lower end of `binomial_interval` reaches ``probability``."""
-    return math.ceil(math.log(0.5 * (1.0 - confidence)) / math.log(probability))
 
 
 class Worst:

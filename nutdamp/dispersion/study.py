@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp import compliance, flight
 from nutdamp.compliance import Left
+from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.cases import Cases, DispersedCases, Model
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
@@ -27,7 +28,6 @@ from nutdamp.dispersion.statistics import (
     Exact,
     Sketch,
     Worst,
-    binomial_interval,
 )
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight

@@ -10,9 +10,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS, aim_output
-from nutdamp.dispersion.statistics import Array, cases_to_show
+from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.flight import Flight
 from nutdamp.presentation import verdicts

@@ -8,8 +8,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy.special import betaincinv
 
-from nutdamp.dispersion.statistics import Exact, Sketch, Worst, binomial_interval, cases_to_show
+from nutdamp.dispersion.binomial import binomial_interval, cases_to_show
+from nutdamp.dispersion.statistics import Exact, Sketch, Worst
 
 PROBABILITIES = np.array([0.0, 0.003, 0.5, 0.9, 0.95, 0.99, 0.997, 1.0])
 
@@ -90,6 +92,28 @@ def test_the_interval_leaves_half_the_doubt_on_each_side(successes: int, trials:
     low, high = binomial_interval(successes, trials)
     assert 1.0 - at_most(successes - 1, low) == pytest.approx(0.025, rel=1e-9)
     assert at_most(successes, high) == pytest.approx(0.025, rel=1e-9)
+
+
+@pytest.mark.parametrize("trials", [1, 2, 19, 20, 100, 1000, 20_000, 10**6, 10**7])
+def test_the_interval_is_that_of_scipy(trials: int) -> None:
+    """Whose inverse of the incomplete beta function comes from Boost, and shares nothing with nutdamp's."""
+    rng = np.random.default_rng(trials)
+    share = {
+        0,
+        1,
+        trials // 3,
+        trials // 2,
+        round(0.997 * trials),
+        trials - 1,
+        trials,
+        *rng.integers(trials + 1, size=9),
+    }
+    for seen, confidence in itertools.product(sorted(int(one) for one in share), (0.9, 0.95, 0.997)):
+        low, high = binomial_interval(seen, trials, confidence)
+        tail, failures = 0.5 * (1.0 - confidence), trials - seen
+        assert low == pytest.approx(betaincinv(seen, failures + 1, tail) if seen else 0.0, rel=1e-12 + 1e-15 * trials)
+        highest = betaincinv(seen + 1, failures, 1.0 - tail) if failures else 1.0
+        assert high == pytest.approx(highest, rel=1e-12 + 1e-15 * trials)
 
 
 def test_how_many_cases_it_takes_to_show_a_probability() -> None:

@@ -201,7 +201,7 @@ def _versions() -> Iterator[tuple[str, str]]:
     """What the numbers and pictures depend on."""
     yield "nutdamp", __version__
     yield "Python", platform.python_version()
-    for package in ("numpy", "scipy", "matplotlib"):
+    for package in ("numpy", "scipy", "highspy", "matplotlib"):
         try:
             yield package, version(package)
         except PackageNotFoundError:
