@@ -195,7 +195,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class Dynamics:
     """The body as one of the two models flies it, and what acts on it besides the pulses."""
 
     moments: tuple[float, float, float]
@@ -230,12 +230,12 @@ class Setting:
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
-def make_setting(spacecraft: Spacecraft) -> Setting:
+def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     """What is flown: the true principal moments, and what acts besides the pulses."""
     disturbances = spacecraft.disturbances
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
     transverse = sum(disturbance.transverse for disturbance in fixed)
-    return Setting(
+    return Dynamics(
         moments=spacecraft.inertia.moments,
         constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
         forcing=Forcing(
@@ -252,20 +252,20 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
     between the pulses as in `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
     """
-    setting, state, allowed = make_setting(spacecraft), spacecraft.initial, _allowed(schedule, until)
+    dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     legs: list[Leg] = []
     now = 0.0
     for index, pulse in enumerate(schedule):
-        path, state = setting.path(state, now, pulse.t, most=allowed)
+        path, state = dynamics.path(state, now, pulse.t, most=allowed)
         allowed -= path.steps
         legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
         kick = _effective_impulse(spacecraft, pulse, state.spin)
-        state = setting.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
+        state = dynamics.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
         now = pulse.t
     last = max(until, schedule.end)
-    path, _ = setting.path(state, now, last, most=allowed)
+    path, _ = dynamics.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
-    return Flight(spacecraft, schedule, tuple(legs), state, setting.moments, tuple((one.t, one.t) for one in schedule))
+    return Flight(spacecraft, schedule, tuple(legs), state, dynamics.moments, tuple((one.t, one.t) for one in schedule))
 
 
 def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
@@ -300,7 +300,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
     series at rounding accuracy. The last leg reaches at least to ``until`` s. Raises Infeasible where that takes more
     than `PLANNED_STEPS`, or `rigid.MOST_STEPS` where a later end is asked for.
     """
-    setting, state, allowed = make_setting(spacecraft), spacecraft.initial, _allowed(schedule, until)
+    dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T
@@ -312,14 +312,16 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(Leg(now, now, setting.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0))
+            legs.append(
+                Leg(now, now, dynamics.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0)
+            )
         for kick in kicks:
-            state = setting.kicked(state, kick)
+            state = dynamics.kicked(state, kick)
         if now == over:
             settled = state
         on = [pulses[index].torque for index in np.flatnonzero((starts <= now) & (end <= ends))]
         torques = [torque for torque in on if torque is not None]
-        path, following = setting.path(state, now, end, torques, most=allowed)
+        path, following = dynamics.path(state, now, end, torques, most=allowed)
         allowed -= path.steps
         completed, at_end = (
             int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
@@ -327,7 +329,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
         )
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
-    return Flight(spacecraft, schedule, tuple(legs), settled, setting.moments, spans)
+    return Flight(spacecraft, schedule, tuple(legs), settled, dynamics.moments, spans)
 
 
 def _allowed(schedule: Schedule, until: float) -> int:

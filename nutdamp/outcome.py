@@ -60,6 +60,12 @@ def seen_at(flight: Flight, time: float) -> Flight:
     )
 
 
+def left_by(flight: Flight) -> Left:
+    """What a flight leaves, as `compliance` takes it."""
+    residual = flight.residual
+    return Left(residual.nutation, residual.axis_error, flight.settled.spin)
+
+
 def tolerated(spacecraft: Spacecraft, otherwise: float = ANGLE) -> dict[Part, float]:
     """By how much models may differ in nutation, in the direction of H, and in the spin where the goal names one.
 
@@ -75,7 +81,7 @@ def tolerated(spacecraft: Spacecraft, otherwise: float = ANGLE) -> dict[Part, fl
 def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:
     """In what two flights of one spacecraft end farther apart than is `tolerated`."""
     body = one.spacecraft
-    ends = [Left(flight.residual.nutation, flight.residual.axis_error, flight.settled.spin) for flight in (one, other)]
+    ends = [left_by(flight) for flight in (one, other)]
     found = []
     for part, most in tolerated(body).items():
         first, second = (end.spin if part is Part.SPIN else compliance.left_of(part, end, body) for end in ends)

@@ -13,6 +13,7 @@ from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
 from nutdamp.hindrance import Hindrance
 from nutdamp.limits import Breach, breaches
+from nutdamp.outcome import left_by
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule
@@ -72,8 +73,7 @@ class Plan:
     @property
     def left(self) -> Left | None:
         """What remains, flown, as `compliance` takes it."""
-        left = self.flown
-        return None if left is None else Left(left.nutation, left.axis_error, self.flight.settled.spin)
+        return left_by(self.flight) if self.feasible else None
 
     @property
     def meets_requirement(self) -> bool | None:

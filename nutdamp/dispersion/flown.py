@@ -28,8 +28,8 @@ class RealWidths:
     model: Model
 
     @cached_property
-    def _setting(self) -> flight.Setting:
-        return flight.make_setting(self.model.spacecraft)
+    def _dynamics(self) -> flight.Dynamics:
+        return flight.make_dynamics(self.model.spacecraft)
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
@@ -43,8 +43,8 @@ class RealWidths:
         )
         upright = np.zeros((4, count))
         upright[0] = 1.0  # the true body axes at t = 0 are where everything is seen from
-        setting = self._setting
-        bodies = rigid_cases.Bodies(moments, setting.constant, setting.forcing)
+        dynamics = self._dynamics
+        bodies = rigid_cases.Bodies(moments, dynamics.constant, dynamics.forcing)
         settled, turned = rigid_cases.fly(bodies, rates, upright, pulses)
         momentum = _triple(moments * settled)
         after = carried(tuple(turned), momentum)

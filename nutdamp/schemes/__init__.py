@@ -103,6 +103,6 @@ def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: S
     spin = scheme.sets_spin and model.spacecraft.goal.spin is not None
     if spin:  # and the pulse that gives most to the spin
         chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-    return least_squares.refine(
+    return least_squares.correct(
         model.spacecraft, made, chosen=chosen, momentum=keeps, spin=spin, on_times=options.on_times
     )

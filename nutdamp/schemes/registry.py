@@ -54,7 +54,7 @@ SCHEMES = {scheme.name: scheme for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, 
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
-POINTING = (TWO_PULSE.name, HALF_CONE.name, RHUMB_LINE.name, OPTIMAL.name)
-"""In the order in which they are shown, cheapest to plan first."""
+POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda one: one.slow) if scheme.points)
+"""In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)

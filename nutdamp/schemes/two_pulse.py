@@ -125,7 +125,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
         )
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
-    return least_squares.refine(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
+    return least_squares.correct(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
 
 
 def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
@@ -254,7 +254,7 @@ def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tup
     )
     made = Schedule(pulses)
     if not literal:
-        made = least_squares.refine(spacecraft, made, chosen=(0, 1), momentum=True)
+        made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
     left = float(np.linalg.norm(least_squares.misses(spacecraft, made)))
     return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
 

@@ -1,8 +1,8 @@
 """What no schedule can beat: lower bounds of the cost, by duality and by the length of the way.
 
 The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
-schedules that leave no more than `Left`, and none of them knows of gaps, ticks and on-times, which can only raise the
-cost.
+schedules that leave no more than `Allowed`, and none of them knows of gaps, ticks and on-times, which can only raise
+the cost.
 
 *Nutation.* w = A ω e^{iφ} with φ = a ∫ω3 dt obeys dw/dt = M e^{iφ}, at any angle. Let y be complex with
 Re(y* m e^{iφ}) ≤ c for the torque m and the cost c per second of every channel, and for every phase φ at which it may
@@ -61,7 +61,7 @@ ROUNDING = 1e-12
 """Share by which gains are lowered and prices raised, so that no bound is too high by the rounding of sums."""
 
 
-class Left(NamedTuple):
+class Allowed(NamedTuple):
     """What may be left: ``nutation`` and distance ``off`` the target in rad, ``spin`` as a share of the final one."""
 
     nutation: float = 0.0
@@ -69,35 +69,37 @@ class Left(NamedTuple):
     spin: float = 0.0
 
 
-def rigorous(spacecraft: Spacecraft, prices: dict[str, float], cost: float, left: Left, *, shift: bool) -> float | None:
+def rigorous(
+    spacecraft: Spacecraft, prices: dict[str, float], cost: float, allowed: Allowed, *, shift: bool
+) -> float | None:
     """Cost that no schedule of the channels of a symmetric body goes below; None where nothing is known to hold.
 
-    ``prices`` per second by the names of the channels, ``cost`` that of a schedule known, which leaves ``left``;
-    ``shift``: H counts, not only the nutation.
+    ``prices`` per second by the names of the channels, ``cost`` that of a schedule known, which leaves as much as is
+    ``allowed``; ``shift``: H counts, not only the nutation.
     """
     channels = usable(spacecraft, axial=True)
     if spacecraft.disturbances or spacecraft.growth != 0.0 or any(one.name not in prices for one in channels):
         return None
-    if left.nutation >= 0.5 * math.pi:  # the spin axis points away from H
+    if allowed.nutation >= 0.5 * math.pi:  # the spin axis points away from H
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
     axial = bool(torques[:, 2].any())
-    found = [_nutation(spacecraft, channels, costs, cost, left)]
+    found = [_nutation(spacecraft, channels, costs, cost, allowed)]
     if spacecraft.goal.spin is not None:
-        found.append(_nutation_and_spin(spacecraft, torques, costs, left))
+        found.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
     if shift and not axial:
-        found.append(_turn(spacecraft, torques, costs, left))
+        found.append(_turn(spacecraft, torques, costs, allowed))
     best = max(found)
     return best if math.isfinite(best) else None
 
 
-def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, left: Left) -> float:
+def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
     inertia, limits = spacecraft.inertia, spacecraft.limits
     faster = cost * float(max(abs(one.axial) / price for one, price in zip(channels, costs, strict=True))) / inertia.C
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    stays = inertia.C * (abs(spacecraft.spin) + faster) * math.tan(left.nutation)
+    stays = inertia.C * (abs(spacecraft.spin) + faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
         return 0.0
     low, wide = _arcs(
@@ -121,14 +123,14 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     return _largest(value, float(np.angle(goal)), math.acos(stays / abs(goal)))
 
 
-def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) -> float:
+def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
     """Least cost of taking the nutation out and changing the spin, whatever the phases."""
     final = spacecraft.goal.spin
     assert final is not None
-    C, allowed = spacecraft.inertia.C, abs(final) * left.spin
-    stays = C * (abs(final) + allowed) * math.tan(left.nutation)
+    C, off = spacecraft.inertia.C, abs(final) * allowed.spin
+    stays = C * (abs(final) + off) * math.tan(allowed.nutation)
     change = final - spacecraft.spin
-    change = math.copysign(max(abs(change) - allowed, 0.0), change)
+    change = math.copysign(max(abs(change) - off, 0.0), change)
     goal = complex(max(spacecraft.least_impulse - stays, 0.0), C * change)
     if goal == 0.0:
         return 0.0
@@ -143,9 +145,9 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, l
     return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
 
 
-def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, left: Left) -> float:
+def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
     """Least cost of the way of H to the direction of the target, round the sphere of radius C|ω3|."""
-    nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - left.off, 0.0)
+    nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
     way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
     dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
     return spacecraft.inertia.C * abs(spacecraft.spin) * way / dearest * (1.0 - ROUNDING)

@@ -89,10 +89,10 @@ class Task:
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
         self.pace = min(1.0 / abs(body.spin), body.inertial_period)
-        setting, start = flight.make_setting(body), body.initial
-        self._forced = setting.constant, setting.forcing
-        self._coasting = np.zeros(3), setting.forcing._replace(turning=())
-        self._start = np.asarray(setting.moments, dtype=float), start.rates, start.quaternion
+        dynamics, start = flight.make_dynamics(body), body.initial
+        self._forced = dynamics.constant, dynamics.forcing
+        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
+        self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
         self._target, self._across = body.target_axis, residual_equations.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:

@@ -12,7 +12,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes.optimal import bounds, residual_equations
-from nutdamp.schemes.optimal.bounds import Left
+from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.repair import UNMET
 from nutdamp.schemes.optimal.residual_equations import Equations
@@ -121,11 +121,11 @@ class Problem:
         nutation, off, spin = self.leaves(flown)
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
-    def leaves(self, flown: flight.Flight) -> Left:
+    def leaves(self, flown: flight.Flight) -> Allowed:
         """What a flight leaves of what is asked for."""
         residual, goal = flown.residual, self.spacecraft.goal
         off = residual.axis_error if self.equations.shift else 0.0
-        return Left(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
+        return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
     def rounded(self, made: Schedule) -> float:
         """What starts and on-times on ticks can leave, rad: half a tick of each, added up as chance does; else zero."""

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import flight
+from nutdamp.compliance import DAMPED_ANGLE
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.schedule import Schedule
@@ -69,9 +70,6 @@ NEAR = 0.05
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
-
-AS_GOOD = math.radians(1e-3)
-"""rad left on ticks below which schedules are as good as one another."""
 
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """By how much more than the program's least time a schedule may need, tried in turn."""
@@ -310,7 +308,10 @@ class _Search(Problem):
         return found
 
     def best(self, found: list[_Found]) -> Schedule | None:
-        """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding."""
+        """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
+
+        All that leave up to `DAMPED_ANGLE` leave as little.
+        """
         there = [one for one in found if one.left <= self.rounded(one.made)]
-        best = min(there, key=lambda one: (max(one.left, AS_GOOD), one.price), default=None)
+        best = min(there, key=lambda one: (max(one.left, DAMPED_ANGLE), one.price), default=None)
         return None if best is None else best.made

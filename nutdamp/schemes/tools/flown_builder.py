@@ -83,7 +83,7 @@ class FlownBuilder:
         self.now, self.here = self._before[-last]
         made = Schedule(tuple(replace(pulse, t=pulse.t - self.now) for pulse in self.pulses[-last:]))
         del self.pulses[-last:], self._before[-last:]
-        self.fire(least_squares.refine(self.here, made, chosen=range(last), momentum=True, on_times=on_times))
+        self.fire(least_squares.correct(self.here, made, chosen=range(last), momentum=True, on_times=on_times))
 
     def schedule(self, *notes: str) -> Schedule:
         """What has been chosen."""

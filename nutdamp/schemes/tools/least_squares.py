@@ -65,7 +65,7 @@ def _across(axis: Vector, vector: Vector) -> Vector:
     return np.array([first @ vector, np.cross(axis, first) @ vector])
 
 
-def refine(
+def correct(
     spacecraft: Spacecraft,
     made: Schedule,
     *,

@@ -71,7 +71,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
             raise Infeasible(_off_limits())
         if torquer.torque is not None or not model_of(spacecraft).exact:
-            made = least_squares.refine(spacecraft, made, chosen=range(len(made)), momentum=True)
+            made = least_squares.correct(spacecraft, made, chosen=range(len(made)), momentum=True)
         return _checked(spacecraft, made)
     channels = for_pairs(spacecraft)
     if not channels:
@@ -137,7 +137,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
         )
         if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
             continue
-        made = least_squares.refine(spacecraft, made, chosen=(0, 1), momentum=True)
+        made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
         left = _left(spacecraft, made)
         if keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
             best = left, made

@@ -18,20 +18,20 @@ from nutdamp.planning import Plan, plan
 from nutdamp.remarks import remarks
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
 from nutdamp.schemes.optimal import bounds
-from nutdamp.schemes.optimal.bounds import Left
+from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.search import _Search
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Channel, Disturbance, Goal, Limits, Spacecraft, Vector
 
 TIGHT = 1e-9
-NOTHING = Left()
+NOTHING = Allowed()
 
 
 def prices(spacecraft: Spacecraft) -> dict[str, float]:
     return {one.name: float(np.linalg.norm(one.torque)) for one in spacecraft.channels}
 
 
-def proved(spacecraft: Spacecraft, left: Left = NOTHING, *, shift: bool = False, cost: float = math.inf) -> float:
+def proved(spacecraft: Spacecraft, left: Allowed = NOTHING, *, shift: bool = False, cost: float = math.inf) -> float:
     """The bound; ``cost`` is that of a schedule known, which counts where torques are axial."""
     if not math.isfinite(cost):
         cost = 1e3 * (spacecraft.least_impulse + spacecraft.turning_impulse)
@@ -111,7 +111,7 @@ def every_plan_keeps_its_bound(seed: int) -> int:
         feasible += 1
         cost = made.pulses.total_impulse
         for shift in (False, body.goal.axis is not None):
-            left = Left(made.flown.nutation, made.flown.axis_error)
+            left = Allowed(made.flown.nutation, made.flown.axis_error)
             assert cost >= proved(body, left, shift=shift, cost=cost) * (1.0 - TIGHT), (seed, scheme)
     return feasible
 
@@ -174,11 +174,11 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
     body = spinner(120.0, 80.0, 3.0, 5.0, math.pi + 1.6, channels=pair, limits=Limits(horizon=1.58))
     cost, left = two_impulses_by_way_of_the_spin(body, 0.1)
     assert left < 1e-7
-    assert proved(body, Left(left), cost=cost) <= cost * (1.0 + TIGHT)
-    assert proved(body, Left(left), cost=cost) >= body.least_impulse * (1.0 - 1e-6)
+    assert proved(body, Allowed(left), cost=cost) <= cost * (1.0 + TIGHT)
+    assert proved(body, Allowed(left), cost=cost) >= body.least_impulse * (1.0 - 1e-6)
     fixed = replace(body, channels=pair[1:])
     with_plenty = replace(body, limits=Limits(horizon=60.0))
-    assert bounds.rigorous(fixed, prices(fixed), cost, Left(left), shift=False) in (None, pytest.approx(math.inf))
+    assert bounds.rigorous(fixed, prices(fixed), cost, Allowed(left), shift=False) in (None, pytest.approx(math.inf))
     assert proved(with_plenty, cost=cost) == pytest.approx(body.least_impulse, rel=1e-9)
 
 
@@ -188,7 +188,7 @@ def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) ->
     body = layout(rng, axial=0.3)
     still = replace(body, channels=tuple(without_axial(one) for one in body.channels))
     costs = prices(body)
-    fixed = bounds.rigorous(still, costs, 1.0, Left(), shift=False)
+    fixed = bounds.rigorous(still, costs, 1.0, Allowed(), shift=False)
     if fixed is None:
         pytest.skip("no solution for this layout")
     free = body.least_impulse / max(abs(one.transverse) / costs[one.name] for one in body.channels)
@@ -280,8 +280,8 @@ def test_ticks_count_what_they_leave() -> None:
     assert made.flown is not None
     assert made.flown.nutation > 1e-6
     cost = made.pulses.total_impulse
-    assert proved(body, Left(made.flown.nutation), cost=cost) <= cost
-    assert proved(body, cost=cost) - proved(body, Left(made.flown.nutation), cost=cost) == pytest.approx(
+    assert proved(body, Allowed(made.flown.nutation), cost=cost) <= cost
+    assert proved(body, cost=cost) - proved(body, Allowed(made.flown.nutation), cost=cost) == pytest.approx(
         body.inertia.C * body.spin * math.tan(made.flown.nutation), rel=1e-6
     )
 
@@ -373,5 +373,5 @@ def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
 
 def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over() -> None:
     body = spinner(channels=cross(8.0), limits=Limits(horizon=60.0))
-    assert bounds.rigorous(body, prices(body), 100.0, Left(nutation=math.radians(80.0)), shift=True) is not None
-    assert bounds.rigorous(body, prices(body), 100.0, Left(nutation=math.radians(100.0)), shift=True) is None
+    assert bounds.rigorous(body, prices(body), 100.0, Allowed(nutation=math.radians(80.0)), shift=True) is not None
+    assert bounds.rigorous(body, prices(body), 100.0, Allowed(nutation=math.radians(100.0)), shift=True) is None
