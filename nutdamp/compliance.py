@@ -34,6 +34,12 @@ class Part(Enum):
     DISTANCE = "axis_error"
     SPIN = "spin"
 
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        names = {Part.SHIFT: "shift of H", Part.DISTANCE: "axis error", Part.SPIN: "spin error"}
+        return names.get(self, "nutation")
+
 
 class Bound(NamedTuple):
     """The most that may be left of a part; ``required`` by file or command line, else what counts as damped."""
@@ -66,6 +72,11 @@ class Left(NamedTuple):
     spin: Any
 
 
+def aim(spacecraft: Spacecraft) -> Part:
+    """How far H ends from where it shall: from the target axis, or without one from where it was."""
+    return Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
+
+
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     """The bounds of the requirement, and of the spin where the goal names one; none where nothing is required."""
     asked, goal = spacecraft.requirement, spacecraft.goal
@@ -73,7 +84,7 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     if asked is not None and asked.nutation is not None:
         bounds.append(Bound(Part.NUTATION, asked.nutation, True))
     if asked is not None and asked.momentum_shift is not None:
-        bounds.append(Bound(Part.SHIFT if goal.axis is None else Part.DISTANCE, asked.momentum_shift, True))
+        bounds.append(Bound(aim(spacecraft), asked.momentum_shift, True))
     if goal.spin is not None:
         bounds.append(Bound(Part.SPIN, SPIN_TOLERANCE * abs(goal.spin), True))
     return tuple(bounds)

@@ -49,21 +49,23 @@ class Hindrance:
             return Obstacle.MAX_PULSES
         if limits.tick is not None and self.nutation < RESOLVED * body.nutation:
             return Obstacle.RESOLUTION
-        return Obstacle.LIMITS if self.binding else Obstacle.SCHEME
+        return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Keys of the file that name the limits which end what the schedule does, as far as that can be seen."""
-        limits = self.spacecraft.limits
+        """Keys of the file that name the limits which the schedule itself shows to end it."""
         found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
         if not any(found.values()):
-            found |= {"min_on_time": self.shortest, "limits.tick": limits.tick is not None}
-        return tuple(key for key in found if found[key]) + ("limits.blackout",) * bool(limits.blackout)
+            found["min_on_time"] = self.shortest
+        return tuple(key for key in found if found[key])
 
     @property
-    def evident(self) -> bool:
-        """Whether the schedule itself shows that a limit ends it; windows and ticks alone do not."""
-        return self.full or self.to_the_end or self.shortest
+    def suspected(self) -> tuple[str, ...]:
+        """Keys of those that the file gives and that may end it: to know it takes a plan without them."""
+        limits = self.spacecraft.limits
+        ticks = limits.tick is not None and not self.full and not self.to_the_end
+        found = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
+        return tuple(key for key in found if found[key])
 
     @property
     def full(self) -> bool:

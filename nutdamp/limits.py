@@ -167,8 +167,16 @@ def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
 
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Longest useful on-time, s: a torque across the spin axis works against itself after half a nutation period."""
-    return min(channel.max_on_time, 0.5 * spacecraft.body_period if channel.damps else math.inf)
+    """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the spin axis."""
+    return longest_useful(channel.max_on_time, spacecraft.body_period) if channel.damps else channel.max_on_time
+
+
+def longest_useful(max_on_time: float, period: float) -> float:
+    """Longest useful on-time, s: a torque across the spin axis works against itself after half a nutation ``period``.
+
+    That is the one in the body, s, at the spin with which the pulse begins.
+    """
+    return min(max_on_time, 0.5 * period)
 
 
 PAIRED = 24

@@ -33,14 +33,9 @@ class Deviation(NamedTuple):
     probability: float = 1.0
 
     def __str__(self) -> str:
-        name, unit = {
-            Part.NUTATION: ("nutation", "deg"),
-            Part.SHIFT: ("shift of H", "deg"),
-            Part.DISTANCE: ("axis error", "deg"),
-            Part.SPIN: ("spin", "rad/s"),
-        }[self.part]
-        error = self.error if self.part is Part.SPIN else math.degrees(self.error)
-        return f"{error:.2g} {unit} of {name}"
+        if self.part is Part.SPIN:
+            return f"{self.error:.2g} rad/s of {self.part.label}"
+        return f"{math.degrees(self.error):.2g} deg of {self.part.label}"
 
 
 def seen_at(flight: Flight, time: float) -> Flight:
@@ -73,9 +68,8 @@ def tolerated(spacecraft: Spacecraft, otherwise: float = ANGLE) -> dict[Part, fl
     something else is.
     """
     required = {bound.part: SHARE * bound.most for bound in compliance.required(spacecraft)}
-    aim = Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
     unbounded = otherwise if required else ANGLE
-    return {Part.NUTATION: unbounded, aim: unbounded, **required}
+    return {Part.NUTATION: unbounded, compliance.aim(spacecraft): unbounded, **required}
 
 
 def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:

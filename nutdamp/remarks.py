@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from nutdamp.hindrance import Obstacle
+from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.limits import Breach, Limit, breaches
 from nutdamp.planning import Plan
 from nutdamp.schedule import Schedule
@@ -105,17 +105,27 @@ def _remainder(plan: Plan) -> Iterator[str]:
     left = plan.flight.residual.nutation
     if left < TELLING or plan.options.uncorrected:
         return
+    yield f"{_degrees(left)} of nutation remain: {obstacle(plan)}"
+
+
+def obstacle(plan: Plan) -> str:
+    """What keeps a plan from leaving less nutation, as a clause."""
     found = plan.hindrance
-    limited = "is limited by" if found.evident else "may be limited by"
-    reason = {
-        Obstacle.UNPLANNED_DISTURBANCES: "the plan does not know of the disturbances (--with-disturbances)",
-        Obstacle.STEADY_TILT: f"{math.degrees(found.steady_tilt):.3g}° is the steady tilt under the disturbances",
-        Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} ends it",
-        Obstacle.RESOLUTION: "the resolution of commands (limits.tick) or the shortest pulse leaves it",
-        Obstacle.LIMITS: f"{plan.scheme} {limited} {' and '.join(found.binding)}",
+    return {
+        Obstacle.UNPLANNED_DISTURBANCES: "the plan was made without the disturbances (--with-disturbances)",
+        Obstacle.STEADY_TILT: f"under the disturbances a steady tilt of {_degrees(found.steady_tilt)} stays",
+        Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} allows no more pulses",
+        Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less",
+        Obstacle.LIMITS: f"{plan.scheme} {_limited(found)}",
         Obstacle.SCHEME: f"with these channels {plan.scheme} takes out no more",
     }[found.obstacle]
-    yield f"{_degrees(left)} of nutation remain: {reason}"
+
+
+def _limited(found: Hindrance) -> str:
+    """By which limits a schedule is limited, and by which it may be."""
+    certain = f"is limited by {' and '.join(found.binding)}" if found.binding else ""
+    possible = f"may be limited by {' and '.join(found.suspected)}" if found.suspected else ""
+    return ", and ".join(text for text in (certain, possible) if text)
 
 
 def _asymmetry(plan: Plan) -> Iterator[str]:

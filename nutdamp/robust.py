@@ -15,11 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import planning
-from nutdamp.compliance import missed
+from nutdamp.compliance import Part, aim, missed
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
 from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.outputs import aim_output
 from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
@@ -221,8 +220,7 @@ def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, im
         check_impulses(study)
     results = run(Results(study, samples), threads=threads_here())
     ends = []
-    aim, _ = aim_output(plan.spacecraft)
-    for output in ("nutation", aim):
+    for output in (Part.NUTATION.value, aim(plan.spacecraft).value):
         distribution = results.distribution(output)
         assert distribution is not None
         ends.append(float(distribution.quantiles(np.array([probability]))[0]))

@@ -6,6 +6,7 @@ import cmath
 import math
 from dataclasses import dataclass
 
+from nutdamp.limits import longest_useful, shortest_on_time
 from nutdamp.physics import cones, damping, forced, rates, stability
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 
@@ -14,8 +15,8 @@ from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 class ChannelSteps:
     """A channel and the nutation angles (rad) that its shortest and longest pulse take out or put in.
 
-    ``smallest`` counts the command resolution too, and is 0 without any least on-time; ``largest`` is that of
-    max_on_time, or of half a body nutation period where that is shorter, infinite where neither bounds it.
+    ``smallest`` is that of the shortest on-time that can be commanded, `limits.shortest_on_time`, and is 0 without any;
+    ``largest`` that of `limits.longest_useful`, a right angle where nothing bounds it.
     """
 
     channel: Channel
@@ -37,8 +38,7 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
     period = spacecraft.body_period
     steps = []
     for channel in spacecraft.channels:
-        shortest = max(channel.min_on_time, spacecraft.limits.tick or 0.0)
-        longest = min(channel.max_on_time, 0.5 * period)
+        shortest, longest = shortest_on_time(spacecraft, channel), longest_useful(channel.max_on_time, period)
         steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), _step(spacecraft, channel, longest)))
     return tuple(steps)
 

@@ -351,7 +351,8 @@ def test_a_limit_that_may_not_be_what_ends_it_is_no_more_than_suspected() -> Non
     body = spinner(100.0, 100.0, channels=(channel("T", 5.0, 5.0, 0.0),), limits=Limits(tick=1e-3))
     body = replace(body, omega0=np.array([-0.2, 0.1, 3.0]))
     made = planning.plan(body, "four-pulse")
-    assert not made.hindrance.evident
+    assert made.hindrance.binding == ()
+    assert made.hindrance.suspected == ("limits.tick",)
     assert any("four-pulse may be limited by limits.tick" in remark for remark in remarks(made))
 
 
@@ -391,7 +392,21 @@ def test_what_binds_is_named_and_nothing_else() -> None:
     assert made.hindrance.obstacle is Obstacle.SCHEME or made.hindrance.binding == ("limits.horizon",)
     assert not any("max_on_time" in remark or "blackout" in remark for remark in remarks(made))
     dark = replace(single, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),)))
-    assert "limits.blackout" in planning.plan(dark, "one-pulse").hindrance.binding
+    found = planning.plan(dark, "one-pulse").hindrance
+    assert found.binding == ("limits.horizon",)
+    assert found.suspected == ("limits.blackout",)
+
+
+def test_a_blackout_is_not_said_to_limit_what_it_may_not_touch() -> None:
+    """It is over before the first pulse: without it the plan is the same, so it must not be called the limit."""
+    single = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0, blackout=((0.0, 0.1),)))
+    made = planning.plan(single, "one-pulse")
+    free = planning.plan(replace(single, limits=Limits(horizon=7.0)), "one-pulse")
+    assert made.pulses.end == free.pulses.end
+    assert any(
+        remark.endswith("one-pulse is limited by limits.horizon, and may be limited by limits.blackout")
+        for remark in remarks(made)
+    )
 
 
 @pytest.mark.parametrize(
@@ -399,7 +414,7 @@ def test_what_binds_is_named_and_nothing_else() -> None:
     [
         (Limits(max_pulses=1), (), False, Obstacle.MAX_PULSES, "limits.max_pulses = 1 allows no more pulses."),
         (Limits(), (Disturbance(0.5 + 0j),), False, Obstacle.UNPLANNED_DISTURBANCES, "--with-disturbances plans with"),
-        (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "Under the disturbances a tilt of 0."),
+        (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "Under the disturbances a steady tilt of 0."),
         (Limits(tick=0.3), (), False, Obstacle.RESOLUTION, "limits.tick and the shortest on-times allow no less."),
     ],
 )
@@ -414,7 +429,7 @@ def test_the_warning_names_what_stands_in_the_way(
 
 
 @pytest.mark.parametrize(
-    ("tick", "share", "obstacle", "binding"),
+    ("tick", "share", "obstacle", "suspected"),
     [
         (0.01, 0.09, Obstacle.RESOLUTION, ("limits.tick",)),
         (0.01, 0.11, Obstacle.LIMITS, ("limits.tick",)),
@@ -423,13 +438,14 @@ def test_the_warning_names_what_stands_in_the_way(
     ],
 )
 def test_ticks_explain_what_is_left_up_to_a_tenth(
-    tick: float | None, share: float, obstacle: Obstacle, binding: tuple[str, ...]
+    tick: float | None, share: float, obstacle: Obstacle, suspected: tuple[str, ...]
 ) -> None:
     body = spinner(channels=cross(8.0), limits=Limits(tick=tick))
     pulse = channel_pulse(body.channels[0], 1.0, 0.1)
     found = Hindrance(body, Schedule((pulse,)), aware=False, nutation=share * body.nutation)
     assert found.obstacle is obstacle
-    assert found.binding == binding
+    assert found.binding == ()
+    assert found.suspected == suspected
 
 
 def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:

@@ -28,6 +28,18 @@ def test_the_smallest_step_is_what_one_shortest_pulse_does_to_a_pure_spin() -> N
         assert steps.smallest == pytest.approx(flown.nutation, rel=1e-12)
 
 
+@pytest.mark.parametrize(("least", "tick", "shortest"), [(0.025, 0.01, 0.03), (0.02, 0.01, 0.02), (0.0, 0.01, 0.01)])
+def test_the_smallest_step_is_that_of_an_on_time_that_can_be_commanded(
+    least: float, tick: float, shortest: float
+) -> None:
+    thrusters = tuple(replace(one, min_on_time=least) for one in CALM.channels[0].thrusters)
+    channel = replace(CALM.channels[0], thrusters=thrusters)
+    body = replace(CALM, channels=(channel,), limits=replace(CALM.limits, tick=tick))
+    (steps,) = survey.channel_steps(body)
+    flown = flight.flown(body, Schedule((channel_pulse(channel, 1.0, shortest),))).residual
+    assert steps.smallest == pytest.approx(flown.nutation, rel=1e-9)
+
+
 @pytest.mark.parametrize(("periods", "resonant"), [(2.9, False), (3.1, True)])
 def test_a_beat_over_three_horizons_is_a_resonance(periods: float, resonant: bool) -> None:
     """The beat has the period 2π/|aω3 + r|."""

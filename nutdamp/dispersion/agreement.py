@@ -10,7 +10,7 @@ import numpy as np
 from nutdamp import compliance
 from nutdamp.compliance import Part
 from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.outputs import OUTPUTS, aim_output
+from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import STRIDE, Results, Study, run
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.outcome import Deviation, tolerated
@@ -29,13 +29,15 @@ def deviations(study: Study) -> tuple[Deviation, ...]:
     summed, flown = (run(Results(one, CASES)) for one in (study, real))
     assert summed.values is not None
     assert flown.values is not None
-    aim = aim_output(body)[0]
-    names = {Part.NUTATION: "nutation", Part.SHIFT: aim, Part.DISTANCE: aim, Part.SPIN: "spin_change"}
     errors = np.abs(summed.values - flown.values)
     return tuple(
         Deviation(
             part,
-            float(np.quantile(errors[OUTPUTS.index(names[part])], flown.probability)),
+            float(
+                np.quantile(
+                    errors[OUTPUTS.index("spin_change" if part is Part.SPIN else part.value)], flown.probability
+                )
+            ),
             most,
             flown.probability,
         )

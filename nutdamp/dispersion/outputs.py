@@ -10,19 +10,11 @@ from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import Cases, Model, Triple
 from nutdamp.dispersion.kernel import Ends
-from nutdamp.spacecraft import Spacecraft
 
 Array = NDArray[np.float64]
 
 OUTPUTS = ("nutation", "momentum_shift", "axis_error", "spin_change", "propellant")
-"""In rad, rad, rad, rad/s and kg."""
-
-
-def aim_output(spacecraft: Spacecraft) -> tuple[str, str]:
-    """The output that tells how far H ends from where it shall, and what people call it."""
-    if spacecraft.goal.axis is None:
-        return "momentum_shift", "shift of H"
-    return "axis_error", "axis error"
+"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.compliance.Part`."""
 
 
 VECTORS = {

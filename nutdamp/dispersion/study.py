@@ -20,7 +20,7 @@ from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.cases import Cases, DispersedCases, Model
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
-from nutdamp.dispersion.outputs import OUTPUTS, ROWS, aim_output, measure, vectors
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
 from nutdamp.dispersion.sensitivity import FirstOrder, first_order, sampled_shares
 from nutdamp.dispersion.statistics import (
     EXACT_CASES,
@@ -119,7 +119,7 @@ class Study:
 
     def severity(self, values: Array, spin: Cases) -> Array:
         """How bad cases are, (n,), by `compliance.severity`: outputs (5, n), and ω3 at their end in rad/s."""
-        aim = OUTPUTS.index(aim_output(self.model.spacecraft)[0])
+        aim = OUTPUTS.index(compliance.aim(self.model.spacecraft).value)
         return np.asarray(compliance.severity(self.model.spacecraft, Left(values[0], values[aim], spin)))
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp.dispersion.outputs import aim_output
+from nutdamp.compliance import aim
 from nutdamp.files.plan_json import final_json, plan_json, target_json
 from nutdamp.robust import Candidate, RobustComparison
 
@@ -49,7 +49,7 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "propellant_kg": pulses.propellant,
         "nominal_nutation_deg": None if plan.flown is None else math.degrees(plan.flown.nutation),
         "nutation_deg": math.degrees(one.nutation),
-        aim_output(plan.spacecraft)[0] + "_deg": math.degrees(one.off),
+        aim(plan.spacecraft).value + "_deg": math.degrees(one.off),
         "met_fraction": one.met,
         "final": final_json(plan.flight),
     }

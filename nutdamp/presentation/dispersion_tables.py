@@ -10,9 +10,11 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp import compliance
+from nutdamp.compliance import Part
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
-from nutdamp.dispersion.outputs import OUTPUTS, aim_output
+from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.flight import Flight
@@ -249,4 +251,5 @@ def case_screen(
 
 def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
     """The outputs of the tolerance budget, and what people call them."""
-    return ("nutation", "nutation"), aim_output(study.model.spacecraft)
+    first, second = Part.NUTATION, compliance.aim(study.model.spacecraft)
+    return (first.value, first.label), (second.value, second.label)

@@ -197,7 +197,7 @@ def _part(bound: Bound) -> tuple[str, Cell]:
         return text if found.met else f"{NOT} {text}"
 
     most = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else degrees(bound.most)
-    return f"  {verdicts.PARTS[bound.part]} ≤ {most}", cell
+    return f"  {bound.part.label} ≤ {most}", cell
 
 
 def _angle(left: Residual | None, name: str) -> str:

@@ -20,6 +20,12 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     return f"{value:.{digits}g} {unit}"
 
 
+def sentence(clause: str) -> str:
+    """A clause with a full stop and a capital letter, unless it begins with a key of the file."""
+    first, _, _ = clause.partition(" ")
+    return f"{clause if '.' in first else clause[:1].upper() + clause[1:]}."
+
+
 def degrees(angle: float | None) -> str:
     """An angle given in rad, in degrees; what is below 1e-9 deg is rounding and shown as such."""
     if angle is None or math.isnan(angle):

@@ -14,8 +14,9 @@ from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Comparison, Plan
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, sentence
 from nutdamp.recommendation import Ground, Standing
+from nutdamp.remarks import obstacle
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:  # few runs look for a robust plan
 
 VERDICT = {True: "met", False: "not met", None: MISSING}
 """What `Plan.meets_requirement` says of the requirement."""
-
-PARTS = {Part.NUTATION: "nutation", Part.SHIFT: "shift of H", Part.DISTANCE: "axis error", Part.SPIN: "spin off"}
-"""What the parts of a requirement are called."""
 
 
 def no_plan(plan: Plan) -> str:
@@ -152,27 +150,19 @@ def shortfall(plan: Plan, bound: Bound) -> str:
     if bound.part is Part.SPIN:
         goal = plan.spacecraft.goal.spin or 0.0
         return f"the spin at {_rpm(left.spin)} ({_rpm(goal)} required)"
-    what = {
-        Part.NUTATION: "of nutation",
-        Part.SHIFT: "of shift of H",
-        Part.DISTANCE: "between H and the target",
-    }[bound.part]
     allowed = "required" if bound.required else "would count as damped"
-    return f"{degrees(value)} {what} ({degrees(bound.most)} {allowed})"
+    return f"{degrees(value)} of {bound.part.label} ({degrees(bound.most)} {allowed})"
 
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
     """What stands in the way of less, in sentences; what cures it first."""
-    body, limits = plan.spacecraft, plan.spacecraft.limits
+    body = plan.spacecraft
     parts = {bound.part for bound in plan.shortfalls}
     if body.disturbances and not plan.options.with_disturbances:
         yield _unplanned(compared)
     if Part.NUTATION in parts and plan.hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
-        yield {
-            Obstacle.STEADY_TILT: f"Under the disturbances a tilt of {degrees(plan.hindrance.steady_tilt)} stays.",
-            Obstacle.MAX_PULSES: f"limits.max_pulses = {limits.max_pulses} allows no more pulses.",
-            Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less.",
-        }.get(plan.hindrance.obstacle, _spent(plan))
+        spent = plan.hindrance.obstacle in (Obstacle.LIMITS, Obstacle.SCHEME)
+        yield _spent(plan) if spent else sentence(obstacle(plan))
     if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
     if _optimal_untried(compared) and parts != {Part.SPIN}:
@@ -306,7 +296,7 @@ def required(spacecraft: Spacecraft) -> str:
             tolerance = 100.0 * compliance.SPIN_TOLERANCE
             texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
         else:
-            texts.append(f"{PARTS[bound.part]} within {degrees(bound.most)}")
+            texts.append(f"{bound.part.label} within {degrees(bound.most)}")
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 2 else texts)
 
 

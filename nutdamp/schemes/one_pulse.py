@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import usable
+from nutdamp.limits import longest_useful, usable
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes.options import SchemeOptions
@@ -58,7 +58,9 @@ def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
 
     def fire(builder: ImpulseBuilder, impulse: float) -> Pulse | None:
         on_time = builder.on_time_for(channel, impulse)
-        return builder.align(channel, min(channel.max_on_time, 0.5 * builder.period) if on_time is None else on_time)
+        return builder.align(
+            channel, longest_useful(channel.max_on_time, builder.period) if on_time is None else on_time
+        )
 
     spin_rate = channel.axial / spacecraft.inertia.C
     return _train(spacecraft, abs(channel.transverse), spin_rate, channel.max_on_time, fire)
@@ -85,7 +87,7 @@ def _train(
             return math.inf
         return torque * on_time * abs(rates.width_factor(start.a, start.spin, spin_rate, on_time))
 
-    longest = min(max_on_time, 0.5 * start.period)
+    longest = longest_useful(max_on_time, start.period)
     count = 1
     single = math.isinf(torque) or rates.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
     share = capacity(min(max_on_time, TRAIN_SHARE * start.period))

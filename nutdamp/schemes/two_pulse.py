@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
+from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits, longest_useful
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import TwoPulseOptions
@@ -358,7 +358,7 @@ def _place(
         wanted = grown * half * factor
         rate = channel.axial / spacecraft.inertia.C
         on_time = rates.on_time_for(wanted, abs(channel.transverse), a, spin, rate, channel.max_on_time)
-        longest = min(channel.max_on_time, math.pi / abs(a * spin) if a != 0.0 else math.inf)
+        longest = longest_useful(channel.max_on_time, spacecraft.body_period)
         on_times.append(max(longest if on_time is None else on_time, channel.min_on_time))
         reached = abs(channel.transverse) * on_times[-1] * abs(rates.width_factor(a, spin, rate, on_times[-1]))
         short += abs(wanted - reached) / (spacecraft.least_impulse * factor)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.dispersion.outputs import aim_output
+from nutdamp import compliance
 from nutdamp.dispersion.statistics import Distribution
 from nutdamp.dispersion.study import Results
 from nutdamp.presentation.figures import style
@@ -25,10 +25,12 @@ def dispersion_figure(results: Results, *, scheme: str) -> Figure:
     """Histogram and distribution function of nutation and shift of H, with what is required of them."""
     figure = style.sheet(7.4, 5.4)
     grid = figure.subplots(2, 2)
-    aim, called = aim_output(results.study.model.spacecraft)
+    aim = compliance.aim(results.study.model.spacecraft)
     asked = results.study.model.spacecraft.requirement
     limits = (None, None) if asked is None else (asked.nutation, asked.momentum_shift)
-    for row, output, name, limit in zip(grid, ("nutation", aim), ("nutation left", called), limits, strict=True):
+    for row, output, name, limit in zip(
+        grid, ("nutation", aim.value), ("nutation left", aim.label), limits, strict=True
+    ):
         found = results.distribution(output)
         if found is None:
             continue

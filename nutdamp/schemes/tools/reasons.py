@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 
+from nutdamp.limits import longest_useful
 from nutdamp.schedule import Pulse
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -89,6 +90,6 @@ def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
 def _end(builder: ImpulseBuilder, channel: Channel, shortest: Pulse) -> float:
     """End in s of the first pulse of a channel that is as long as it takes; of the ``shortest`` where none has room."""
     needed = builder.on_time_for(channel, builder.left)
-    most = min(channel.max_on_time, 0.5 * builder.period)
+    most = longest_useful(channel.max_on_time, builder.period)
     pulse = builder.align(channel, most if needed is None else min(needed, most))
     return shortest.end if pulse is None else max(pulse.end, shortest.end)
