@@ -9,6 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ ComplexArray = NDArray[np.complex128]
 
 SERIES_REACH = 2.0
 """Largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel."""
+
+MANY_PANELS = 12
+"""Panels from which on all are summed at once."""
 
 SERIES_ORDERS = 60
 """Orders of that power series: it has converged long before."""
@@ -85,6 +89,10 @@ def width_factor(
         return 0.0 + 0.0j
     panels = math.ceil(turned / SERIES_REACH) or 1
     width = half / panels
+    if panels >= MANY_PANELS:
+        middles = (2 * np.arange(panels) + 1 - panels) * width
+        turns = np.exp(1j * (offset + (slope + bend * middles) * middles))
+        return complex(np.mean(turns * _mean_of_phase(slope + 2 * bend * middles, bend, width)))
     total = 0.0 + 0.0j
     for panel in range(panels):
         middle = (2 * panel + 1 - panels) * width
@@ -93,18 +101,22 @@ def width_factor(
     return total / panels
 
 
-def _mean_of_phase(slope: complex, bend: float, half: float) -> complex:
-    """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series about the middle."""
-    before, term = 0.0 + 0.0j, 1.0 + 0.0j  # terms c_k half^k of the series of the integrand
+def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
+    """Mean of exp(i(slope s + bend s²)) over |s| <= half, for one ``slope`` or many, by its power series."""
+    before, term = 0.0 * slope, 1.0 + 0.0 * slope  # terms c_k half^k of the series of the integrand
     total = term
     for order in range(SERIES_ORDERS):
-        if order >= 4 and abs(term) + abs(before) <= 1e-18:
+        if order >= 4 and _largest(abs(term) + abs(before)) <= 1e-18:
             break
         after = 1j * half * (slope * term + 2 * bend * half * before) / (order + 1)
         before, term = term, after
         if order % 2 == 1:
-            total += term / (order + 2)
+            total = total + term / (order + 2)
     return total
+
+
+def _largest(sizes: float | Array) -> float:
+    return sizes if isinstance(sizes, float) else float(sizes.max())
 
 
 def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate: float, longest: float) -> float | None:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude, driven
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ NOTHING = Forcing()
 class Piece:
     """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration.
 
-    ``rates`` (ORDER+1, 3) in rad/s, ``attitude`` (ORDER+1, 4).
+    ``rates`` (orders, 3) in rad/s, ``attitude`` (orders, 4).
     """
 
     start: float
@@ -63,7 +64,7 @@ class Piece:
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Rates (n, 3) and unit quaternions (n, 4) at ``times`` (n,) s within the piece."""
-        powers = ((np.asarray(times, dtype=float) - self.start) / self.duration)[:, None] ** np.arange(ORDER + 1)
+        powers = ((np.asarray(times, dtype=float) - self.start) / self.duration)[:, None] ** np.arange(len(self.rates))
         quaternion = powers @ self.attitude
         return powers @ self.rates, quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
@@ -89,6 +90,8 @@ def integrate(
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
     Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
+    if moments[0] == moments[1] and forcing.growth == 0.0:
+        return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
@@ -104,10 +107,7 @@ def integrate(
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
         pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
         if not pace * left <= LONGEST:
-            raise Infeasible(
-                f"the motion from {now:.4g} s to {end:.4g} s runs over {pace * left:.2g} rad, too many to be "
-                f"integrated; shorten the time, or look for a torque or rate that is too large"
-            )
+            raise _too_long(now, end, pace * left)
         unit = 1.0 / pace if pace > 0.0 else left
         series = _series(moments, acceleration, forcing, floor, now, np.concatenate([rates, quaternion]), unit)
         step = min(_reach(series, unit) * unit, left)
@@ -118,10 +118,79 @@ def integrate(
         pieces.append(piece)
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
-    raise Infeasible(
+    raise _too_many(start, end)
+
+
+def _too_long(start: float, end: float, angle: float) -> Infeasible:
+    return Infeasible(
+        f"the motion from {start:.4g} s to {end:.4g} s runs over {angle:.2g} rad, too many to be "
+        f"integrated; shorten the time, or look for a torque or rate that is too large"
+    )
+
+
+def _too_many(start: float, end: float) -> Infeasible:
+    return Infeasible(
         f"the motion from {start:.4g} s to {end:.4g} s takes too many steps to be integrated; shorten the time, or "
         "look for a torque or rate that is too large"
     )
+
+
+def _symmetric(
+    moments: tuple[float, float, float],
+    torque: Array,
+    rates: Array,
+    quaternion: Array,
+    start: float,
+    end: float,
+    forcing: Forcing,
+    most: int,
+) -> list[Piece]:
+    """`integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+    A, _, C = moments
+    drive = driven.Drive(
+        np.array([(A - C) / A]),
+        np.array([complex(torque[0], torque[1]) / A]),
+        np.array([float(torque[2]) / C]),
+        tuple((np.array([size / A]), rate) for size, rate in forcing.turning),
+    )
+    omega, spin, duration = (
+        np.array([complex(rates[0], rates[1])]),
+        np.array([float(rates[2])]),
+        np.array([end - start]),
+    )
+    angle = float(drive.pace(omega, spin, duration)[0]) * (end - start)
+    if angle > most * driven.STRIDE and most < MOST_STEPS:
+        raise _too_many(start, end)
+    if not angle <= LONGEST:
+        raise _too_long(start, end, angle)
+    count = driven.count_for(drive, omega, spin, duration)
+    pieces: list[Piece] = []
+    try:
+        for found in driven.steps(drive, omega, spin, np.array([start]), duration, count):
+            pieces += _pieces(found, quaternion)
+            quaternion = pieces[-1].final[1]
+            if len(pieces) > most:
+                raise _too_many(start, end)
+    except driven.NotConverged:
+        raise _too_many(start, end) from None
+    pieces[-1] = replace(pieces[-1], duration=end - pieces[-1].start)  # the same but for rounding
+    return pieces
+
+
+def _pieces(found: driven.Steps, quaternion: Array) -> list[Piece]:
+    """The steps of one body as pieces, from its ``quaternion`` (4,) at their beginning."""
+    terms, count = len(found.omega), len(found.starts)
+    rates = np.zeros((count, terms, 3))
+    rates[..., 0], rates[..., 1] = found.omega[..., 0].real.T, found.omega[..., 0].imag.T
+    rates[:, :2, 2] = found.spin[..., 0].T
+    turn = found.turn[..., 0]
+    if count > 1:
+        before = driven.in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
+        turn[:, :, 1:] = np.moveaxis(driven.product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:]), 0, 1)
+    parts = np.stack([turn[:, 0].real, turn[:, 1].real, turn[:, 1].imag, turn[:, 0].imag], axis=-1)
+    quaternions = attitude.multiply(quaternion, np.swapaxes(parts, 0, 1))
+    starts, duration = found.starts[:, 0].tolist(), float(found.duration[0])
+    return [Piece(*one) for one in zip(starts, [duration] * count, rates, quaternions, strict=True)]
 
 
 def _series(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import energy_sink
+from nutdamp.physics import driven, energy_sink
 from nutdamp.physics.rigid import AT_REST, LONGEST, NOTHING, Forcing
 
 Array = NDArray[np.float64]
@@ -30,6 +30,11 @@ LARGEST_ORDER = 30
 
 STRIDE = 2.5
 """Radians of one step, at most; there the work per radian is least."""
+
+FEW = 256
+"""Cases up to which many steps of symmetric bodies are summed at once: the calls then cost more than the sums."""
+
+TOO_FAST = "the motion of a dispersed case changes too fast to be integrated"
 
 REMAINDER = 1e-15
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
@@ -233,19 +238,49 @@ def _integrate(
 ) -> None:
     """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place."""
     forcing, moments = bodies.forcing, bodies.moments
+    if len(now) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
+        _integrate_symmetric(bodies, rates, quaternion, now, duration, acceleration)
+        return
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     pace = np.sqrt(np.sum(rates * rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
     span = float(np.max(pace * duration))
-    if span > LONGEST:
+    _expect_short(span)
+    steps = max(1, math.ceil(span / STRIDE))
+    for number in range(steps):
+        _step(bodies, rates, quaternion, now + duration * (number / steps), duration / steps, acceleration)
+
+
+def _expect_short(span: float) -> None:
+    """Raise Infeasible for motions over too many radians."""
+    if not span <= LONGEST:
         raise Infeasible(
             f"the motion of a dispersed case runs over {span:.2g} rad, too many to be integrated; shorten the time, "
             f"or look for a torque or rate that is too large"
         )
-    steps = max(1, math.ceil(span / STRIDE))
-    for number in range(steps):
-        _step(bodies, rates, quaternion, now + duration * (number / steps), duration / steps, acceleration)
+
+
+def _integrate_symmetric(
+    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, acceleration: Array
+) -> None:
+    """`_integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+    A, _, C = bodies.moments
+    drive = driven.Drive(
+        1.0 - C / A,
+        acceleration[0] + 1j * acceleration[1],
+        acceleration[2],
+        tuple((size / A, rate) for size, rate in bodies.forcing.turning),
+    )
+    omega, spin = rates[0] + 1j * rates[1], rates[2]
+    _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))
+    turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
+    try:
+        omega, rates[2], (first, second) = driven.end(drive, omega, spin, turned, now, duration)
+    except driven.NotConverged:
+        raise Infeasible(TOO_FAST) from None
+    rates[:2] = omega.real, omega.imag
+    quaternion[:] = first.real, second.real, second.imag, first.imag
 
 
 def _step(
@@ -257,7 +292,7 @@ def _step(
         rates[:], quaternion[:] = series.end()
         return
     if halvings == 0:
-        raise Infeasible("the motion of a dispersed case changes too fast to be integrated")
+        raise Infeasible(TOO_FAST)
     for begin in (0.0, 0.5):
         _step(bodies, rates, quaternion, now + begin * step, 0.5 * step, acceleration, halvings - 1)
 

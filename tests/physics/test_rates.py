@@ -146,6 +146,16 @@ def test_width_factor_by_quadrature(a: float, spin: float, spin_rate: float, on_
     assert rates.width_factor(a, spin, spin_rate, on_time) == pytest.approx(complex(real, imaginary), abs=1e-12)
 
 
+@pytest.mark.parametrize("spin_rate", [0.05, -0.2])
+def test_width_factor_of_long_pulses_by_quadrature(spin_rate: float) -> None:
+    """Over some hundred panels, against Simpson's rule on a fine grid."""
+    a, spin, on_time = 0.7, 3.0, 90.0
+    s = np.linspace(-0.5 * on_time, 0.5 * on_time, 400_001)
+    values = np.exp(1j * a * (spin * s + 0.5 * spin_rate * (s + 0.5 * on_time) ** 2))
+    weights = np.array([1.0, *([4.0, 2.0] * 199_999), 4.0, 1.0]) / (3.0 * 400_000)
+    assert rates.width_factor(a, spin, spin_rate, on_time) == pytest.approx(complex(weights @ values), abs=1e-12)
+
+
 def test_width_factor_is_continuous_where_the_axial_torque_vanishes() -> None:
     plain = rates.width_factor(0.5, 3.0, 0.0, 1.5)
     assert rates.width_factor(0.5, 3.0, 1e-14, 1.5) == pytest.approx(plain, abs=1e-13)
