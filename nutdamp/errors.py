@@ -135,3 +135,14 @@ class MissingPandas(NutdampError):
 
 class Infeasible(NutdampError):
     """A scheme that cannot work with this spacecraft within its limits; the text says why."""
+
+
+class TooShort(Infeasible):
+    """The same, where a longer horizon would do: ``why``, and a ``cure`` that names one, where one is known."""
+
+    def __init__(self, why: str, cure: str = "") -> None:
+        self.why, self.cure = why, cure
+        super().__init__(why, cure)
+
+    def __str__(self) -> str:
+        return f"{self.why}; {self.cure}" if self.cure else self.why

@@ -28,6 +28,7 @@ FAULTS = [Fault("b.yaml", 3, 1, "mass", "zero"), Fault("a.yaml", 0, 0, "", "empt
         errors.MissingExtra("plot", "a picture"),
         errors.MissingPandas(),
         errors.Infeasible("no thrusters"),
+        errors.TooShort("no pulse fits", "limits.horizon = 90 s is long enough"),
     ],
     ids=lambda error: type(error).__name__,
 )

@@ -5,12 +5,14 @@ A scheme's module has ``schedule(spacecraft, options) -> Schedule``; `registry` 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.options import LEAST, Options, SchemeOptions, shown
 from nutdamp.schemes.registry import CLASSIC, NAMES, PLANNED, POINTING, SCHEMES, SPINNING, SUNLIT, Scheme
 
@@ -63,8 +65,40 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
     scheme = SCHEMES[name]
     chosen, model = options_of(scheme, options), model_of(spacecraft)
-    made = cast("Schedule", _loaded(scheme).schedule(model.body, chosen))
+
+    def planned(body: Spacecraft) -> Schedule:
+        return cast("Schedule", _loaded(scheme).schedule(body, chosen))
+
+    try:
+        made = planned(model.body)
+    except TooShort as short:
+        raise TooShort(short.why, short.cure or _longer_horizon(model.body, planned)) from None
     return _corrected(scheme, model, made, chosen)
+
+
+LONGER = 4.0
+"""Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
+
+
+def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
+    """A horizon within which the whole schedule is ``planned``, in words: it was tried; else that none was found."""
+
+    def end(horizon: float) -> float | None:
+        """When the schedule within a horizon ends; None where there is none."""
+        try:
+            return planned(replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))).end
+        except Infeasible:
+            return None
+
+    usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
+    for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
+        over = end(horizon) if horizon > spacecraft.horizon else None
+        if over:
+            step = 10.0 ** (math.floor(math.log10(over)) - 3)
+            shortest = math.ceil(over / step) * step  # four digits, rounded up
+            needed = shortest if end(shortest) is not None else horizon
+            return f"limits.horizon = {needed:.4g} s is long enough"
+    return f"not even limits.horizon = {horizon:.4g} s is long enough"
 
 
 def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> list[Schedule]:

@@ -35,7 +35,7 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     else:
         _turning(builder, channels, on_times, options)
     if not builder.pulses:
-        raise Infeasible(no_alignment(spacecraft, channels))
+        raise no_alignment(spacecraft, channels)
     return builder.schedule()
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import Windows, commandable, usable
 from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
@@ -85,7 +85,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
             break
         best = made
     if best is None:
-        raise reason or Infeasible(_no_time(here))
+        raise reason or _no_time(here)
     return best
 
 
@@ -127,19 +127,19 @@ def _most(spacecraft: Spacecraft) -> int:
     return min(MOST_CONES, room, MOST_CONES if most is None else most - 1)
 
 
-def _no_time(spacecraft: Spacecraft) -> str:
+def _no_time(spacecraft: Spacecraft) -> Infeasible:
     most = spacecraft.limits.max_pulses
     fewest = _fewest(spacecraft)
     if most is not None and most < fewest + 1:
-        return f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}"
+        return Infeasible(f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}")
     if fewest >= MOST_CONES:
-        return (
+        return Infeasible(
             f"one pulse turns H by {turn_of(spacecraft, _reach(spacecraft))} at most, so more than {MOST_CONES} half "
             "cones would be needed; rhumb-line takes many small pulses"
         )
-    return (
+    return TooShort(
         f"{fewest} half cones are needed at least, each half a nutation turn long; "
-        f"the horizon of {spacecraft.horizon:.4g} s leaves no time for them"
+        f"the {spacecraft.horizon:.4g} s up to limits.horizon do not suffice for them"
     )
 
 

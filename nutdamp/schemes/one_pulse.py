@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import longest_useful, usable
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
@@ -32,13 +32,13 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
         builder = _steered(spacecraft, torquer)
         if builder.pulses:
             return builder.schedule()
-        raise Infeasible(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
+        raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
     if not trains:
-        raise Infeasible(no_alignment(spacecraft, channels))
+        raise no_alignment(spacecraft, channels)
     best = min(trains, key=_preference)
     return best.schedule()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -95,3 +96,18 @@ def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: 
         plan = planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True))
         assert plan.flown is not None, infeasibility(plan)
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
+
+
+@pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
+@pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
+def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:
+    """What was named covered the pulses that damp the nutation first, and the way to the target had no room."""
+    limits = Limits(horizon=horizon)
+    body = aimed(spinner(120.0, 80.0, 3.0, 5.0, channels=cross(20.0, max_on_time=2.0), limits=limits), 20.0, 45.0)
+    why = infeasibility(planning.plan(body, scheme))
+    found = re.search(r"limits\.horizon = (\S+) s is long enough$", why)
+    assert found is not None, why
+    longer = replace(body, limits=replace(limits, horizon=float(found[1])))
+    assert planning.plan(longer, scheme).feasible
+    named = [float(number) for number in re.findall(r"horizon of (\S+) s", why)]
+    assert all(one == horizon for one in named), why

@@ -286,11 +286,12 @@ class _Search:
         if self.within_reach:
             return (
                 f"pairs of the channels ({names}) acquire the target, but not within on-times, gap, blackout windows "
-                f"and the horizon of {self.windows.horizon:.4g} s"
+                f"and the {self.windows.horizon:.4g} s up to limits.horizon"
             )
         return (
-            f"no two of the channels ({names}) stand the right way, one after the other, within the horizon of "
-            f"{self.windows.horizon:.4g} s; a longer one, a steerable torquer or rhumb-line can help"
+            f"no two of the channels ({names}) push in the right directions, one after the other, in the "
+            f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, a steerable torquer or rhumb-line "
+            "can help"
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
@@ -54,5 +54,7 @@ def damping(here: Spacecraft, scheme: Scheme) -> Schedule:
         if steps > INTEGRATED:
             break
     if best is None:
-        raise Infeasible(f"the nutation is to be taken out first, and {reason}")
+        text = "the nutation is to be taken out first, and"
+        # Its cure, where it has one, is for the damping alone.
+        raise TooShort(f"{text} {reason.why}") if isinstance(reason, TooShort) else Infeasible(f"{text} {reason}")
     return best[1]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import Windows, usable
 from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
@@ -136,7 +136,7 @@ class Train:
             fewest = max(math.ceil(_ratio(self.h * self.way, wide) - 1e-9), 2)
         most = min(len(left), self._most())
         if fewest > most:
-            raise Infeasible(self._too_few(fewest, len(left)))
+            raise self._too_few(fewest, len(left))
         closing = [count for count in range(fewest, most + 1) if left[count - 1] <= CLOSED]
         if not closing:
             best = int(np.argmin(left[fewest - 1 : most])) + fewest
@@ -155,7 +155,7 @@ class Train:
         fewest = self.fewest()
         most = min(self._most(), math.floor(_ratio(self.h * self.way, self.turns_by((1.0 - UNEQUAL) * asked)) + 1e-9))
         if fewest > min(self._most(), len(left)):
-            raise Infeasible(self._too_few(fewest, len(left)))
+            raise self._too_few(fewest, len(left))
         if fewest > most:
             within = f"within {100 * UNEQUAL:.0f} % of {asked:.4g} s"
             raise Infeasible(f"{fewest} pulses {within} turn H too far, and {fewest - 1} not far enough")
@@ -297,16 +297,21 @@ class Train:
             ready = max(free or 0.0, start + 0.25 * self.turn)
         return None
 
-    def _too_few(self, needed: int, moments: int) -> str:
+    def _too_few(self, needed: int, moments: int) -> Infeasible:
+        """That the limits do not leave moments for as many pulses as are needed, or allow too few."""
         most = self.here.limits.max_pulses
         if most is not None and most < needed:
-            return f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
+            return Infeasible(
+                f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
+            )
         if needed <= moments:
-            return "the shortest pulses turn H beyond the target in so many; lower min_on_time, or take two-pulse"
+            return Infeasible(
+                "so many of the shortest pulses turn H beyond the target; lower min_on_time, or take two-pulse"
+            )
         turns = needed / self.options.per_turn * self.turn
-        return (
+        return TooShort(
             f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the limits leave moments for "
-            f"{moments}; a longer horizon, longer pulses or more of them a turn help"
+            f"{moments}; longer pulses or more of them a turn help, or a longer horizon"
         )
 
     def _in_phase(self, fewest: int, most: int, left: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import longest_useful
 from nutdamp.schedule import Pulse
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
@@ -48,37 +49,38 @@ def no_target() -> str:
     return "needs a target axis: --target, or goal in the file"
 
 
-def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> str:
-    """No channel can be fired against ω within the limits; names the cure."""
+def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
+    """That no channel can be fired against ω within the limits, with the cure."""
     omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     if spacecraft.inertia.a == 0.0:
         off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
         nearest = min(off, key=lambda name: off[name])
-        return (
-            "in a sphere (a = 0) ω stands still in the body, so waiting brings no channel to oppose it; "
+        return Infeasible(
+            "in a sphere (a = 0) ω does not turn in the body, so waiting brings no channel to oppose it; "
             f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
     pulses = [builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period)) for channel in channels]
     there = [pulse for pulse in pulses if pulse is not None]
     if not there:
-        return "no channel ever opposes the nutation" + (
-            ": dissipation brings the body into flat spin before, where ω stands still in it" if builder.growing else ""
-        )
+        flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
+        return Infeasible(f"no channel ever opposes the nutation{flat * builder.growing}")
     by_name = {channel.name: channel for channel in channels}
     ends = [_end(builder, by_name[pulse.channel], pulse) for pulse in there if builder.helps(pulse)]
     if not ends:
         best = min(there, key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
-            return f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
-        return (
+            return Infeasible(
+                f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
+            )
+        return Infeasible(
             f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} of nutation, and "
             f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
         )
-    return (
-        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s; "
-        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that"
+    return TooShort(
+        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
+        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
     )
 
 

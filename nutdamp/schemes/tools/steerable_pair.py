@@ -211,7 +211,7 @@ class SteerablePair:
             once = 2.0 * torque / spin
             axes = self.axes(self.moments()[:SAMPLES])
             if len(axes) == 0:
-                return f"there is no time between limits.earliest and the horizon of {horizon:.4g} s"
+                return "no time is left between limits.earliest and limits.horizon"
             if cones == 1:
                 sizes = pointing.two_jumps(self.A, self.h, self.momentum, axes, self.target)
                 needed = float(np.maximum(sizes.first, sizes.second).min())
@@ -225,8 +225,8 @@ class SteerablePair:
                     "cones or rhumb-line take less"
                 )
         return (
-            f"the pulses of {cones} half cone{'s' if cones > 1 else ''} find no room within the horizon of "
-            f"{horizon:.4g} s, the gap and the blackout windows"
+            f"the pulses of {cones} half cone{'s' if cones > 1 else ''} find no room within the {horizon:.4g} s up to "
+            "limits.horizon, the gap and the blackout windows"
         )
 
 
