@@ -9,33 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nutdamp import errors
     from nutdamp.errors import NutdampError
-    from nutdamp.library import (
-        Comparison,
-        Dispersion,
-        Flight,
-        FourPulseOptions,
-        HalfConeOptions,
-        OptimalOptions,
-        Options,
-        Plan,
-        Residual,
-        RhumbLineOptions,
-        Spacecraft,
-        Track,
-        Trade,
-        TwoPulseOptions,
-        Verified,
-        compare,
-        disperse,
-        example,
-        export,
-        load,
-        load_schedule,
-        plan,
-        read,
-        trade,
-        verify,
-    )
+    from nutdamp.library import *
 
 __all__ = [
     "Comparison",
@@ -47,6 +21,7 @@ __all__ = [
     "OptimalOptions",
     "Options",
     "Plan",
+    "Report",
     "Residual",
     "RhumbLineOptions",
     "Spacecraft",
@@ -64,6 +39,7 @@ __all__ = [
     "load_schedule",
     "plan",
     "read",
+    "report",
     "trade",
     "verify",
 ]

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral, Real
 from os import PathLike, fspath
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from nutdamp import schemes
+import numpy as np
+
 from nutdamp.errors import BadRequest
-from nutdamp.schemes import Choice, Options, SchemeOptions
-from nutdamp.schemes.options import is_count, is_number, shown
+from nutdamp.units import LARGEST
 
 Kind = TypeVar("Kind")
+Record = TypeVar("Record", bound=Any)
 
 
 def instance(name: str, value: object, kind: type[Kind], expected: str) -> Kind:
@@ -37,24 +41,6 @@ def changes(value: Any) -> Mapping[str, object]:
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return value
     raise BadRequest(f"set: expected a mapping such as {{'limits.horizon': '300 s'}}, got {shown(value)}")
-
-
-def scheme_names(values: Iterable[str]) -> tuple[str, ...]:
-    """Names of schemes that there are; raises BadRequest."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise BadRequest(f"names: expected a list of schemes, such as ['two-pulse'], got {shown(values)}")
-    names = tuple(values)
-    for name in names:
-        if not isinstance(name, str) or name not in schemes.NAMES:
-            raise BadRequest(f"there is no scheme {shown(name)}; there are {', '.join(schemes.NAMES)}")
-    return names
-
-
-def options(value: Choice) -> Choice:
-    """The options of one scheme or several; raises BadRequest for what is none."""
-    if value is None or isinstance(value, Options | SchemeOptions):
-        return value
-    raise BadRequest(f"options: expected nutdamp.Options(…), got {shown(value)}")
 
 
 def end_of_flight(value: Any) -> float:
@@ -91,3 +77,59 @@ def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
     if isinstance(value, str) and value in names:
         return value
     raise BadRequest(f"{name} = {shown(value)}: expected one of {', '.join(names)}")
+
+
+def is_number(value: Any) -> bool:
+    """Whether Python or numpy would call it a real number, of sensible size."""
+    return issubclass(type(value), Real) and type(value) is not bool and abs(value) <= LARGEST
+
+
+def is_count(value: Any) -> bool:
+    """Whether it is a whole number of at least 1."""
+    return issubclass(type(value), Integral) and type(value) is not bool and value >= 1
+
+
+def shown(value: object) -> str:
+    """A value as a message names it: what is short as it is, anything else by its type."""
+    text = repr(value) if isinstance(value, str | Real | None) else ""
+    kind = type(value)
+    return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
+
+
+def replaced(value: Record, fields: Mapping[str, object]) -> Record:
+    """A dataclass with some of its fields replaced, looked at by their types; raises BadRequest."""
+    kinds = get_type_hints(type(value))
+    known = [field.name for field in dataclasses.fields(value) if field.init]
+    made: dict[str, Any] = {}
+    for name, one in fields.items():
+        if name not in known:
+            raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(known)}")
+        kind = kinds[name]
+        if not _fits(one, kind):
+            raise BadRequest(f"{name}: expected {_described(kind)}, got {shown(one)}")
+        made[name] = np.array(one, dtype=float) if get_origin(kind) is np.ndarray else one
+    return dataclasses.replace(value, **made)
+
+
+def _fits(value: object, kind: Any) -> bool:
+    """Whether a value is of a kind that a type hint names; an array is three numbers."""
+    parts = get_args(kind)
+    if get_origin(kind) is UnionType:
+        return any(_fits(value, part) for part in parts)
+    if get_origin(kind) is np.ndarray:
+        return isinstance(value, Sequence | np.ndarray) and len(value) == 3 and all(map(is_number, value))
+    if get_origin(kind) is tuple:
+        return isinstance(value, tuple) and all(_fits(one, parts[0]) for one in value)
+    return is_number(value) if kind is float else isinstance(value, kind)
+
+
+def _described(kind: Any) -> str:
+    """A kind that a type hint names, in words."""
+    parts = get_args(kind)
+    if get_origin(kind) is UnionType:
+        return " or ".join(_described(part) for part in parts)
+    if get_origin(kind) is np.ndarray:
+        return "three numbers"
+    if get_origin(kind) is tuple:
+        return f"a tuple of {parts[0].__name__}"
+    return {float: "a number", str: "a text", type(None): "None"}.get(kind) or f"a {kind.__name__}"

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,15 @@ from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.rigid import Forcing
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
-from nutdamp.track import PIECE, Track, even_times, make_track, widest
+from nutdamp.track import PIECE, Track, even_times, in_file_axes, make_track, widest
+from nutdamp.views import Tabled, figure, write_csv
+
+if TYPE_CHECKING:
+    from nutdamp.views import Figure
+
+IMPULSE_SUM = "impulse sum (17)"
+REAL_WIDTHS = "real pulse widths"
+"""The two models by which a schedule is flown."""
 
 PLANNED_STEPS = 30_000
 """Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
@@ -34,7 +44,8 @@ class Residual:
 
     ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
     (signed) are those of that instant, so that they add up to it.
-    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis.
+    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis; ``model`` by
+    which it was found, which does not count where two are compared.
     """
 
     nutation: float
@@ -42,6 +53,7 @@ class Residual:
     space_cone: float
     momentum_shift: float
     axis_error: float
+    model: str = field(default=REAL_WIDTHS, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +89,13 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 """Times (n,) s, rates (n, 3) rad/s, quaternions (n, 4) and pulses completed (n,)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Flight:
-    """A schedule flown: its legs in order, and the motion as the last pulse ends.
+@dataclass(frozen=True, eq=False, repr=False)
+class Flight(Tabled):
+    """A schedule flown by one ``model``: its legs in order, and the motion as the last pulse ends.
 
     ``moments`` are those flown with; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
-    the times (s) between which each pulse acts, its centre twice in the impulse sum.
+    the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
+    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse.
     """
 
     spacecraft: Spacecraft
@@ -91,6 +104,9 @@ class Flight:
     settled: SpinState
     moments: tuple[float, float, float]
     spans: tuple[tuple[float, float], ...]
+    model: str = REAL_WIDTHS
+    until: float | None = None
+    samples: int = 1000
 
     @property
     def steps(self) -> int:
@@ -108,7 +124,7 @@ class Flight:
         shift = float(attitude.angle_between(before, after))
         left = arc_cones(self.moments, self.settled.rates, self._sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
-        return Residual(left.nutation, left.body, left.space, shift, error)
+        return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 
     @property
     def final(self) -> Final:
@@ -132,7 +148,28 @@ class Flight:
             body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
         return body, quaternion
 
-    def track(self, samples: int, until: float) -> Track:
+    @property
+    def shown_to(self) -> float:
+        """End of the rows, s."""
+        return self.legs[-1].end if self.until is None else self.until
+
+    @property
+    def track(self) -> Track:
+        """The rows as arrays: SI and rad, body rates and quaternion in the axes of the file."""
+        return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
+
+    def figure(self, name: str = "overview") -> Figure:
+        """A matplotlib figure: ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``.
+
+        Raises BadRequest for other names, MissingExtra without matplotlib.
+        """
+        return figure(self, name)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the rows as ``simulate --csv`` does; raises CannotWrite."""
+        write_csv(self, path)
+
+    def sampled(self, samples: int, until: float) -> Track:
         """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
 
         The flight must have been made to reach ``until``.
@@ -140,7 +177,7 @@ class Flight:
         return self._joined(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
-        """The rows of `track` in order, about `track.PIECE` at a time, so that many of them take no more memory."""
+        """The rows of `sampled` in order, about `track.PIECE` at a time, so that many of them take no more memory."""
         motions: list[Motion] = []
         count = 0
         for motion in self._motions(samples, until):
@@ -265,7 +302,8 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     last = max(until, schedule.end)
     path, _ = dynamics.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
-    return Flight(spacecraft, schedule, tuple(legs), state, dynamics.moments, tuple((one.t, one.t) for one in schedule))
+    spans = tuple((one.t, one.t) for one in schedule)
+    return Flight(spacecraft, schedule, tuple(legs), state, dynamics.moments, spans, IMPULSE_SUM)
 
 
 def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:

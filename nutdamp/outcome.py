@@ -39,7 +39,7 @@ class Deviation(NamedTuple):
 
 
 def seen_at(flight: Flight, time: float) -> Flight:
-    """The flight as it has come by ``time`` s, which it must reach: `Flight.residual` and `Flight.final` are of then.
+    """The flight as it has come by ``time`` s, which it must reach: residual, final state and rows end there.
 
     Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
     """
@@ -52,6 +52,7 @@ def seen_at(flight: Flight, time: float) -> Flight:
         schedule=Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
         settled=SpinState(complex(first, second), third, quaternion[0]),
         spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
+        until=time,
     )
 
 

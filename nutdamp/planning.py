@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
+from typing import Any
 
-from nutdamp import compliance, flight, schemes
+from nutdamp import arguments, compliance, flight, schemes, views
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
 from nutdamp.hindrance import Hindrance
 from nutdamp.limits import Breach, breaches
-from nutdamp.outcome import left_by
+from nutdamp.outcome import left_by, seen_at
 from nutdamp.recommendation import Recommendation, Standing, recommend
 from nutdamp.rounding import cleaned_change
 from nutdamp.schedule import Schedule
@@ -26,14 +28,14 @@ BUG = "internal error, please report"
 """Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(views.Tabled):
     """A scheme's schedule for a spacecraft, and how it was judged.
 
     Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the
     nutation (rad) that this would leave where that is ``worse`` than without pulses. `nutdamp.remarks` has the
     words of all three.
-    ``failure``: the exception of a scheme that has a bug.
+    ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
     """
 
     spacecraft: Spacecraft
@@ -44,6 +46,7 @@ class Plan:
     failure: Exception | None = None
     breach: Breach | None = None
     worse: float | None = None
+    from_file: bool = False
 
     @property
     def feasible(self) -> bool:
@@ -54,6 +57,56 @@ class Plan:
     def pulses(self) -> Schedule:
         """The schedule; empty where the plan is infeasible."""
         return Schedule() if self.schedule is None else self.schedule
+
+    @property
+    def why(self) -> str | None:
+        """Why there is no schedule; None where there is one."""
+        return None if self.feasible else views.reason(self)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader should know of it."""
+        return views.sentences(self)
+
+    @property
+    def total_impulse(self) -> float:
+        """Σ |J| in N m s."""
+        return self.pulses.total_impulse
+
+    @property
+    def propellant(self) -> float | None:
+        """kg; None where one pulse's is not known."""
+        return self.pulses.propellant
+
+    @property
+    def end(self) -> float:
+        """End of the last pulse, s."""
+        return self.pulses.end
+
+    def __len__(self) -> int:
+        return len(self.pulses)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the pulses as ``plan --csv`` does; raises CannotWrite, and Infeasible where there is no schedule."""
+        views.write_csv(self, path)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``plan --json`` says of it."""
+        return views.data(self)
+
+    def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
+        """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
+
+        Default end: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows
+        just before and after each pulse. Raises Infeasible where there is no schedule, BadRequest where no track can
+        be made.
+        """
+        if self.schedule is None:
+            raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
+        end = arguments.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
+        count = arguments.rows(samples)
+        fly = flight.by_impulses if by_impulses else flight.flown
+        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count)
 
     @cached_property
     def residual(self) -> Residual | None:
@@ -216,20 +269,52 @@ def _helps(judged: Plan, left: Residual) -> bool:
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
-    """The schedule as it would be with commands of any resolution; None where there is no tick, or no such schedule."""
+    """The schedule as it would be with commands of any resolution.
+
+    None where there is no tick, no such schedule, or no scheme that planned it.
+    """
     body = plan_.spacecraft
-    if body.limits.tick is None:
+    if body.limits.tick is None or plan_.from_file:
         return None
     smooth = plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options)
     return smooth.schedule
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Several plans for one spacecraft, and which of them is recommended on what ground."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(views.Shown):
+    """Several plans for one spacecraft, and which of them is recommended on what ground.
+
+    ``comparison["two-pulse"]`` is one of them, iterating gives all.
+    """
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
+
+    def __len__(self) -> int:
+        return len(self.plans)
+
+    def __iter__(self) -> Iterator[Plan]:
+        return iter(self.plans)
+
+    def __getitem__(self, scheme: str) -> Plan:
+        for one in self.plans:
+            if one.scheme == scheme:
+                return one
+        raise KeyError(scheme)
+
+    @property
+    def reason(self) -> str:
+        """Why the recommended one."""
+        return views.reason(self)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the recommended plan does not reach, and what stands in the way."""
+        return views.sentences(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``plan --json`` gives."""
+        return views.data(self)
 
     @cached_property
     def recommendation(self) -> Recommendation[Plan]:

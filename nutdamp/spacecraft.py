@@ -7,16 +7,20 @@ leads back to the axes of the file, which is where vectors and quaternions are s
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import arguments, views
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
 from nutdamp.epoch import DIGITS, Epoch
+from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
@@ -181,13 +185,20 @@ class SpinState:
         return np.array([self.omega.real, self.omega.imag, self.spin])
 
 
-@dataclass(frozen=True, eq=False)
-class Spacecraft:
+class Source(Protocol):
+    """What a spacecraft was read from."""
+
+    def changed(self, keys: Mapping[str, object]) -> Spacecraft:
+        """The spacecraft with keys of its file changed; raises FaultyFile or BadRequest."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Spacecraft(views.Shown):
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
     which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off;
-    ``object_id`` names it in messages.
+    ``object_id`` names it in messages; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -204,6 +215,34 @@ class Spacecraft:
     goal: Goal = field(default_factory=Goal)
     dispersions: Dispersions | None = None
     object_id: str | None = None
+    source: Source | None = field(default=None, init=False)
+
+    def with_(self, **keys: object) -> Spacecraft:
+        """The spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
+
+        Of a mapping only the keys that are in it change, so that the other limits keep their values; entries of a list
+        are named by their ``name``: ``thrusters={"T1": {"force": "12 N"}}``. All is checked as the file is. Raises
+        FaultyFile with everything wrong, BadRequest for what no file can hold or where no file was read.
+        """
+        if self.source is None:
+            raise BadRequest("with_: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+        return self.source.changed(keys)
+
+    def replace(self, **fields: object) -> Spacecraft:
+        """The spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
+
+        Only names and types are checked; `with_` checks all that a file is checked for. Raises BadRequest.
+        """
+        return arguments.replaced(self, fields)
+
+    @property
+    def rates(self) -> Vector:
+        """Body rates at t = 0, (3,) rad/s, in the axes of the file."""
+        return self.inertia.in_file(self.omega0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the JSON files say of it."""
+        return views.data(self)
 
     @property
     def growth(self) -> float:

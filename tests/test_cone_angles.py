@@ -67,7 +67,7 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
     for fly in (flight.flown, flight.by_impulses):
         made = fly(body, Schedule(), until)
         left = residual_json(made.residual)
-        track = made.track(2000, until)
+        track = made.sampled(2000, until)
         assert track.nutation[0] == pytest.approx(now, rel=1e-9)
         assert math.degrees(track.nutation.max()) == pytest.approx(said["nutation_deg"], rel=1e-4)
         for key in ("nutation_deg", "body_cone_deg", "space_cone_deg"):

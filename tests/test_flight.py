@@ -113,7 +113,7 @@ def test_start_is_the_attitude_of_the_file_or_else_frame_n() -> None:
 def test_frame_n_has_z_along_h_for_three_different_moments_too(spin: float) -> None:
     """The frame is laid by the true H, not by that of the equivalent symmetric body (0.45° off)."""
     spacecraft = spinner(moments=(120.0, 100.0, 80.0), spin=spin, degrees=5.0)
-    start = flight.flown(spacecraft, Schedule(), 1.0).track(2, 1.0)
+    start = flight.flown(spacecraft, Schedule(), 1.0).sampled(2, 1.0)
     h = start.momentum[0] / np.linalg.norm(start.momentum[0])
     assert h == pytest.approx([0, 0, 1], abs=4 * EPS)
     assert start.axis[0, 1] == pytest.approx(0.0, abs=4 * EPS)
@@ -136,7 +136,7 @@ def test_start_turns_from_principal_axes_through_those_of_the_file() -> None:
 @settings(max_examples=30)
 @given(symmetric_spinners() | triaxial_spinners())
 def test_momentum_and_energy_stay_on_arcs(spacecraft: Spacecraft) -> None:
-    track = flight.flown(spacecraft, Schedule(), 50.0).track(40, 50.0)
+    track = flight.flown(spacecraft, Schedule(), 50.0).sampled(40, 50.0)
     first = track.momentum[0]
     # About two roundings in each of the hundred-odd steps of the integration; exact arcs take one.
     assert track.momentum == pytest.approx(np.tile(first, (40, 1)), abs=1000 * EPS * float(np.linalg.norm(first)))
@@ -377,7 +377,7 @@ WIDE = Schedule(
 @pytest.mark.parametrize("fly", [flight.by_impulses, flight.flown])
 @pytest.mark.parametrize("samples", [1, 2, 11, 1000])
 def test_track_goes_from_zero_to_until_in_order(fly: object, samples: int) -> None:
-    track = fly(spinner(), WIDE, 10.0).track(samples, 10.0)  # type: ignore[operator]
+    track = fly(spinner(), WIDE, 10.0).sampled(samples, 10.0)  # type: ignore[operator]
     assert track.t[0] == 0.0
     assert track.t[-1] == 10.0
     assert np.all(np.diff(track.t) >= 0.0)
@@ -388,7 +388,7 @@ def test_track_goes_from_zero_to_until_in_order(fly: object, samples: int) -> No
 
 
 def test_track_by_impulses_has_a_row_before_and_after_each_pulse() -> None:
-    track = flight.by_impulses(spinner(), WIDE, 10.0).track(3, 10.0)
+    track = flight.by_impulses(spinner(), WIDE, 10.0).sampled(3, 10.0)
     for number, one in enumerate(WIDE):
         at = np.flatnonzero(track.t == one.t)
         assert track.pulse[at].tolist() == [number, number + 1]
@@ -399,7 +399,7 @@ def test_track_by_impulses_has_a_row_before_and_after_each_pulse() -> None:
 
 
 def test_flown_track_has_a_row_as_each_pulse_begins_and_ends() -> None:
-    track = flight.flown(spinner(), WIDE, 10.0).track(3, 10.0)
+    track = flight.flown(spinner(), WIDE, 10.0).sampled(3, 10.0)
     for number, one in enumerate(WIDE):
         assert number in track.pulse[track.t == one.start]
         assert one.end in track.t
@@ -411,7 +411,7 @@ def test_flown_track_has_a_row_as_each_pulse_begins_and_ends() -> None:
 def test_pulses_completed_by_the_end_of_the_last_one_are_all() -> None:
     """The row at the end of a pulse counts it as completed."""
     made = Schedule(WIDE.pulses[:2])
-    track = flight.flown(spinner(), made, made.end).track(3, made.end)
+    track = flight.flown(spinner(), made, made.end).sampled(3, made.end)
     for number, one in enumerate(made, start=1):
         assert track.pulse[track.t == one.end].max() == number
 
@@ -420,7 +420,7 @@ def test_pulses_completed_by_the_end_of_the_last_one_are_all() -> None:
 def test_ideal_impulse_at_zero_has_the_motion_before_it_too(fly: object) -> None:
     made = Schedule((pulse(0.0, 0.0, np.array([6.0, 0.0, 0.0])),))
     spacecraft = spinner()
-    track = fly(spacecraft, made, 5.0).track(5, 5.0)  # type: ignore[operator]
+    track = fly(spacecraft, made, 5.0).sampled(5, 5.0)  # type: ignore[operator]
     assert track.t[:2].tolist() == [0.0, 0.0]
     assert track.pulse[:3].tolist() == [0, 1, 1]
     assert np.array_equal(track.rates[0], spacecraft.omega0)
@@ -441,13 +441,13 @@ def test_motion_around_pulses(fly: object) -> None:
 
 def test_flight_without_pulses_has_a_track_and_no_rows_around_pulses() -> None:
     flown = flight.flown(spinner(), Schedule(), 7.0)
-    assert np.array_equal(flown.track(8, 7.0).t, np.linspace(0.0, 7.0, 8))
+    assert np.array_equal(flown.sampled(8, 7.0).t, np.linspace(0.0, 7.0, 8))
     before, after = flown.around_pulses()
     assert len(before.t) == len(after.t) == 0
 
 
 def test_cone_angles_of_the_track_are_those_of_its_rates() -> None:
-    track = flight.flown(spinner(), WIDE, 10.0).track(50, 10.0)
+    track = flight.flown(spinner(), WIDE, 10.0).sampled(50, 10.0)
     omega = np.hypot(track.rates[:, 0], track.rates[:, 1])
     assert track.nutation == pytest.approx(cones.nutation_angle(120.0, 80.0, omega, track.rates[:, 2]), abs=4 * EPS)
     assert track.body_cone == pytest.approx(cones.body_cone(omega, track.rates[:, 2]), abs=4 * EPS)

@@ -22,7 +22,7 @@ from process import Run
 from scipy.spatial.transform import Rotation
 
 import nutdamp
-from nutdamp import errors, planning
+from nutdamp import errors, flight, planning, spacecraft
 from nutdamp.files import pulses_csv, track_csv
 from nutdamp.schemes.options import OptimalOptions
 
@@ -149,6 +149,42 @@ def test_with_changes_the_keys_named_and_no_others(craft: nutdamp.Spacecraft, tm
         assert more.core.steerable.isp == 200.0
     compared = nutdamp.compare(held, ["two-pulse"])
     assert compared["two-pulse"].spacecraft.with_(mass=3).core.mass == 3.0
+
+
+def test_there_is_one_type_of_each_name(craft: nutdamp.Spacecraft) -> None:
+    """What the library gives is what the modules below make, not something around it."""
+    compared = nutdamp.compare(craft, ["two-pulse"])
+    (plan,) = compared.plans
+    for made, kind in (
+        (craft, spacecraft.Spacecraft),
+        (plan, planning.Plan),
+        (compared, planning.Comparison),
+        (plan.fly(), flight.Flight),
+    ):
+        assert type(made) is kind is getattr(nutdamp, kind.__name__)
+    assert plan.spacecraft is craft
+    assert plan.fly().spacecraft is craft
+    assert planning.plan(craft, "two-pulse").to_dict() == plan.to_dict()
+
+
+def test_every_residual_carries_the_name_of_its_model(craft: nutdamp.Spacecraft) -> None:
+    plan = nutdamp.plan(craft, "two-pulse")
+    assert plan.residual is not None
+    assert plan.flown is not None
+    assert plan.residual.model == plan.fly(by_impulses=True).residual.model == "impulse sum (17)"
+    assert plan.flown.model == plan.fly().residual.model == "real pulse widths"
+    assert plan.fly(by_impulses=True).residual.nutation == pytest.approx(plan.residual.nutation, abs=1e-12)
+    assert plan.fly().residual.nutation == pytest.approx(plan.flown.nutation, abs=1e-12)
+
+
+def test_fields_are_replaced_in_si(craft: nutdamp.Spacecraft) -> None:
+    lighter = craft.replace(mass=np.float64(200.0), omega0=[0.1, 0.0, 3])
+    assert (lighter.mass, lighter.name, lighter.rates.tolist()) == (200.0, craft.name, [0.1, 0.0, 3.0])
+    assert nutdamp.plan(lighter, "two-pulse").feasible
+    assert craft.mass != 200.0
+    # It is no longer what its file says.
+    assert craft.source is not None
+    assert lighter.source is None
 
 
 def test_with_is_checked_as_the_file_is(craft: nutdamp.Spacecraft) -> None:
@@ -307,9 +343,9 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
         lambda *_: nutdamp.plan("spacecraft.yaml", "two-pulse"),  # type: ignore[arg-type]
         "spacecraft: expected a Spacecraft, as nutdamp.load gives it, got 'spacecraft.yaml'",
     ),
-    "a core as spacecraft": (
-        lambda craft, _: nutdamp.compare(craft.core),
-        "expected a Spacecraft, as nutdamp.load gives it, got a nutdamp.spacecraft.Spacecraft",
+    "a plan as spacecraft": (
+        lambda _, plan: nutdamp.compare(plan),
+        "expected a Spacecraft, as nutdamp.load gives it, got a nutdamp.planning.Plan",
     ),
     "a mapping as text": (
         lambda *_: nutdamp.read({"name": "X"}),  # type: ignore[arg-type]
@@ -331,9 +367,21 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
     ),
     "a number as key": (lambda craft, _: craft.with_(limits={3: 4}), "with_ limits: expected the name of a key, got 3"),
     "a spacecraft without a file": (
-        lambda craft, _: nutdamp.Spacecraft(craft.core).with_(mass=3),
+        lambda craft, _: craft.replace(mass=3).with_(name="X"),
         "with_: expected a spacecraft from nutdamp.load, read or example",
     ),
+    "a text as mass": (lambda craft, _: craft.replace(mass="3 kg"), "mass: expected a number or None, got '3 kg'"),
+    "two rates": (lambda craft, _: craft.replace(omega0=(0.1, 3.0)), "omega0: expected three numbers, got a tuple"),
+    "names as channels": (
+        lambda craft, _: craft.replace(channels=("+M1",)),
+        "channels: expected a tuple of Channel, got a tuple",
+    ),
+    "an unknown field": (lambda craft, _: craft.replace(weight=3), "replace: there is no 'weight'; there are name"),
+    "a plan to report": (
+        lambda _, plan: nutdamp.report(plan),
+        "path: expected the name of a file or a dict of its keys, got a nutdamp.planning.Plan",
+    ),
+    "another ending": (lambda craft, _: nutdamp.report(craft, "page.txt"), "page.txt: the ending says the format"),
     "a number to change": (
         lambda *_: nutdamp.load("x", set={3: 4}),  # type: ignore[dict-item]
         "set: expected a mapping such as {'limits.horizon': '300 s'}, got a dict",
@@ -441,6 +489,44 @@ def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
         texts = [(tmp_path / one).read_text() for one in (name, f"command-{name}")]
         mine, its = (re.sub(r"(CREATION_DATE|MESSAGE_ID)( *= *|>)[^<\n]*", r"\1", text) for text in texts)
         assert mine == its
+
+
+def test_a_report_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(TILTED)
+    chosen = ("--scheme", "two-pulse", "--set", "limits.horizon=100 s")
+    assert run("report", "own.yaml", *chosen, "-o", "command.md").returncode == 0
+    craft = nutdamp.load(tmp_path / "own.yaml", set={"limits.horizon": "100 s"})
+    made = nutdamp.report(craft, tmp_path / "own.md", ["two-pulse"])
+    mine, its = ((tmp_path / name).read_text() for name in ("own.md", "command.md"))
+    assert made.content == mine
+    assert made.good
+    assert made.verdict.startswith("Recommended: two-pulse")
+    assert made.comparison["two-pulse"].feasible
+    mine, its = (re.sub(r"(?m)^nutdamp.*report.*|^<details><summary>Input file .*", "", text) for text in (mine, its))
+    assert mine.replace("```python", "```console") == its
+    again = nutdamp.report({**KEYS, "limits": {"horizon": "100 s"}}, tmp_path / "dict.html", ["two-pulse"])
+    assert again.verdict == made.verdict
+    assert str(again.content).startswith("<!DOCTYPE html>")
+
+
+def test_a_report_of_replaced_fields_names_no_file(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
+    nutdamp.report(craft.replace(name="Other"), tmp_path / "own.md", ["two-pulse"])
+    text = (tmp_path / "own.md").read_text()
+    assert text.startswith("# Other: damping")
+    assert "Input file" not in text
+    assert f"nutdamp.report(spacecraft, {str(tmp_path / 'own.md')!r}, ['two-pulse'])" in text
+
+
+def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
+    craft = nutdamp.load(dispersed / "spacecraft.yaml")
+    options = nutdamp.Options(on_time=0.2)
+    made = nutdamp.report(craft, dispersed / "own.md", options=options, disperse=200, seed=3)
+    called = ", options=nutdamp.Options(on_time=0.2), disperse=200, seed=3)"
+    assert called in (dispersed / "own.md").read_text()
+    assert made.dispersed is not None
+    assert made.comparison.recommended is not None
+    assert made.dispersed.met_fraction == nutdamp.disperse(made.comparison.recommended, 200, seed=3).met_fraction
+    assert "with dispersions (200 cases)" in made.verdict
 
 
 def test_tables_become_data_frames(craft: nutdamp.Spacecraft, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,14 +68,14 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         (found,) = survey.consequences(body)
         assert found.tilt is not None
         assert found.beat is not None
-        swollen = flight.flown(body, Schedule(), found.beat_period).track(401, found.beat_period).nutation
+        swollen = flight.flown(body, Schedule(), found.beat_period).sampled(401, found.beat_period).nutation
         assert swollen.max() == pytest.approx(found.beat, rel=1e-4)
         assert swollen[-1] < 1e-12
         inertia = body.inertia
         steady = forced.steady_response(inertia.A, inertia.C, 3.0, disturbance.transverse, disturbance.rate)
         assert found.precession == pytest.approx(abs(steady), rel=1e-12)
         kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
-        angles = flight.flown(kept, Schedule(), 10.0).track(50, 10.0).nutation
+        angles = flight.flown(kept, Schedule(), 10.0).sampled(50, 10.0).nutation
         assert np.abs(angles - found.tilt).max() < 1e-12
 
 
@@ -94,7 +94,7 @@ def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_told() -> None:
     assert found.tilt is None
     mark, time = found.resonant[0]
     assert mark == pytest.approx(math.radians(10.0))
-    assert flight.flown(body, Schedule(), time).track(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
+    assert flight.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
 
 
 def test_the_nearest_pair_is_the_least_off_the_turn_between_halves() -> None:

@@ -78,7 +78,7 @@ def test_farthest_and_nearest_to_h_at_the_start_with_their_times() -> None:
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     spacecraft = spinner(spin=spin, degrees=12.0)
     until = spacecraft.inertial_period
-    found = track.extremes([flight.flown(spacecraft, Schedule(), until).track(4001, until)])
+    found = track.extremes([flight.flown(spacecraft, Schedule(), until).sampled(4001, until)])
     assert degrees(found.x) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
     assert degrees(found.y) == pytest.approx([-12, 12], abs=1e-4)
     assert math.degrees(found.farthest[0]) == pytest.approx(12.0, abs=1e-12)
@@ -95,7 +95,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     place: Vector = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     there = spinner(degrees=12.0, attitude=Attitude(attitude.from_matrix(place @ in_n)))
     until = spacecraft.inertial_period
-    found = track.extremes([flight.flown(there, Schedule(), until).track(4001, until)])
+    found = track.extremes([flight.flown(there, Schedule(), until).sampled(4001, until)])
     assert degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
     west, east = degrees(found.right_ascension)
     assert [west, east] == pytest.approx([(right_ascension - 12) % 360, (right_ascension - 12) % 360 + 24], abs=1e-4)
@@ -103,7 +103,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
 
 def test_track_has_axis_and_momentum_in_the_inertial_frame() -> None:
     spacecraft = spinner(spin=-3.0, degrees=20.0)
-    rows = flight.flown(spacecraft, Schedule(), 10.0).track(20, 10.0)
+    rows = flight.flown(spacecraft, Schedule(), 10.0).sampled(20, 10.0)
     moments = np.array(spacecraft.inertia.moments)
     for quaternion, rates, axis, h in zip(rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True):
         rotation = attitude.matrix(quaternion)

@@ -48,7 +48,7 @@ def test_even_times_are_those_of_linspace(samples: int, first: float, second: fl
 @pytest.mark.parametrize("samples", [1, 2, 50, 333])
 def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = flown()
-    whole = made.track(samples, UNTIL)
+    whole = made.sampled(samples, UNTIL)
     for module in (track, flight):
         monkeypatch.setattr(module, "PIECE", FEW)
     pieces = list(made.pieces(samples, UNTIL))
@@ -65,7 +65,7 @@ def test_extremes_of_pieces_are_those_of_the_whole() -> None:
     generator = np.random.default_rng(4)
     made = flown()
     for count in (1, 5, 40, 500):
-        whole = made.track(count, UNTIL)
+        whole = made.sampled(count, UNTIL)
         found = track.extremes([whole])
         cuts = np.sort(generator.integers(0, len(whole.t), 3))
         parts = [
@@ -98,7 +98,7 @@ def test_the_first_of_equal_extremes_counts_across_pieces() -> None:
 
 def test_a_track_is_written_as_it_was_by_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     made = flown()
-    whole = made.track(100, UNTIL)
+    whole = made.sampled(100, UNTIL)
     monkeypatch.setattr(track, "PIECE", FEW)
     stream = io.BytesIO()
     write_track(stream, track.in_pieces(whole), made.spacecraft.inertia)

@@ -13,7 +13,7 @@ from nutdamp.cli.parameters import FILE
 from nutdamp.cli.scheme_options import Aim, expect_read
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
-from nutdamp.schemes import Options
+from nutdamp.schemes import Options, SchemeOptions
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -172,18 +172,18 @@ def plan_or_read(
     """
     from nutdamp import planning
     from nutdamp.cli.progress import working
-    from nutdamp.errors import Infeasible, printable
-    from nutdamp.remarks import broken_limits, infeasibility
+    from nutdamp.errors import Infeasible
+    from nutdamp.remarks import infeasibility
     from nutdamp.remarks import remarks as sentences
 
     expect_read(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
     if schedule is not None:
-        from nutdamp.files.schedule_file import read_pulses
+        from nutdamp.files.schedule_file import read_plan
 
-        pulses, warnings = read_pulses(schedule, body)
-        for warning in (*warnings, *broken_limits(body, pulses)):
+        read, warnings = read_plan(schedule, body, options.of(SchemeOptions))
+        for warning in warnings:
             remark(f"warning: {warning}")
-        return planning.Plan(body, printable(schedule), pulses)
+        return read
     with working("planning", quiet=quiet):
         if scheme:
             plan: Plan | None = planning.plan(body, scheme, options)

@@ -85,7 +85,7 @@ def command(
     """
     from nutdamp.presentation.page.formats import form_of
 
-    form = form_of(output)
+    form_of(output)
     expect_outputs(spacecraft, output=output)
     expect_impulses(impulses, force, disperse is not None, "--disperse")
     remark = remarks(quiet)
@@ -93,8 +93,9 @@ def command(
 
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.files.yaml_tree import dotted
+    from nutdamp.library.reports import made_of
     from nutdamp.planning import compare, usual
-    from nutdamp.presentation.page.content import Repeat, report_page
+    from nutdamp.presentation.page.content import Repeat
 
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
@@ -111,11 +112,10 @@ def command(
     if chosen is not None and disperse is not None:
         dispersed, note = _dispersed(chosen, disperse, impulses=impulses, force=force, quiet=quiet)
     with working("writing the page", quiet=quiet):
-        page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed, note=note)
-        content = form.write(page, output)
-    deliver([(output, content)])
-    if not page.good:
-        remark(page.verdict)
+        made = made_of(compared, repeat, output, dispersed, note)
+    deliver([(output, made.content)])
+    if not made.good:
+        remark(made.verdict)
     if output != "-":
         remark(f"wrote {output}")
     if show_failures(compared):

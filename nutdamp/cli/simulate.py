@@ -99,7 +99,7 @@ def command(
     impulses, flown = ends = tuple(seen_at(one, end) for one in flights)
     moving, chosen = flights[real], ends[real]
     found = extremes(moving.pieces(samples, end))
-    track = moving.track(min(samples, PICTURED), end) if plot is not None or drawn else None
+    track = moving.sampled(min(samples, PICTURED), end) if plot is not None or drawn else None
     outputs: list[Output] = []
     if csv is not None:
         from nutdamp.files.track_csv import write_track

@@ -61,19 +61,17 @@ def command(
     expect_places(json)
 
     from nutdamp.cli.progress import working
-    from nutdamp.planning import unrounded
-    from nutdamp.verification import verify
+    from nutdamp.library.studies import verify
 
     plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
     with working("verifying", quiet=quiet):
-        smooth = None if schedule else unrounded(plan)
-        found = verify(body, plan.pulses, smooth, expected=options.with_disturbances)
+        verified = verify(plan)
+    found = verified.core
     outputs: list[Output] = []
     if json is not None:
         from nutdamp.files.output import json_text
-        from nutdamp.files.verification_json import verification_json
 
-        outputs.append((json, json_text(verification_json(plan.flight, plan.scheme, found))))
+        outputs.append((json, json_text(verified.to_dict())))
     screens: list[RenderableType] = []
     if not silent:
         from nutdamp.presentation.verify_tables import verification_screen

@@ -17,11 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from nutdamp.epoch import Epoch
-from nutdamp.errors import Fault, FaultyFile
+from nutdamp.errors import Fault, FaultyFile, printable
 from nutdamp.files.facts import nearest
 from nutdamp.files.input import read_utf8
 from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
+from nutdamp.planning import Plan
+from nutdamp.remarks import broken_limits
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, overlapping
+from nutdamp.schemes import SchemeOptions
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 from nutdamp.units import shown
 
@@ -58,6 +61,18 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
     if len(rows) > MOST_PULSES + 1:
         raise FaultyFile([Fault(name, rows[-1][0], 1, "", f"more than {MOST_PULSES} pulses")])
     return _Reader(name, spacecraft, [entry.strip() for entry in rows[0][1]]).read(rows[1:])
+
+
+def read_plan(
+    path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
+) -> tuple[Plan, tuple[str, ...]]:
+    """A schedule file as a plan of that name, and the warnings of `read_pulses` and of limits that it breaks.
+
+    ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
+    """
+    pulses, warnings = read_pulses(path, spacecraft)
+    made = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
+    return made, (*warnings, *broken_limits(spacecraft, pulses))
 
 
 class _Reader:

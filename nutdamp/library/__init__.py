@@ -7,44 +7,35 @@
     flight = plan.fly()
     flight.to_csv("track.csv")
 
-It stands beside the command line, on top of everything else: thin objects that hold the results of the floors below
-(``core``) and add what knows files and screens. Attributes are SI and radians, vectors in the axes of the spacecraft
-file; arrays with named fields carry the names and units of the CSV files.
+It stands beneath the command line. The types are those of the modules below; how they show and write themselves is in
+`views`. Attributes are SI and radians, vectors in principal axes unless they say that they are in the axes of the
+spacecraft file; arrays with named fields carry the names and units of the CSV files.
 """
 
-from nutdamp.flight import Residual
-from nutdamp.library.calls import compare, load_schedule, plan
-from nutdamp.library.craft import Spacecraft, example, load, read
-from nutdamp.library.results import Comparison, Flight, Plan
-from nutdamp.library.studies import Dispersion, Trade, Verified, disperse, export, trade, verify
-from nutdamp.schemes import Options
-from nutdamp.schemes.options import FourPulseOptions, HalfConeOptions, OptimalOptions, RhumbLineOptions, TwoPulseOptions
-from nutdamp.track import Track
-
-__all__ = [
-    "Comparison",
-    "Dispersion",
-    "Flight",
-    "FourPulseOptions",
-    "HalfConeOptions",
-    "OptimalOptions",
-    "Options",
-    "Plan",
-    "Residual",
-    "RhumbLineOptions",
-    "Spacecraft",
-    "Track",
-    "Trade",
-    "TwoPulseOptions",
-    "Verified",
-    "compare",
-    "disperse",
-    "example",
-    "export",
-    "load",
-    "load_schedule",
-    "plan",
-    "read",
-    "trade",
-    "verify",
-]
+from nutdamp.flight import Flight as Flight
+from nutdamp.flight import Residual as Residual
+from nutdamp.library.calls import compare as compare
+from nutdamp.library.calls import load_schedule as load_schedule
+from nutdamp.library.calls import plan as plan
+from nutdamp.library.craft import example as example
+from nutdamp.library.craft import load as load
+from nutdamp.library.craft import read as read
+from nutdamp.library.reports import Report as Report
+from nutdamp.library.reports import report as report
+from nutdamp.library.studies import Dispersion as Dispersion
+from nutdamp.library.studies import Trade as Trade
+from nutdamp.library.studies import Verified as Verified
+from nutdamp.library.studies import disperse as disperse
+from nutdamp.library.studies import export as export
+from nutdamp.library.studies import trade as trade
+from nutdamp.library.studies import verify as verify
+from nutdamp.planning import Comparison as Comparison
+from nutdamp.planning import Plan as Plan
+from nutdamp.schemes import Options as Options
+from nutdamp.schemes.options import FourPulseOptions as FourPulseOptions
+from nutdamp.schemes.options import HalfConeOptions as HalfConeOptions
+from nutdamp.schemes.options import OptimalOptions as OptimalOptions
+from nutdamp.schemes.options import RhumbLineOptions as RhumbLineOptions
+from nutdamp.schemes.options import TwoPulseOptions as TwoPulseOptions
+from nutdamp.spacecraft import Spacecraft as Spacecraft
+from nutdamp.track import Track as Track

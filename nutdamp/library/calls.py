@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 
-from nutdamp import arguments, planning
-from nutdamp.errors import printable
-from nutdamp.library.craft import Spacecraft, core_of
-from nutdamp.library.results import Comparison, Plan
-from nutdamp.remarks import broken_limits
-from nutdamp.schemes import Choice
+from nutdamp import arguments, planning, schemes
+from nutdamp.arguments import shown
+from nutdamp.errors import BadRequest
+from nutdamp.library.craft import expected
+from nutdamp.planning import Comparison, Plan
+from nutdamp.schemes import Choice, Options, SchemeOptions
+from nutdamp.spacecraft import Spacecraft
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
@@ -19,8 +20,8 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
 
     Raises BadRequest for a scheme that there is not, or an option that makes no sense.
     """
-    (name,) = arguments.scheme_names([scheme])
-    return Plan(planning.plan(core_of(spacecraft), name, arguments.options(options)), spacecraft.source)
+    (name,) = _names([scheme])
+    return planning.plan(expected(spacecraft), name, _options(options))
 
 
 def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice = None) -> Comparison:
@@ -28,9 +29,8 @@ def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice =
 
     Default: the classic three, or those that point where the file has a target axis.
     """
-    core = core_of(spacecraft)
-    chosen = arguments.scheme_names(names) or planning.usual(core)
-    return Comparison(planning.compare(core, chosen, arguments.options(options)), spacecraft.source)
+    chosen = _names(names) or planning.usual(expected(spacecraft))
+    return planning.compare(expected(spacecraft), chosen, _options(options))
 
 
 def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
@@ -38,10 +38,28 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
 
     Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
     """
-    from nutdamp.files.schedule_file import read_pulses
+    from nutdamp.files.schedule_file import read_plan
 
-    core, name = core_of(spacecraft), arguments.path("path", path)
-    schedule, remarks = read_pulses(name, core)
-    for remark in (*remarks, *broken_limits(core, schedule)):
+    body, name = expected(spacecraft), arguments.path("path", path)
+    made, remarks = read_plan(name, body)
+    for remark in remarks:
         warnings.warn(remark, stacklevel=2)
-    return Plan(planning.Plan(core, printable(name), schedule), spacecraft.source, from_file=True)
+    return made
+
+
+def _names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are; raises BadRequest."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise BadRequest(f"names: expected a list of schemes, such as ['two-pulse'], got {shown(values)}")
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in schemes.NAMES:
+            raise BadRequest(f"there is no scheme {shown(name)}; there are {', '.join(schemes.NAMES)}")
+    return names
+
+
+def _options(value: Choice) -> Choice:
+    """The options of one scheme or several; raises BadRequest for what is none."""
+    if value is None or isinstance(value, Options | SchemeOptions):
+        return value
+    raise BadRequest(f"options: expected nutdamp.Options(…), got {shown(value)}")

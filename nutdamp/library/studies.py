@@ -3,40 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from nutdamp import arguments, dispersion, planning, verification
-from nutdamp import fronts as trading
-from nutdamp import spacecraft as craft
+from nutdamp import arguments, dispersion, fronts, planning, verification
 from nutdamp.dispersion.study import Results, run, threads_here
 from nutdamp.errors import BadRequest
-from nutdamp.library.craft import Source, Spacecraft, core_of
-from nutdamp.library.results import Plan, feasible_core
+from nutdamp.library.craft import expected
+from nutdamp.library.views import feasible
+from nutdamp.planning import Plan
 from nutdamp.schemes.options import LEAST, OptimalOptions
+from nutdamp.spacecraft import Spacecraft
 
 
 @dataclass(frozen=True, eq=False)
 class Trade:
     """What time costs: ``fronts`` of schedules of the scheme optimal, one for each shift of H allowed."""
 
-    core: craft.Spacecraft
-    fronts: tuple[trading.Front, ...]
-    source: Source | None = None
+    spacecraft: Spacecraft
+    fronts: tuple[fronts.Front, ...]
 
     @property
     def plans(self) -> tuple[Plan, ...]:
         """The plans of all points, front after front, each from its earliest end to its latest."""
-        return tuple(Plan(point.plan, self.source) for _, _, point in trading.numbered(self.fronts))
+        return tuple(point.plan for _, _, point in fronts.numbered(self.fronts))
 
     def to_dict(self) -> dict[str, Any]:
         """What ``trade --json`` gives."""
         from nutdamp.files.output import finite
         from nutdamp.files.trade_files import trade_json
 
-        return finite(trade_json(self.core, self.fronts))
+        return finite(trade_json(self.spacecraft, self.fronts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ class Verified:
         from nutdamp.files.output import finite
         from nutdamp.files.verification_json import verification_json
 
-        return finite(verification_json(self.plan.core.flight, self.plan.scheme, self.core))
+        return finite(verification_json(self.plan.flight, self.plan.scheme, self.core))
 
 
 def trade(
@@ -89,15 +88,20 @@ def trade(
     points: int = 10,
     allow: Iterable[float] = (0.0, math.inf),
     least: str = "propellant",
+    *,
+    with_disturbances: bool = False,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Trade:
     """Time against propellant (``least="impulse"``: impulse), as ``nutdamp trade`` does; raises BadRequest.
 
-    ``points``: horizons tried for each front; ``allow``: how far from its target H may end, rad, a front for each.
+    ``points``: horizons tried for each front; ``allow``: how far from its target H may end, rad, a front for each;
+    ``progress`` is called with the number of horizons tried so far.
     """
-    core = core_of(spacecraft)
+    body = expected(spacecraft)
     count, shifts = arguments.count("points", points), arguments.shifts(allow)
-    options = OptimalOptions(least=arguments.one_of("least", least, LEAST[:2]))
-    return Trade(core, trading.fronts(core, options, count=count, shifts=shifts), spacecraft.source)
+    least = arguments.one_of("least", least, LEAST[:2])
+    options = OptimalOptions(least=least, with_disturbances=with_disturbances)
+    return Trade(body, fronts.fronts(body, options, count=count, shifts=shifts, progress=progress))
 
 
 def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispersion.SEED) -> Dispersion:
@@ -105,20 +109,18 @@ def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispe
 
     Raises Infeasible where there is no schedule, BadRequest for a spacecraft without dispersions.
     """
-    core = feasible_core(plan)
+    feasible(plan)
     if not 0 <= arguments.instance("seed", seed, int, "a whole number") < 2**64:
         raise BadRequest(f"seed = {seed}: expected a whole number from 0 to 2**64 - 1")
-    study = dispersion.study_of(core.spacecraft, core.pulses, seed=seed)
+    study = dispersion.study_of(plan.spacecraft, plan.pulses, seed=seed)
     results = Results(study, arguments.count("samples", samples))
-    return Dispersion(run(results, threads=threads_here()), core.scheme)
+    return Dispersion(run(results, threads=threads_here()), plan.scheme)
 
 
 def verify(plan: Plan) -> Verified:
     """Fly the schedule by independent methods, as ``nutdamp verify`` does; raises Infeasible without a schedule."""
-    core = feasible_core(plan)
-    smooth = None if plan.from_file else planning.unrounded(core)
-    expected = core.options.with_disturbances
-    return Verified(verification.verify(core.spacecraft, core.pulses, smooth, expected=expected), plan)
+    body, known = feasible(plan).spacecraft, plan.options.with_disturbances
+    return Verified(verification.verify(body, plan.pulses, planning.unrounded(plan), expected=known), plan)
 
 
 def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float | None = None) -> None:  # noqa: A002 - as --format
@@ -129,7 +131,7 @@ def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float |
     from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
     from nutdamp.files.output import write_whole
 
-    core, form = feasible_core(plan), arguments.one_of("format", format, FORMATS)
+    made, form = feasible(plan), arguments.one_of("format", format, FORMATS)
     name = arguments.path("path", path)
     end = None if until is None else arguments.end_of_flight(until)
-    write_whole(name, export_text(core, form, xml=form in MESSAGES and name.lower().endswith(".xml"), until=end))
+    write_whole(name, export_text(made, form, xml=form in MESSAGES and name.lower().endswith(".xml"), until=end))

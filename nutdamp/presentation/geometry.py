@@ -42,7 +42,7 @@ def drawn(flight: Flight, track: Track) -> Track:
     if until / step <= len(track.t):
         return track
     reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
-    return flight.track(min(math.ceil(reach / step) + 1, MOST_ROWS), reach)
+    return flight.sampled(min(math.ceil(reach / step) + 1, MOST_ROWS), reach)
 
 
 class Stretch(NamedTuple):

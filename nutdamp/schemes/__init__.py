@@ -12,8 +12,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
+from nutdamp.arguments import shown
 from nutdamp.errors import BadRequest, Infeasible, TooShort
-from nutdamp.schemes.options import LEAST, Options, SchemeOptions, shown
+from nutdamp.schemes.options import LEAST, Options, SchemeOptions
 from nutdamp.schemes.registry import CLASSIC, NAMES, PLANNED, POINTING, SCHEMES, SPINNING, SUNLIT, Scheme
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy

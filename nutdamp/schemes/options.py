@@ -9,11 +9,10 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from numbers import Integral, Real
 from typing import Any, TypeVar
 
+from nutdamp.arguments import is_count, is_number, shown
 from nutdamp.errors import BadRequest, SenselessOption
-from nutdamp.units import LARGEST
 
 ANY_ON_TIME = (0.0, math.inf)
 """Bounds on on-times, s, that bound nothing."""
@@ -206,20 +205,3 @@ class Options:
 def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
     """Names of the options of a scheme."""
     return tuple(field.name for field in dataclasses.fields(kind))
-
-
-def is_number(value: Any) -> bool:
-    """Whether Python or numpy would call it a real number, of sensible size."""
-    return issubclass(type(value), Real) and type(value) is not bool and abs(value) <= LARGEST
-
-
-def is_count(value: Any) -> bool:
-    """Whether it is a whole number of at least 1."""
-    return issubclass(type(value), Integral) and type(value) is not bool and value >= 1
-
-
-def shown(value: object) -> str:
-    """A value as a message names it: what is short as it is, anything else by its type."""
-    text = repr(value) if isinstance(value, str | Real | None) else ""
-    kind = type(value)
-    return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")

@@ -74,7 +74,7 @@ def flown(case: str) -> tuple[Flight, Track]:
 def fly(body: Spacecraft, pulses: Schedule, until: float | None = None) -> tuple[Flight, Track]:
     end = pulses.end + body.inertial_period if until is None else until
     made = flight.flown(body, pulses, end)
-    return made, made.track(1000, end)
+    return made, made.sampled(1000, end)
 
 
 @cache

@@ -104,7 +104,7 @@ def test_a_frame_shows_the_cones_of_its_moment() -> None:
         scene = Scene(made, timed, 400)
         for number in (0, 3, 7):
             scene.show(number)
-            track = made.track(2, float(timed.times[number])) if number else made.track(2, 1e-9)
+            track = made.sampled(2, float(timed.times[number])) if number else made.sampled(2, 1e-9)
             away = np.degrees(angle_between(track.axis[-1], track.momentum[0]))
             squares = [line for line in scene.sky.lines if line.get_marker() == "s" and np.size(line.get_xdata())]
             assert len(squares) == 1

@@ -35,7 +35,7 @@ def flown(body: Spacecraft, scheme: str = "four-pulse", samples: int = 200) -> t
     pulses = planning.plan(body, scheme).pulses
     end = pulses.end + body.inertial_period
     made = flight.flown(body, pulses, end)
-    return made, made.track(samples, end)
+    return made, made.sampled(samples, end)
 
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
@@ -93,7 +93,7 @@ def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float
 @pytest.mark.parametrize("body", [BODIES["prolate"], BODIES["oblate, reversed"], spinner(moments=(120, 100, 80))])
 def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
     made = flight.flown(body, Schedule(), 4.0)
-    track = made.track(20, 4.0)
+    track = made.sampled(20, 4.0)
     marks = []
     for rates, quaternion in zip(track.rates, track.quaternion, strict=True):
         mark = geometry.body_mark(geometry.cones(made, rates, quaternion), quaternion)
@@ -159,7 +159,7 @@ def turned(points: Vector) -> float:
 @pytest.mark.parametrize("samples", [2, 50])
 def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
     made = flight.flown(spinner(), Schedule(), 300.0)
-    fine = geometry.drawn(made, made.track(samples, 300.0))
+    fine = geometry.drawn(made, made.sampled(samples, 300.0))
     assert fine.t[-1] == 300.0
     assert turned(geometry.pole_path(fine)) < 2 * math.pi / geometry.ROWS_A_TURN * 1.01
     assert geometry.drawn(made, fine) is fine
@@ -169,7 +169,7 @@ def test_of_a_very_long_time_the_first_part_is_drawn_and_all_pulses() -> None:
     body = spinner()
     pulses = Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),))
     made = flight.flown(body, pulses, 1e6)
-    fine = geometry.drawn(made, made.track(1000, 1e6))
+    fine = geometry.drawn(made, made.sampled(1000, 1e6))
     assert len(fine.t) < geometry.MOST_ROWS + 10
     assert 5000.0 <= fine.t[-1] < 1e6
 
@@ -186,7 +186,7 @@ SCHEDULES = {
 @pytest.mark.parametrize("fly", [flight.flown, flight.by_impulses])
 def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse, ...], fly: type) -> None:
     made: Flight = fly(spinner(), Schedule(pulses), 6.0)
-    track = made.track(50, 6.0)
+    track = made.sampled(50, 6.0)
     found = list(geometry.stretches(made, track))
     assert found[0].first == 0
     assert found[-1].last == len(track.t) - 1
@@ -199,5 +199,5 @@ def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse
 
 def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
     made = flight.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
-    found = list(geometry.stretches(made, made.track(20, 1.0)))
+    found = list(geometry.stretches(made, made.sampled(20, 1.0)))
     assert [one.pulse for one in found] == [0, None]

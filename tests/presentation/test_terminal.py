@@ -34,7 +34,7 @@ def flown(case: str) -> tuple[Flight, Track]:
     pulses = planning.plan(body, scheme).pulses
     end = pulses.end + body.inertial_period
     made = flight.flown(body, pulses, end)
-    return made, made.track(300, end)
+    return made, made.sampled(300, end)
 
 
 def screen(case: str, width: int, **settings: object) -> str:
@@ -184,7 +184,7 @@ def test_the_dots_are_the_track() -> None:
     """Of free motion: every dot of the left panel lies on the circle of ω, and all of it is there."""
     made, track = flown("free")
     made = flight.flown(made.spacecraft, Schedule(), made.spacecraft.body_period)
-    drawing = motion_drawing(made, made.track(100, made.spacecraft.body_period))
+    drawing = motion_drawing(made, made.sampled(100, made.spacecraft.body_period))
     lines = drawing.pole_curve(45)[2:-3]
     begins = min(line.plain.index(sign) for line in lines for sign in "│┤" if sign in line.plain) + 1
     inner = [line[begins:] for line in lines]

@@ -62,4 +62,4 @@ def plan_picture(name: str, plan: Plan, path: str) -> bytes:
     """A figure of a plan, flown through its real widths to one inertial period after the last pulse."""
     end = plan.pulses.end + plan.spacecraft.inertial_period
     flown = flights.flown(plan.spacecraft, plan.pulses, end)
-    return picture(name, flown, flown.track(ROWS, end), path)
+    return picture(name, flown, flown.sampled(ROWS, end), path)

@@ -199,7 +199,7 @@ class Scene:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         self.flight, self.timed = flight, timed
-        track = flight.track(timed.frames, timed.until)
+        track = flight.sampled(timed.frames, timed.until)
         rows = np.searchsorted(track.t, timed.times, side="right") - 1
         rows[0] = 0  # before what is fired at once
         self.rates, self.quaternions = track.rates[rows], track.quaternion[rows]

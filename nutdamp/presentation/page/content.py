@@ -39,7 +39,7 @@ if TYPE_CHECKING:  # few reports disperse
 
 
 class Repeat(NamedTuple):
-    """What it takes to make the page again: the command, and the input file by name and text.
+    """What it takes to make the page again: the command in its ``language``, and the input file by name and text.
 
     ``settings``: keys that the command sets in place of what the file says, and their values.
     """
@@ -48,6 +48,7 @@ class Repeat(NamedTuple):
     name: str
     text: str
     settings: tuple[tuple[str, str], ...] = ()
+    language: str = "console"
 
 
 def report_page(
@@ -184,17 +185,12 @@ def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) 
 
 
 def _repeat(repeat: Repeat) -> Section:
-    changed = (Facts("Set in place of what the file says", repeat.settings),) if repeat.settings else ()
-    return Section(
-        "repeat",
-        "To repeat it",
-        (
-            Listing("Command", repeat.command, "console"),
-            Facts("Versions", tuple(_versions())),
-            Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"),
-            *changed,
-        ),
-    )
+    blocks: list[Block] = [Listing("Command", repeat.command, repeat.language), Facts("Versions", tuple(_versions()))]
+    if repeat.text:
+        blocks.append(Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"))
+    if repeat.settings:
+        blocks.append(Facts("Set in place of what the file says", repeat.settings))
+    return Section("repeat", "To repeat it", tuple(blocks))
 
 
 def _versions() -> Iterator[tuple[str, str]]:

@@ -21,7 +21,7 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     body, pulses = plan.spacecraft, plan.pulses
     until = pulses.end + body.inertial_period
     flown = flight.flown(body, pulses, until)
-    track = flown.track(SAMPLES, until)
+    track = flown.sampled(SAMPLES, until)
     drawn = [
         (
             figures.motion_figure(flown, track),

@@ -1,0 +1,168 @@
+"""How the results show and write themselves: what `nutdamp.views` declares, for each of the public types."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from nutdamp import arguments, views
+from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.flight import Flight
+from nutdamp.planning import Comparison, Plan
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.text import degrees
+from nutdamp.remarks import infeasibility, remarks
+from nutdamp.spacecraft import Spacecraft
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nutdamp.presentation.page.document import Block
+
+views.sentences.register(Plan, remarks)
+views.sentences.register(Comparison, verdicts.warnings)
+views.reason.register(Plan, infeasibility)
+views.reason.register(Comparison, verdicts.reason)
+
+
+@views.data.register
+def _(spacecraft: Spacecraft) -> dict[str, Any]:
+    from nutdamp.files.output import finite
+    from nutdamp.files.plan_json import spacecraft_json
+
+    return finite(spacecraft_json(spacecraft))
+
+
+@views.data.register
+def _(plan: Plan) -> dict[str, Any]:
+    from nutdamp.files.output import finite
+    from nutdamp.files.plan_json import plan_json
+
+    return finite(plan_json(plan))
+
+
+@views.data.register
+def _(compared: Comparison) -> dict[str, Any]:
+    from nutdamp.files.output import finite
+    from nutdamp.files.plan_json import comparison_json
+
+    return finite(comparison_json(compared, verdicts.spoken(compared)))
+
+
+@views.table.register
+def _(plan: Plan) -> views.Table:
+    from nutdamp.files.pulses_csv import pulses_array
+
+    return pulses_array(plan.flight)
+
+
+@views.table.register
+def _(flight: Flight) -> views.Table:
+    from nutdamp.files.track_csv import track_array
+
+    return track_array(flight.sampled(flight.samples, flight.shown_to), flight.spacecraft.inertia)
+
+
+@views.write_csv.register
+def _(plan: Plan, path: str | PathLike[str]) -> None:
+    from nutdamp.files.output import write_whole
+    from nutdamp.files.pulses_csv import pulses_csv
+
+    write_whole(arguments.path("path", path), pulses_csv(feasible(plan).flight))
+
+
+@views.write_csv.register
+def _(flight: Flight, path: str | PathLike[str]) -> None:
+    from nutdamp.files.output import whole_file
+    from nutdamp.files.track_csv import write_track
+
+    with whole_file(arguments.path("path", path)) as stream:
+        write_track(stream, flight.pieces(flight.samples, flight.shown_to), flight.spacecraft.inertia)
+
+
+@views.figure.register(Flight)
+def _(flight: Flight, name: str) -> Figure:
+    from nutdamp.presentation import figures
+
+    arguments.instance("name", name, str, "the name of a figure")
+    try:
+        return figures.named(name, flight, flight.sampled(flight.samples, flight.shown_to))
+    except KeyError:
+        raise BadRequest(f"there is no figure {name!r}") from None
+
+
+@views.line.register
+def _(spacecraft: Spacecraft) -> str:
+    inertia = spacecraft.inertia
+    return (
+        f"<Spacecraft {spacecraft.name}: {inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(spacecraft.nutation)}>"
+    )
+
+
+@views.line.register
+def _(plan: Plan) -> str:
+    left = plan.flown
+    if left is None:
+        return f"<Plan {plan.scheme}: infeasible, {plan.why}>"
+    return f"<Plan {plan.scheme}: {len(plan)} pulses until {plan.end:.4g} s, nutation left {degrees(left.nutation)}>"
+
+
+@views.line.register
+def _(flight: Flight) -> str:
+    left = flight.residual
+    ended = f"nutation left {degrees(left.nutation)}, shift of H {degrees(left.momentum_shift)}"
+    return f"<Flight of {_summary(flight)}: {ended}>"
+
+
+@views.line.register
+def _(compared: Comparison) -> str:
+    chosen = compared.recommended
+    verdict = compared.reason if chosen is None else f"recommended {chosen.scheme}, {compared.reason}"
+    return f"<Comparison of {', '.join(one.scheme for one in compared)}: {verdict}>"
+
+
+@views.html.register
+def _(spacecraft: Spacecraft) -> str:
+    from nutdamp.presentation.page.sheets import spacecraft_facts
+
+    return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
+
+
+@views.html.register
+def _(plan: Plan) -> str:
+    from nutdamp.presentation.page.document import Prose
+    from nutdamp.presentation.page.sheets import pulse_sheet
+
+    return _block(pulse_sheet(plan) if plan.feasible else Prose(repr(plan)[1:-1]))
+
+
+@views.html.register
+def _(flight: Flight) -> str:
+    from nutdamp.presentation.page.sheets import residual_sheet
+
+    return _block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual))
+
+
+@views.html.register
+def _(compared: Comparison) -> str:
+    from nutdamp.presentation.page.sheets import comparison_sheet
+
+    return _block(comparison_sheet(compared))
+
+
+def _block(content: Block) -> str:
+    from nutdamp.presentation.page.html import block_html
+
+    return block_html(content)
+
+
+def _summary(flight: Flight) -> str:
+    return f"{len(flight.schedule)} pulses until {flight.shown_to:.4g} s by {flight.model}"
+
+
+def feasible(plan: Plan) -> Plan:
+    """A plan with a schedule; raises BadRequest for what is no `Plan`, Infeasible for one without."""
+    arguments.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
+    if not plan.feasible:
+        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
+    return plan

@@ -1,0 +1,107 @@
+"""What files and screens make of results: declared here, below them all, and written in `nutdamp.library.views`.
+
+So a `Plan` writes itself as CSV although its module knows no files. What is written there is in place as soon as a
+public name of `nutdamp` is used; without it these functions raise TypeError.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import MissingPandas
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Figure
+    from pandas import DataFrame
+
+Table = NDArray[np.void]
+"""A structured array: one row a pulse or a sample, fields named as the columns of the CSV files."""
+
+
+@singledispatch
+def data(result: object) -> dict[str, Any]:
+    """What JSON files say of it."""
+    raise _missing(result)
+
+
+@singledispatch
+def table(result: object) -> Table:
+    """Its rows."""
+    raise _missing(result)
+
+
+@singledispatch
+def write_csv(result: object, path: str | PathLike[str]) -> None:  # noqa: ARG001
+    """Write its rows."""
+    raise _missing(result)
+
+
+@singledispatch
+def html(result: object) -> str:
+    """A small table, as notebooks show it."""
+    raise _missing(result)
+
+
+@singledispatch
+def figure(result: object, name: str) -> Figure:  # noqa: ARG001
+    """A picture of it."""
+    raise _missing(result)
+
+
+@singledispatch
+def sentences(result: object) -> tuple[str, ...]:
+    """What a reader should know of it."""
+    raise _missing(result)
+
+
+@singledispatch
+def reason(result: object) -> str:
+    """Why it is so."""
+    raise _missing(result)
+
+
+@singledispatch
+def line(result: object) -> str:
+    """It in one line."""
+    return object.__repr__(result)
+
+
+def _missing(result: object) -> TypeError:
+    return TypeError(f"expected what nutdamp.library.views can show, got a {type(result).__qualname__}")
+
+
+class Shown:
+    """A result that shows itself at a prompt and in notebooks."""
+
+    @property
+    def core(self) -> Self:
+        """Itself, as results that wrapped another had it."""
+        return self
+
+    def __repr__(self) -> str:
+        return line(self)
+
+    def _repr_html_(self) -> str:
+        return html(self)
+
+
+class Tabled(Shown):
+    """A result that has rows."""
+
+    def to_numpy(self) -> Table:
+        """The rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
+        return table(self)
+
+    def to_pandas(self) -> DataFrame:
+        """`to_numpy` as a DataFrame; raises MissingPandas where pandas is not installed."""
+        try:
+            import pandas
+        except ImportError:
+            raise MissingPandas from None
+        rows = table(self)
+        return pandas.DataFrame({name: rows[name] for name in rows.dtype.names or ()})
