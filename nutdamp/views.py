@@ -42,8 +42,8 @@ def write_csv(result: object, path: str | PathLike[str]) -> None:  # noqa: ARG00
 
 
 @singledispatch
-def html(result: object) -> str:
-    """A small table, as notebooks show it."""
+def html(result: object) -> str | None:
+    """A small table, as notebooks show it; None without the extra plot, so that they show a line."""
     raise _missing(result)
 
 
@@ -86,7 +86,7 @@ class Shown:
     def __repr__(self) -> str:
         return line(self)
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         return html(self)
 
 

@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 import nutdamp
 from nutdamp import errors, flight, planning, spacecraft
 from nutdamp.files import pulses_csv, track_csv
+from nutdamp.presentation.page import html
 from nutdamp.schemes.options import OptimalOptions
 
 ROOT = Path(__file__).parent.parent
@@ -564,11 +565,19 @@ def test_notebooks_show_small_tables() -> None:
     plan = compared["two-pulse"]
     for shown in (craft, compared, plan, plan.fly(), nutdamp.plan(craft, "four-pulse")):
         tags = _Tags()
-        tags.feed(shown._repr_html_())
+        text = shown._repr_html_()
+        assert text is not None
+        tags.feed(text)
         assert tags.open == []
-        assert "table" in tags.seen or not plan.feasible or "infeasible" in shown._repr_html_()
+        assert "table" in tags.seen or not plan.feasible or "infeasible" in text
         assert "b" not in tags.seen
         assert repr(shown).startswith(f"<{type(shown).__name__}")
+
+
+def test_notebooks_show_a_line_without_jinja(craft: nutdamp.Spacecraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    html._templates.cache_clear()
+    assert craft._repr_html_() is None
 
 
 def test_dictionaries_hold_no_number_that_json_has_not() -> None:

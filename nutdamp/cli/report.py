@@ -81,7 +81,7 @@ def command(
     """Write a report: spacecraft, schemes compared, schedule, pictures, error budget, and how to repeat it.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output, as HTML. Pictures need the extra plot, a PDF needs Chromium, Chrome or Edge.
+    standard output, as HTML. Needs the extra plot; a PDF needs Chromium, Chrome or Edge.
     """
     from nutdamp.presentation.page.formats import form_of
 

@@ -6,7 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import arguments, views
-from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.flight import Flight
 from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation import verdicts
@@ -122,14 +122,14 @@ def _(compared: Comparison) -> str:
 
 
 @views.html.register
-def _(spacecraft: Spacecraft) -> str:
+def _(spacecraft: Spacecraft) -> str | None:
     from nutdamp.presentation.page.sheets import spacecraft_facts
 
     return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
 
 
 @views.html.register
-def _(plan: Plan) -> str:
+def _(plan: Plan) -> str | None:
     from nutdamp.presentation.page.document import Prose
     from nutdamp.presentation.page.sheets import pulse_sheet
 
@@ -137,23 +137,26 @@ def _(plan: Plan) -> str:
 
 
 @views.html.register
-def _(flight: Flight) -> str:
+def _(flight: Flight) -> str | None:
     from nutdamp.presentation.page.sheets import residual_sheet
 
     return _block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual))
 
 
 @views.html.register
-def _(compared: Comparison) -> str:
+def _(compared: Comparison) -> str | None:
     from nutdamp.presentation.page.sheets import comparison_sheet
 
     return _block(comparison_sheet(compared))
 
 
-def _block(content: Block) -> str:
+def _block(content: Block) -> str | None:
     from nutdamp.presentation.page.html import block_html
 
-    return block_html(content)
+    try:
+        return block_html(content)
+    except MissingExtra:
+        return None
 
 
 def _summary(flight: Flight) -> str:

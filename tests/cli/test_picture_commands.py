@@ -122,16 +122,19 @@ def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, a
 
 
 @pytest.mark.parametrize("output", ["report.html", "-"])
-def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str) -> None:
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
+def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str, package: str) -> None:
     """No file is read, and no plan is made: what would make it is not there."""
     no_plans = "import nutdamp.planning; nutdamp.planning.compare = None"
-    done = without("matplotlib", tmp_path, "report", "missing.yaml", "-o", output, more=no_plans)
+    done = without(package, tmp_path, "report", "missing.yaml", "-o", output, more=no_plans)
     assert done.returncode == 1
     assert "pip install 'nutdamp[plot]'" in done.stderr
     assert "Traceback" not in done.stderr
     assert left(tmp_path) == []
-    # A page without pictures needs none.
-    assert without("matplotlib", tmp_path, "report", "--scheme", "two-pulse", "-o", "a.md").returncode == 0
+    # A page without pictures needs no matplotlib.
+    done = without(package, tmp_path, "report", "--scheme", "two-pulse", "-o", "a.md")
+    assert done.returncode == (1 if package == "jinja2" else 0)
+    assert ("a page needs the extra 'plot': pip install 'nutdamp[plot]'" in done.stderr) == (package == "jinja2")
 
 
 def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:

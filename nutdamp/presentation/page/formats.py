@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from nutdamp.errors import BadRequest
 from nutdamp.presentation.figures.style import require
+from nutdamp.presentation.page import templates
 from nutdamp.presentation.page.document import Page
 from nutdamp.presentation.page.html import page_html
 from nutdamp.presentation.page.markdown import page_markdown
@@ -31,13 +32,14 @@ FORMS = {
 def form_of(path: str) -> Form:
     """The form for the file ``path``; HTML for standard output.
 
-    Raises BadRequest for an unknown ending, MissingExtra for pictures without matplotlib, CannotWrite where a PDF lacks
-    the browser to print it.
+    Raises BadRequest for an unknown ending, MissingExtra without Jinja, or without matplotlib for pictures, CannotWrite
+    where a PDF lacks the browser to print it.
     """
     ending = ".html" if path == "-" else Path(path).suffix.lower()
     if ending not in FORMS:
         raise BadRequest(f"--output {path}: the ending says the format; use one of {', '.join(FORMS)}")
     form = FORMS[ending]
+    templates.require()
     if form.pictured:
         require()
     if ending == ".pdf":
