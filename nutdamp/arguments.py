@@ -10,8 +10,6 @@ from os import PathLike, fspath
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-import numpy as np
-
 from nutdamp.errors import BadRequest
 from nutdamp.units import LARGEST
 
@@ -98,6 +96,8 @@ def shown(value: object) -> str:
 
 def replaced(value: Record, fields: Mapping[str, object]) -> Record:
     """A dataclass with some of its fields replaced, looked at by their types; raises BadRequest."""
+    import numpy as np  # here, because the command line knows options without it
+
     kinds = get_type_hints(type(value))
     known = [field.name for field in dataclasses.fields(value) if field.init]
     made: dict[str, Any] = {}
@@ -107,8 +107,13 @@ def replaced(value: Record, fields: Mapping[str, object]) -> Record:
         kind = kinds[name]
         if not _fits(one, kind):
             raise BadRequest(f"{name}: expected {_described(kind)}, got {shown(one)}")
-        made[name] = np.array(one, dtype=float) if get_origin(kind) is np.ndarray else one
+        made[name] = np.array(one, dtype=float) if _array(kind) else one
     return dataclasses.replace(value, **made)
+
+
+def _array(kind: Any) -> bool:
+    """Whether a type hint is that of an array."""
+    return getattr(get_origin(kind), "__name__", "") == "ndarray"
 
 
 def _fits(value: object, kind: Any) -> bool:
@@ -116,8 +121,8 @@ def _fits(value: object, kind: Any) -> bool:
     parts = get_args(kind)
     if get_origin(kind) is UnionType:
         return any(_fits(value, part) for part in parts)
-    if get_origin(kind) is np.ndarray:
-        return isinstance(value, Sequence | np.ndarray) and len(value) == 3 and all(map(is_number, value))
+    if _array(kind):
+        return isinstance(value, Sequence | get_origin(kind)) and len(value) == 3 and all(map(is_number, value))
     if get_origin(kind) is tuple:
         return isinstance(value, tuple) and all(_fits(one, parts[0]) for one in value)
     return is_number(value) if kind is float else isinstance(value, kind)
@@ -128,7 +133,7 @@ def _described(kind: Any) -> str:
     parts = get_args(kind)
     if get_origin(kind) is UnionType:
         return " or ".join(_described(part) for part in parts)
-    if get_origin(kind) is np.ndarray:
+    if _array(kind):
         return "three numbers"
     if get_origin(kind) is tuple:
         return f"a tuple of {parts[0].__name__}"
