@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import work
 from nutdamp.motion import Arc, Integrated, Path
 from nutdamp.physics import attitude, rates, rigid
 from nutdamp.physics.arc_cones import arc_cones
@@ -30,6 +31,12 @@ if TYPE_CHECKING:
 IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
 """The two models by which a schedule is flown."""
+
+LEG, PULSE = 0.03, 0.3
+"""Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
+
+SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.5
+"""Units of a step of a symmetric body, of any other, and of one with dissipation."""
 
 PLANNED_STEPS = 30_000
 """Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
@@ -244,6 +251,13 @@ class Dynamics:
         """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
         return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
 
+    @property
+    def step_cost(self) -> float:
+        """Units of `work` of one step of integration."""
+        if self.forcing.growth != 0.0:
+            return SUNK_STEP
+        return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
+
     def path(
         self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = (), *, most: int
     ) -> tuple[Path, SpinState]:
@@ -251,6 +265,7 @@ class Dynamics:
 
         Raises Infeasible where it takes more than ``most`` steps of integration.
         """
+        work.spend(LEG)
         if end == start or (self.free and not torques):
             arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
             return arc, state if end == start else arc.end(end)
@@ -258,6 +273,7 @@ class Dynamics:
         pieces = rigid.integrate(
             self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing, most=most
         )
+        work.spend(PULSE + self.step_cost * len(pieces))
         rates_, quaternion_ = pieces[-1].final
         return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from os import PathLike
 from typing import Any
 
-from nutdamp import arguments, compliance, flight, schemes, views
+from nutdamp import arguments, compliance, flight, schemes, views, work
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
@@ -36,6 +36,7 @@ class Plan(views.Tabled):
     nutation (rad) that this would leave where that is ``worse`` than without pulses. `nutdamp.remarks` has the
     words of all three.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
+    ``cut``: its search ended at its budget of `work`.
     """
 
     spacecraft: Spacecraft
@@ -47,6 +48,7 @@ class Plan(views.Tabled):
     breach: Breach | None = None
     worse: float | None = None
     from_file: bool = False
+    cut: bool = False
 
     @property
     def feasible(self) -> bool:
@@ -207,10 +209,12 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
     chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
-    try:
-        return judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, chosen), chosen), chosen)
-    except Infeasible as reason:
-        return Plan(spacecraft, scheme, None, str(reason))
+    with work.budget(scheme, work.SCHEME) as spent:
+        try:
+            made = judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, chosen), chosen), chosen)
+        except Infeasible as reason:
+            made = Plan(spacecraft, scheme, None, str(reason))
+    return replace(made, cut=True) if spent.exhausted else made
 
 
 def _spun(spacecraft: Spacecraft) -> bool:
@@ -365,7 +369,8 @@ def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Choic
     unknown = set(names) - set(schemes.NAMES)
     if unknown:
         raise KeyError(*sorted(unknown))
-    return Comparison(spacecraft, tuple(attempt(spacecraft, name, options) for name in names))
+    with work.budget("the comparison", work.COMMAND):
+        return Comparison(spacecraft, tuple(attempt(spacecraft, name, options) for name in names))
 
 
 def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Choice) -> Plan:

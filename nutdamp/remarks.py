@@ -19,15 +19,26 @@ TELLING = math.radians(1e-6)
 """Nutation angle in rad from which what is left is worth a remark."""
 
 
+CUT = "the search ended at its limit of work"
+
+
 def remarks(plan: Plan) -> tuple[str, ...]:
     """All of them; what the scheme says comes first."""
+    notes = plan.pulses.notes
+    if plan.cut:
+        notes = (*notes, f"{CUT}: this is the best schedule found so far")
     if plan.flown is None or not len(plan.pulses):
-        return plan.pulses.notes
-    return (*plan.pulses.notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan))
+        return notes
+    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan))
 
 
 def infeasibility(plan: Plan) -> str:
     """Why there is no schedule; empty where there is one."""
+    why = _infeasibility(plan)
+    return f"{why}; {CUT}" if why and plan.cut else why
+
+
+def _infeasibility(plan: Plan) -> str:
     if plan.breach is not None:
         return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
     if plan.worse is not None:

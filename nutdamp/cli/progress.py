@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from nutdamp.work import Watch, watched
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
     from rich.status import Status
@@ -36,7 +38,7 @@ def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> It
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Says ``what`` is done while it is done, where nobody can tell how much is left.
+    """Says ``what`` is done while it is done: which search, and how much of its budget of `work` is spent.
 
     Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
     """
@@ -48,19 +50,33 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
     def show() -> None:
         from rich.console import Console
 
-        shown.append(Console(stderr=True).status(what))
+        shown.append(Console(stderr=True).status(_Doing(what, watch)))
         shown[0].start()
 
-    timer = threading.Timer(PATIENCE, show)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()
-        for status in shown:
-            status.stop()
+    with watched() as watch:
+        timer = threading.Timer(PATIENCE, show)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()
+            for status in shown:
+                status.stop()
+
+
+class _Doing:
+    """``what`` is done, with the search that a ``watch`` sees and how far it is at the moment it is shown."""
+
+    def __init__(self, what: str, watch: Watch) -> None:
+        self.what, self.watch = what, watch
+
+    def __rich__(self) -> str:
+        budget = self.watch.budget
+        if budget is None:
+            return self.what
+        return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
 
 
 class _Bar:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from nutdamp import work
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import Windows, commandable, usable
 from nutdamp.motion import Arc
@@ -78,12 +79,14 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
             made = _row(builder.fork(), cones)
         except Infeasible as why:
             reason, failed = why, failed + 1
-            if best is not None or failed > PATIENCE:
+            if best is not None or failed > PATIENCE or work.exhausted():
                 break
             continue
         if best is not None and made.cost > (1.0 - WORTH_A_CONE) * best.cost:
             break
         best = made
+        if work.exhausted():
+            break
     if best is None:
         raise reason or _no_time(here)
     return best

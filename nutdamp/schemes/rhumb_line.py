@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nutdamp import work
 from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.physics import pointing
@@ -110,7 +111,7 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         left = max(left, EXACT)
         if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
             best = left, made
-        if left <= EXACT and best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor:
+        if work.exhausted() or (left <= EXACT and best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor):
             break
     if best is None or best[0] > tolerable(train.here):
         raise Infeasible(_reason(train, best))

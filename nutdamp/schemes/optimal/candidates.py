@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
+from nutdamp import work
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits, usable
 from nutdamp.schedule import Schedule
@@ -38,6 +39,8 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         plans += [partial(rhumb_line.schedule, body, one) for one in (RhumbLineOptions(), *_trains(body))]
         plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
     for plan in plans:
+        if work.exhausted():
+            return
         try:
             made = plan()
             every = [made] if isinstance(made, Schedule) else list(made)

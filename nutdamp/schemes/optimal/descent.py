@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import flight
+from nutdamp import flight, work
 from nutdamp.physics import attitude, rigid_cases
 from nutdamp.schemes.optimal import residual_equations
 from nutdamp.schemes.optimal.residual_equations import Equations
@@ -29,6 +29,9 @@ SIDES = 32
 
 DIFFERENCE = 1e-6
 """Step of the difference quotients, in scaled unknowns."""
+
+FLIGHT, CASE = 0.05, 0.0003
+"""Units of `work` of a stretch of a flight of many sequences, and of each of them."""
 
 SHARES = np.array([0.5, 0.2, 0.05, 0.01])
 """Shares of a step that are tried where the whole does not help."""
@@ -105,6 +108,7 @@ class Task:
 
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
+        work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
         bodies = rigid_cases.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
@@ -246,7 +250,7 @@ class Descent:
         """Take at most so many steps with each sequence."""
         for _ in range(steps):
             going = np.flatnonzero(self.state.error > SETTLED)
-            if not len(going):
+            if not len(going) or work.exhausted():
                 break
             with np.errstate(all="ignore"):  # a sequence that gets lost is left as it is
                 self.state.put(going, self._stepped(going))

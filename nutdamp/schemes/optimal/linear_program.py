@@ -14,8 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import work
 from nutdamp.schemes.optimal import lp_solver
 from nutdamp.schemes.optimal.columns import Columns, alone
+from nutdamp.schemes.optimal.reach import supplies
 from nutdamp.schemes.optimal.residual_equations import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -24,6 +26,9 @@ SLOTS = 64
 
 MOST_SLOTS = 600_000
 """Slots of all channels together: a horizon of more is looked at as far as they reach."""
+
+SOLVED, SLOT = 2.0, 2e-4
+"""Units of `work` of a program's solution, and of each of its slots."""
 
 SLACK_COST = 1e3
 """Cost of what no column supplies, over the dearest channel's: used only where there is no solution."""
@@ -149,6 +154,7 @@ class Program:
 
         ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
         """
+        work.spend(SOLVED + SLOT * self.forbidden.size)
         nothing = np.zeros(len(self.influence.goal))
         if self._scale == 0.0:
             return Solution((), 0.0, 0.0, np.zeros(2), nothing)
@@ -267,6 +273,16 @@ class Program:
     def _gains(self, weights: Vector) -> Vector:
         """The same, less what it costs."""
         return np.asarray(self._worth(weights) - (self._price / self._dearest)[:, None] * self._dearness(self.centres))
+
+    def reachable(self) -> bool | None:
+        """Whether all slots together can supply the goal, by `reach`; None where that is not known."""
+        if self._scale == 0.0 or self._strong.any():  # strong ones act at moments, of which slots are only samples
+            return None
+        work.spend(SOLVED + SLOT * self.forbidden.size)
+        lost = self.influence.widths(np.array([self.width]))[0]
+        grid = self.influence.rows(self.centres) * lost[:, None]
+        most = np.einsum("nek,ck->ecn", grid, self._direction) * (self.width / self._unit)[None, :, None]
+        return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
 
     def _out_of_reach(self, weights: Vector) -> bool:
         """Whether prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""

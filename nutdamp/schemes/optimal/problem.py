@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nutdamp import flight
+from nutdamp import flight, work
 from nutdamp.errors import Infeasible
 from nutdamp.limits import usable
 from nutdamp.schedule import Bounds, Schedule
@@ -69,7 +69,9 @@ class Problem:
 
     def feasible(self, horizon: float) -> bool:
         """Whether the program of small angles has a solution within ``horizon`` s."""
-        return self.program(self.within(horizon)).solve(enough=True).unmet <= UNMET
+        program = self.program(self.within(horizon))
+        known = program.reachable()
+        return program.solve(enough=True).unmet <= UNMET if known is None else known
 
     def least_horizon(self, low: float, high: float, sharp: float = SHARPEST) -> float:
         """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow.
@@ -176,6 +178,8 @@ class Problem:
         body = self.spacecraft
         horizon = later = body.horizon
         while later < LATEST * horizon:
+            if work.exhausted():
+                return f"horizons of more than {later:.4g} s were not tried"
             later *= 2.0
             if self.feasible(later):
                 needed = self.least_horizon(0.5 * later, later, NAMED)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nutdamp import work
 from nutdamp.limits import Windows
 from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
@@ -74,6 +75,8 @@ def _repaired(program: Program, solution: Solution) -> Solution:
     if solution.unmet > UNMET:
         raise Unrepairable
     for _ in range(REPAIRS):
+        if work.exhausted():
+            raise Unrepairable
         broken = next(_broken(program, solution.burns), None)
         if broken is None:
             return solution

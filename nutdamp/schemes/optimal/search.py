@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp import flight
+from nutdamp import flight, work
 from nutdamp.compliance import DAMPED_ANGLE
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
@@ -157,7 +157,7 @@ class _Search(Problem):
         first = self.program().solve()
         self.check_number(first)
         best = self.cheapest(first)
-        if self.looser and not self.proved(best, EQUAL):
+        if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
             kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             best = self.cheaper(best, kept.cheapest(kept.program().solve()))
         if best is None:
@@ -173,7 +173,7 @@ class _Search(Problem):
         """The cheapest schedule found, where the program's ``first`` solution is this."""
         # Infinite where the solver gave up: then there may be solutions all the same.
         best = None if UNMET < first.unmet < math.inf else self.programmed(first)
-        if self.doubtful(best, first):
+        if not work.exhausted() and self.doubtful(best, first):
             best = self.cheaper(best, self.descended(best))
         return best
 
@@ -181,7 +181,11 @@ class _Search(Problem):
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
         best, horizon = self.settled(first.cost), self.spacecraft.horizon
         halvings = 0
-        while self.dear(best, first.cost) and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period:
+        while (
+            not work.exhausted()
+            and self.dear(best, first.cost)
+            and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period
+        ):
             halvings += 1
             if best is not None and halvings > HALVINGS:
                 break
@@ -189,7 +193,7 @@ class _Search(Problem):
             if not shorter.feasible(horizon):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
-        if self.dear(best, first.cost):
+        if self.dear(best, first.cost) and not work.exhausted():
             best = self.cheaper(best, self.others(first.cost))
         return best
 
@@ -256,6 +260,8 @@ class _Search(Problem):
         program.haste = HASTE
         found: list[_Found] = []
         for _ in range(CHOICES):
+            if work.exhausted():
+                break
             solution = program.solve()
             if solution.unmet > UNMET:
                 break
@@ -272,11 +278,13 @@ class _Search(Problem):
         flights: list[flight.Flight] = []
         for made in candidates.by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(flight.flown(self.spacecraft, Schedule(made.pulses)))
-            if self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR):
+            if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR)):
                 break
         for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
             left = self.left(way)
             found.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            if work.exhausted():
+                continue
             program = self.program()
             program.aim(residual_equations.along(way, self.equations, program.width))
             burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
@@ -288,7 +296,7 @@ class _Search(Problem):
         found: list[_Found] = []
         last = math.inf
         for turn in range(AIMS):
-            if solution.unmet > LOST or not solution.burns:
+            if solution.unmet > LOST or not solution.burns or work.exhausted():
                 break
             try:
                 solution = repaired(program, solution)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nutdamp import flight
+from nutdamp import flight, work
 from nutdamp.limits import channel_of, commandable, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
@@ -105,7 +105,7 @@ def correct(
     start, scale, lower, upper = (
         np.concatenate([getattr(one, name) for one in pulses]) for name in ("start", "scale", "lower", "upper")
     )
-    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED)
+    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED or work.exhausted())
     trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
     better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
     return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from nutdamp import work
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import SchemeOptions
@@ -51,7 +52,7 @@ def damping(here: Spacecraft, scheme: Scheme) -> Schedule:
         if best is None or cost < best[0]:
             best = cost, made
         steps += builder.steps
-        if steps > INTEGRATED:
+        if steps > INTEGRATED or work.exhausted():
             break
     if best is None:
         text = "the nutation is to be taken out first, and"

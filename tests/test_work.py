@@ -1,0 +1,83 @@
+"""Searches are bounded by counted work: they end with the best found so far, and say so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from builders import cross, spinner
+from cases_dir import CASES
+
+from nutdamp import flight, planning, remarks, work
+from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.schedule import Schedule
+
+
+def test_work_counts_for_all_budgets_around_it() -> None:
+    with work.budget("all", 10.0) as outer:
+        with work.budget("first", 7.0) as first:
+            work.spend(4.0)
+            assert not work.exhausted()
+            work.spend(4.0)
+            assert work.exhausted()
+        assert (first.done, outer.done) == (8.0, 8.0)
+        with work.budget("second", 7.0) as second:
+            assert second.most == 2.0
+        assert not work.exhausted()
+        assert outer.share == 0.8
+    assert not work.exhausted()
+    work.spend(1e9)  # nobody counts
+
+
+def test_who_watches_sees_the_innermost_budget() -> None:
+    seen: list[work.Budget | None] = []
+    with work.watched() as watch:
+        seen.append(watch.budget)
+        with work.budget("all", 10.0) as outer:
+            with work.budget("first", 7.0) as first:
+                seen.append(watch.budget)
+            seen.append(watch.budget)
+        seen.append(watch.budget)
+    assert seen == [None, first, outer, None]
+
+
+def test_flights_count_by_legs_and_steps() -> None:
+    body = spinner(channels=cross(8.0))
+    with work.budget("flight", 1e9) as short:
+        flown = flight.flown(body, Schedule(), 10.0)
+    assert 0.0 < short.done == flight.LEG * len(flown.legs)
+    tumbling = spinner(moments=(100.0, 120.0, 80.0))
+    with work.budget("flight", 1e9) as long:
+        flown = flight.flown(tumbling, Schedule(), 100.0)
+    assert long.done > flight.STEP * flown.steps > 10.0
+
+
+@pytest.mark.parametrize("most", [20.0, 500.0])
+def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    body = load_spacecraft(CASES / "slow-optimal.yaml")
+    monkeypatch.setattr(work, "SCHEME", most)
+    with work.budget("test", 1e9) as spent:
+        plan = planning.plan(body, "optimal")
+    assert plan.cut
+    assert spent.done < most + 300.0
+    assert any(remarks.CUT in text for text in remarks.said(plan))
+
+
+def test_what_is_not_cut_is_the_same_with_any_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = load_spacecraft(Path(CASES) / "kick-stage.yaml")
+    before = planning.plan(body, "optimal")
+    monkeypatch.setattr(work, "SCHEME", 1e9)
+    after = planning.plan(body, "optimal")
+    assert not before.cut
+    assert before.feasible
+    assert [(one.t, one.on_time) for one in before.pulses] == [(one.t, one.on_time) for one in after.pulses]
+    assert not any(remarks.CUT in text for text in remarks.said(before))
+
+
+def test_a_comparison_shares_one_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = load_spacecraft(CASES / "slow-optimal.yaml")
+    monkeypatch.setattr(work, "COMMAND", 30.0)
+    with work.budget("test", 1e9) as spent:
+        compared = planning.compare(body, ("one-pulse", "optimal"))
+    assert compared.plans[-1].cut
+    assert spent.done < 330.0
