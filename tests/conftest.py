@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+import functools
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from process import Run
+from process import Run, apart, within
 
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
 settings.register_profile("project", deadline=None, derandomize=True)
@@ -18,21 +16,14 @@ settings.load_profile("project")
 
 @pytest.fixture
 def run(tmp_path: Path) -> Run:
-    """Run the command line as a process in an empty folder: ``run("plan", "--json", "-")``."""
+    """Run the command line in an empty folder, within this process: ``run("plan", "--json", "-")``."""
+    return functools.partial(within, tmp_path)
 
-    def call(*arguments: str, stdin: str | None = None, columns: int = 80) -> subprocess.CompletedProcess[str]:
-        environment = {**os.environ, "COLUMNS": str(columns), "NO_COLOR": "1", "PYTHONUTF8": "1"}
-        return subprocess.run(
-            [sys.executable, "-m", "nutdamp", *arguments],
-            cwd=tmp_path,
-            env=environment,
-            input=stdin,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
 
-    return call
+@pytest.fixture
+def run_apart(tmp_path: Path) -> Run:
+    """The same as a process of its own, for what only a process shows."""
+    return functools.partial(apart, tmp_path)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,8 +1,64 @@
-"""The type of the fixture that runs the command line."""
+"""Running the command line: within this process, which is quick, or as a process of its own."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
+import signal
 import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from nutdamp.cli import main
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
+"""``run("plan", "--json", "-", stdin=…, columns=80)``: the type of the fixtures that run the command line."""
+
+
+def environment(columns: int) -> dict[str, str]:
+    """Environment of a command: a screen of ``columns`` without colours."""
+    return {"COLUMNS": str(columns), "NO_COLOR": "1", "PYTHONUTF8": "1"}
+
+
+def within(
+    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line in this process, in ``folder``; an error that is a bug of nutdamp is raised."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    given = io.TextIOWrapper(io.BytesIO((stdin or "").encode()), encoding="utf-8")
+    handler = signal.getsignal(signal.SIGTERM)
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        patch.setattr(sys, "argv", ["nutdamp", *arguments])
+        patch.setattr(sys, "stdin", given)
+        patch.chdir(folder)
+        for name, value in environment(columns).items():
+            patch.setenv(name, value)
+        try:
+            main()
+        except SystemExit as leave:
+            status = leave.code
+        finally:
+            signal.signal(signal.SIGTERM, handler)
+    assert isinstance(status, int)
+    # As a text stream of a process would give them.
+    texts = [stream.buffer.getvalue().decode().replace("\r\n", "\n") for stream in (out, err)]
+    return subprocess.CompletedProcess(["nutdamp", *arguments], status, *texts)
+
+
+def apart(
+    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line as a process of its own in ``folder``."""
+    return subprocess.run(
+        [sys.executable, "-m", "nutdamp", *arguments],
+        cwd=folder,
+        env={**os.environ, **environment(columns)},
+        input=stdin,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
