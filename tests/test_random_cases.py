@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from samples import some
 from scipy.integrate import solve_ivp
 
 from nutdamp import flight
@@ -162,14 +163,13 @@ def check(cases: list[Case], periods: float) -> int:
     return compared
 
 
-@pytest.mark.parametrize("batch", range(12))
+@pytest.mark.parametrize("batch", some(range(12), always=2))
 def test_25_random_cases_over_10_periods(batch: int) -> None:
     rng = np.random.default_rng(1970 + batch)
     assert check([draw(rng, 10.0) for _ in range(25)], 10.0) >= 5
 
 
-@pytest.mark.parametrize("batch", [pytest.param(0), *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 10))])
+@pytest.mark.parametrize("batch", some(range(10)))
 def test_2_random_cases_over_100_periods(batch: int) -> None:
-    """The first batch runs always, the others where slow tests are asked for."""
     rng = np.random.default_rng(2070 + batch)
     check([draw(rng, 100.0, slimmest=0.25) for _ in range(2)], 100.0)

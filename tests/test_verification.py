@@ -214,6 +214,7 @@ def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
     assert found.agree
 
 
+@pytest.mark.slow
 def test_the_course_example_of_dissipation() -> None:
     """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in DOP853."""
     body = Spacecraft("x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0)
@@ -269,6 +270,7 @@ def _missing(*_: object) -> BasiliskFlight:
     raise MissingExtra("verify", "a flight by Basilisk")
 
 
+@pytest.mark.slow
 def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Path) -> None:
     """Two thousand hours of coasting are more than DOP853 and Basilisk fly."""
     text = "name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"

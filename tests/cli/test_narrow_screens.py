@@ -17,7 +17,7 @@ COMMANDS = [
     ("check",),
     ("verify", "--scheme", "two-pulse"),
     ("disperse", "--scheme", "two-pulse", "--samples", "1e3", "--worst", "2"),
-    ("trade", "--points", "3"),
+    ("trade", "--points", "2"),
 ]
 
 

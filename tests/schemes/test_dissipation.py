@@ -13,6 +13,7 @@ import reference
 from builders import aimed, channel, spinner
 from cases_dir import case
 from process import Run
+from samples import slow
 
 from nutdamp import flight, planning
 from nutdamp.physics import rigid
@@ -62,7 +63,7 @@ def left_by_reference(one: planning.Plan) -> tuple[float, float]:
     return reference.nutation(moments, end.rates, math.copysign(1.0, body.spin)), shift
 
 
-@pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse", "four-pulse", "optimal"])
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", slow("two-pulse"), slow("optimal")])
 def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
     damped = 0
     for seed in range(8):

@@ -82,6 +82,7 @@ def closes(plan: planning.Plan) -> None:
     assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-8
 
 
+@pytest.mark.slow
 def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
     """Equal pulses, the last few within a tenth of what is asked for."""
     kept, named = 0, 0

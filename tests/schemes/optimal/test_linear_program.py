@@ -252,6 +252,7 @@ def test_a_weak_axial_torque_is_scaled_up() -> None:
     assert made.spin_change == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """Columns taken in a few at a time ended before they supplied the goal; 64 times the horizon seemed too short."""
     body = load_spacecraft(case("geo-target.yaml"))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from builders import Outcome, cross, spinner
 from cases_dir import case
+from samples import slow
 
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import compare, plan
@@ -33,7 +34,7 @@ def pauses(made: Schedule) -> list[float]:
 
 @pytest.mark.parametrize(
     ("changed", "most"),
-    [("", 1.03), ("limits: {gap: 100 ms}\n", 1.09), ("limits: {tick: 1 ms}\n", 1.03)],
+    [("", 1.03), ("limits: {gap: 100 ms}\n", 1.09), slow("limits: {tick: 1 ms}\n", 1.03)],
     ids=["plain", "gap", "tick"],
 )
 def test_several_short_pulses_in_each_half_turn_damp(changed: str, most: float) -> None:
