@@ -20,6 +20,15 @@ def printable(text: str) -> str:
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text)
 
 
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The one of some names that a misspelt ``word`` may stand for, whatever its case."""
+    import difflib  # here, because few runs meet a misspelt word
+
+    folded = {name.casefold(): name for name in known}
+    close = difflib.get_close_matches(word.casefold(), folded, n=1)
+    return folded[close[0]] if close else None
+
+
 class Fault(NamedTuple):
     """One thing wrong in an input file.
 

@@ -22,11 +22,11 @@ from nutdamp.cli.verify import command as verify_command
 from nutdamp.errors import MissingExtra
 from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.presentation.verify_tables import verdict
+from nutdamp.presentation.verify_tables import conservation, verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
-from nutdamp.verification import AGREE, integrate, verify
+from nutdamp.verification import AGREE, Verification, integrate, verify
 
 EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
 
@@ -282,3 +282,17 @@ def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Pa
     assert done.returncode == 3
     assert "not confirmed" in done.stderr
     assert "NOT CONFIRMED" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("momentum", "energy", "said"),
+    [
+        (0.0, 0.0, "On coasts neither |H| nor the energy changes by a single digit."),
+        (0.0, 2.3e-15, "rounding changes |H| by at most 0 of itself, the energy by < 1e-12."),
+        (3.1e-9, 0.0, "rounding changes |H| by at most 3.1e-09 of itself, the energy by 0."),
+    ],
+)
+def test_what_is_conserved_is_no_number_of_noughts(momentum: float, energy: float, said: str) -> None:
+    """It read "at most 0.0e+00"."""
+    found = Verification((), momentum, energy, ())
+    assert conservation(EXAMPLE, found).endswith(said)

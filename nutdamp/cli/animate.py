@@ -14,7 +14,7 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.parameters import FILE, Named, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import progress
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
@@ -24,7 +24,7 @@ from nutdamp.schemes import NAMES, Options
 @click.command("animate", cls=PlanningCommand)
 @spacecraft_argument
 @click.option(
-    "--scheme", type=click.Choice(NAMES), help="Show this scheme with default options; without it the recommended one."
+    "--scheme", type=Named(NAMES), help="Show this scheme with default options; without it the recommended one."
 )
 @click.option("--schedule", type=FILE, help="Show the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options

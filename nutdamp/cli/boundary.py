@@ -92,6 +92,13 @@ def _silence_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def tell(wrong: Exception) -> None:
+    """Say on standard error what is wrong; faults of a file begin with its name, all else with that of the program."""
+    from nutdamp.errors import FaultyFile
+
+    say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
+
+
 def _explain(wrong: Exception) -> int:
     """Say on standard error what the user can cure, and give its exit status; a bug is raised again."""
     from nutdamp import errors  # here, because a run without errors need not load it
@@ -106,5 +113,5 @@ def _explain(wrong: Exception) -> int:
     }
     if not isinstance(wrong, errors.NutdampError):
         raise wrong
-    say(str(wrong) if isinstance(wrong, errors.FaultyFile) else f"nutdamp: {wrong}")
+    tell(wrong)
     return next(status for kind, status in statuses.items() if isinstance(wrong, kind))

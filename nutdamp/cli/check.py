@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE
+from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE, tell
 from nutdamp.cli.common import DEFAULT_FILE, Input, deliver, load, quiet_option, remarks, set_option
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
-from nutdamp.cli.screen import say, show
+from nutdamp.cli.screen import show
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +41,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.files.check_json import failed_json
 
-            say(str(wrong))
+            tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
             reports.append(failed_json(name, wrong, doubts))
             continue
@@ -57,7 +57,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
         try:
             deliver([(json, json_text(check_json(reports)))])
         except CannotWrite as wrong:
-            say(f"nutdamp: {wrong}")
+            tell(wrong)
             failures.add(UNREADABLE)
     if failures:
         sys.exit(max(failures))

@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import click
 
 from nutdamp.cli.failures import show_failures
-from nutdamp.cli.parameters import FILE
+from nutdamp.cli.parameters import FILE, Named
 from nutdamp.cli.scheme_options import Aim, expect_read
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
@@ -103,9 +103,7 @@ def placed(wrong: Unsuitable, given: Input) -> NutdampError:
 def plot_options(command: Command) -> Command:
     """``--plot FILE`` and which picture it is to be."""
     for option in (
-        click.option(
-            "--figure", type=click.Choice(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."
-        ),
+        click.option("--figure", type=Named(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."),
         click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs the extra plot)."),
     ):
         command = option(command)
@@ -193,6 +191,8 @@ def plan_or_read(
             compared = planning.compare(body, planning.usual(body), options)
             plan = compared.recommended
             show_failures(compared)
+            if plan is not None:
+                remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
             for warning in verdicts.warnings(compared):
                 remark(f"warning: {warning}")
     if plan is None:

@@ -25,7 +25,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Count
+from nutdamp.cli.parameters import FILE, Count, Named
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
@@ -49,7 +49,7 @@ SAVED_EVERY = 30.0
 @spacecraft_argument
 @click.option(
     "--scheme",
-    type=click.Choice(NAMES),
+    type=Named(NAMES),
     help="Disperse this scheme with default options; without it the recommended one.",
 )
 @click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")

@@ -18,7 +18,7 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.parameters import FILE, Named, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
@@ -30,14 +30,14 @@ from nutdamp.schemes import NAMES, PLANNED, Options
 @click.option(
     "--format",
     "form",
-    type=click.Choice(FORMATS),
+    type=Named(FORMATS),
     help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS); stk: the same as .a; basilisk: a "
     "script that flies the schedule; json: as `plan --json`.",
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
 @click.option(
     "--scheme",
-    type=click.Choice(NAMES),
+    type=Named(NAMES),
     help="Export this scheme with default options; without it the recommended one.",
 )
 @click.option("--schedule", type=FILE, help="Export the pulses of a CSV file, as `plan --csv` writes it.")

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
+from nutdamp.errors import nearest
+
 if TYPE_CHECKING:
     ParamType = click.ParamType
+    Choice = click.Choice
 else:
 
     class ParamType(click.ParamType):
@@ -17,6 +20,39 @@ else:
 
         def __class_getitem__(cls, _: object) -> type[ParamType]:
             return cls
+
+    class Choice(click.Choice):
+        """`click.Choice`, likewise from click 8.2 on only."""
+
+        def __class_getitem__(cls, _: object) -> type[Choice]:
+            return cls
+
+
+class Named(Choice[str]):
+    """One of some names; a misspelt one is told the nearest."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name; a usage error for anything else."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as wrong:
+            close = nearest(str(value), self.choices)
+            if close is None:
+                raise
+            self.fail(f"{wrong.message.rstrip('.')}; did you mean {close!r}?", param, ctx)
+
+
+class Bare(float):
+    """A number that was written without a unit."""
+
+
+def is_number(word: str) -> bool:
+    """Whether a word of the command line is a number without a unit."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 class FileName(ParamType[str]):
@@ -59,9 +95,10 @@ class Quantity(ParamType[float]):
         from nutdamp.units import parse
 
         try:
-            return parse(value, self.kind, bare=True)
+            number = parse(value, self.kind, bare=True)
         except ValueError as wrong:
             self.fail(str(wrong), param, ctx)
+        return Bare(number) if isinstance(value, str) and is_number(value) else number
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
         """Shown in the help page; click gives a context from 8.2 on."""
@@ -76,22 +113,25 @@ class FinalSpin(Quantity):
         return value if value == "keep" else super().convert(value, param, ctx)
 
 
+def reading_of(value: float, kind: str, meant: str) -> str:
+    """How a number without unit is read, and what to write if another unit is ``meant``."""
+    from nutdamp.files.plausibility import reading
+
+    return reading(int(value) if value.is_integer() else float(value), kind, meant)
+
+
 class Angles(NamedTuple):
-    """Two angles in rad that name a direction, and those numbers among them that were written without a unit."""
+    """Two angles in rad that name a direction."""
 
     first: float
     second: float
-    bare: tuple[str, ...] = ()
 
     @property
     def readings(self) -> tuple[str, ...]:
         """How the numbers without unit are read that are more likely degrees: whole ones, and more than a turn."""
-        from nutdamp.files.plausibility import reading
-        from nutdamp.units import parse
-
-        numbers = [parse(text, "angle", bare=True) for text in self.bare]
-        doubtful = [one for one in numbers if one and (one.is_integer() or abs(one) > 2.0 * math.pi)]
-        return tuple(reading(int(one) if one.is_integer() else one, "angle", "deg") for one in doubtful)
+        bare = [one for one in self if isinstance(one, Bare)]
+        doubtful = [one for one in bare if one and (one.is_integer() or abs(one) > 2.0 * math.pi)]
+        return tuple(reading_of(one, "angle", "deg") for one in doubtful)
 
 
 class Direction(ParamType[Angles]):
@@ -107,16 +147,7 @@ class Direction(ParamType[Angles]):
         if len(parts) != 2:
             self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
         first, second = (Quantity("angle").convert(part, param, ctx) for part in parts)
-        return Angles(first, second, tuple(part for part in parts if not part[-1:].isalpha() and part[-1:] != "°"))
-
-
-def is_count(word: str) -> bool:
-    """Whether a word of the command line is a number: one that `Count` takes, or refuses as a number of cases."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+        return Angles(first, second)
 
 
 class Count(ParamType[int]):

@@ -23,7 +23,7 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE
+from nutdamp.cli.parameters import FILE, Named
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @click.command("plan", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Plan it alone; repeatable.")
+@click.option("--scheme", "names", multiple=True, type=Named(PLANNED), help="Plan it alone; repeatable.")
 @scheme_options
 @goal_options
 @click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")

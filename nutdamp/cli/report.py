@@ -22,7 +22,7 @@ from nutdamp.cli.common import (
 from nutdamp.cli.disperse import SAMPLES, fly
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Count, is_count
+from nutdamp.cli.parameters import FILE, Count, Named, is_number
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
@@ -42,14 +42,14 @@ class Report(PlanningCommand):
         for index, word in enumerate(args):
             given.append(word)
             following = args[index + 1 : index + 2]
-            if word == "--disperse" and "--" not in given and not (following and is_count(following[0])):
+            if word == "--disperse" and "--" not in given and not (following and is_number(following[0])):
                 given[-1] = f"--disperse={SAMPLES}"
         return super().parse_args(ctx, given)
 
 
 @click.command("report", cls=Report)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=click.Choice(PLANNED), help="Compare this one only; repeatable.")
+@click.option("--scheme", "names", multiple=True, type=Named(PLANNED), help="Compare this one only; repeatable.")
 @goal_options
 @click.option(
     "-o",

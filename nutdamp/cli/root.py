@@ -9,6 +9,7 @@ import click
 
 from nutdamp import __version__
 from nutdamp.cli.boundary import run
+from nutdamp.errors import nearest
 
 COMMANDS = {
     "plan": "Plan pulse schedules that damp the nutation, and compare them.",
@@ -39,6 +40,16 @@ class Commands(click.Group):
         """The commands on the help page, without loading any of them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that a command line names; a usage error says which one a misspelt name may stand for."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            close = nearest(name, COMMANDS)
+            ctx.fail(f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else ""))
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """The command of that name."""

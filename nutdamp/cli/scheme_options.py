@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import click
 
 from nutdamp.cli.failures import debug_option
-from nutdamp.cli.parameters import Angles, Direction, FinalSpin, Quantity
+from nutdamp.cli.parameters import Angles, Bare, Direction, FinalSpin, Named, Quantity, reading_of
 from nutdamp.errors import SenselessOption
 from nutdamp.schemes.options import Kind, Options, SchemeOptions, names_of
 from nutdamp.schemes.registry import SCHEMES, SUNLIT
@@ -26,6 +26,9 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"
 """Heading of the options that say what is to be reached."""
+
+FASTEST = 100.0
+"""rad/s; no spacecraft spins faster, so a larger number without unit is more likely one of rpm, as a whole one is."""
 
 COUNT_FROM_ONE = click.IntRange(1)
 
@@ -169,7 +172,7 @@ def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
 
 def _type(kind: Kind) -> click.ParamType[Any]:
     if kind.names:
-        return click.Choice(kind.names)
+        return Named(kind.names)
     return COUNT_FROM_ONE if kind.unit is None else Quantity(kind.unit)
 
 
@@ -198,6 +201,8 @@ class Aim(NamedTuple):
                     f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)", param_hint="--spin"
                 )
             goal = dataclasses.replace(goal, spin=spin)
+        if isinstance(self.spin, Bare) and (self.spin.is_integer() or abs(self.spin) > FASTEST):
+            remark(f"--spin: warning: {reading_of(self.spin, 'rate', 'rpm')}")
         for option, angles in (("--target", self.target), ("--sun", self.sun)):
             for reading in () if angles is None else angles.readings:
                 remark(f"{option}: warning: {reading}")

@@ -19,7 +19,7 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.parameters import FILE, Named, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.schemes import NAMES, Options
@@ -36,8 +36,8 @@ PICTURED = 100_000
 @spacecraft_argument
 @click.option(
     "--scheme",
-    type=click.Choice(NAMES),
-    help="Plan this scheme with default options and propagate it; none is free motion.",
+    type=Named(NAMES),
+    help="Plan this scheme with default options and propagate it, not the recommended one; none is free motion.",
 )
 @click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
@@ -76,7 +76,7 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
     example. A FILE of - is standard output, for --schedule standard input.
     """
-    if (scheme is None) == (schedule is None):
+    if scheme is not None and schedule is not None:
         raise click.UsageError("name what to propagate: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")

@@ -19,7 +19,7 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, FOLDER, Quantity
+from nutdamp.cli.parameters import FILE, FOLDER, Bare, Named, Quantity, reading_of
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
 from nutdamp.schemes.options import LEAST, OptimalOptions, Options
@@ -51,7 +51,7 @@ class Allowance(Quantity):
 @click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
 @click.option(
     "--least",
-    type=click.Choice(LEAST[:2]),
+    type=Named(LEAST[:2]),
     default=LEAST[0],
     show_default=True,
     help="What is traded against time; impulse where propellant is unknown.",
@@ -91,6 +91,9 @@ def command(
     silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot, schedules=written)
     expect_picture(plot)
     remark = remarks(quiet)
+    for shift in allow:
+        if isinstance(shift, Bare) and shift:
+            remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
     chosen = OptimalOptions(least=least, with_disturbances=options.with_disturbances)

@@ -19,7 +19,7 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE
+from nutdamp.cli.parameters import FILE, Named
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @spacecraft_argument
 @click.option(
     "--scheme",
-    type=click.Choice(NAMES),
+    type=Named(NAMES),
     help="Verify this scheme with default options; without it the recommended one.",
 )
 @click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file, as `plan --csv` writes it.")

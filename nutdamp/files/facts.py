@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from typing import NamedTuple
 
@@ -17,13 +16,6 @@ Vector = NDArray[np.float64]
 
 MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
 """Keys for single parts of an inertia tensor, which a file gives as a whole."""
-
-
-def nearest(word: str, known: list[str]) -> str | None:
-    """The one of some names that a misspelt ``word`` stands for, whatever its case."""
-    folded = {name.casefold(): name for name in known}
-    close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.7)
-    return folded[close[0]] if close else None
 
 
 class Finding(NamedTuple):

@@ -12,11 +12,12 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from nutdamp.errors import Fault, FaultyFile, in_order
+from nutdamp.errors import Fault, FaultyFile, in_order, nearest
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
-from nutdamp.files.facts import MOMENT, Finding, nearest
+from nutdamp.files.facts import MOMENT, Finding
 from nutdamp.files.fields import section_of
+from nutdamp.files.kinds import foreign
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import findings
@@ -32,6 +33,9 @@ def read_contents(
 
     ``warn`` is given what is hardly meant. Raises `FaultyFile` with all faults, sorted by place.
     """
+    other = foreign(text.removeprefix("\ufeff"))
+    if other is not None:
+        raise FaultyFile([Fault(name, 1, 1, "", other)])
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced

@@ -5,13 +5,13 @@ The rules read the raw tree and skip what cannot be read, so that they speak up 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import nearest
 from nutdamp.files.facts import MOMENT, Facts, Finding
 from nutdamp.files.fields import SMALLEST
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
@@ -286,9 +286,9 @@ def _channels(facts: Facts) -> Iterator[Finding]:
 def instead(name: str, names: list[str]) -> str:
     """The thruster that was meant, or all there are."""
     few = names[:20]  # to look for the nearest of very many takes long
-    close = difflib.get_close_matches(name, few, n=1)
-    if close:
-        return f"did you mean {shown(close[0])}?"
+    close = nearest(name, few)
+    if close is not None:
+        return f"did you mean {shown(close)}?"
     return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
 
 

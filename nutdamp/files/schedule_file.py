@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from nutdamp.epoch import Epoch
-from nutdamp.errors import Fault, FaultyFile, printable
-from nutdamp.files.facts import nearest
+from nutdamp.errors import Fault, FaultyFile, nearest, printable
 from nutdamp.files.input import read_utf8
 from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
 from nutdamp.planning import Plan

@@ -6,7 +6,6 @@ The tree is changed before anything in it is checked, so that what is set is che
 from __future__ import annotations
 
 import ast
-import difflib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,7 +13,7 @@ from dataclasses import replace
 from numbers import Integral, Real
 from typing import NamedTuple
 
-from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.errors import BadRequest, Fault, FaultyFile, nearest
 from nutdamp.files.yaml_tree import MAX_DEPTH, KeyPath, Node, Place, dotted, read_value
 from nutdamp.units import shown
 
@@ -182,8 +181,8 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
     known = [name for name in names if isinstance(name, str)]
     if not known:
         raise _NoPlaceError(f"expected a position, such as {dotted((*behind, 0))}: the entries have no names")
-    close = difflib.get_close_matches(step, known, n=1)
-    cure = f"did you mean {shown(close[0])}?" if close else f"there are {', '.join(map(shown, known[:8]))}"
+    close = nearest(step, known) if isinstance(step, str) else None
+    cure = f"did you mean {shown(close)}?" if close else f"there are {', '.join(map(shown, known[:8]))}"
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
 

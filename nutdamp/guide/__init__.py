@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, nearest
 from nutdamp.guide.equation import Equation
 from nutdamp.guide.kreisel import KREISEL, OWN, SOURCES
 from nutdamp.guide.magnus import MAGNUS
@@ -82,5 +81,5 @@ def equation(source: str, number: str) -> Equation:
 
 def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") -> str:
     """``did you mean 'nutation'?``, or the command by which they are ``listed``."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"`{listed}` lists them"
+    close = nearest(name, known)
+    return f"did you mean {close!r}?" if close else f"`{listed}` lists them"

@@ -8,7 +8,7 @@ from os import PathLike
 
 from nutdamp import arguments, planning, schemes
 from nutdamp.arguments import shown
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, nearest
 from nutdamp.library.craft import expected
 from nutdamp.planning import Comparison, Plan
 from nutdamp.schemes import Choice, Options, SchemeOptions
@@ -54,7 +54,9 @@ def _names(values: Iterable[str]) -> tuple[str, ...]:
     names = tuple(values)
     for name in names:
         if not isinstance(name, str) or name not in schemes.NAMES:
-            raise BadRequest(f"there is no scheme {shown(name)}; there are {', '.join(schemes.NAMES)}")
+            close = nearest(name, schemes.NAMES) if isinstance(name, str) else None
+            cure = f"there are {', '.join(schemes.NAMES)}" if close is None else f"did you mean {close!r}?"
+            raise BadRequest(f"there is no scheme {shown(name)}; {cure}")
     return names
 
 

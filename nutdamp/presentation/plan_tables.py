@@ -16,7 +16,7 @@ from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, steering
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, steering
 from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
@@ -196,8 +196,8 @@ def _part(bound: Bound) -> tuple[str, Cell]:
         text = quantity(found.left, "rad/s") if bound.part is Part.SPIN else degrees(found.left)
         return text if found.met else f"{NOT} {text}"
 
-    most = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else degrees(bound.most)
-    return f"  {bound.part.label} ≤ {most}", cell
+    limit = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else most(bound.most)
+    return f"  {bound.part.label} ≤ {limit}", cell
 
 
 def _angle(left: Residual | None, name: str) -> str:

@@ -67,7 +67,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
         )
     what = verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
-    more = f"{rest} more plans are worse. " if rest else ""
+    more = f"{rest} more plan{'s rank' if rest > 1 else ' ranks'} below these. " if rest else ""
     note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
     star = " * is recommended for nominal values." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))

@@ -36,6 +36,11 @@ def degrees(angle: float | None) -> str:
     return f"{shown:.4g} deg"
 
 
+def most(angle: float) -> str:
+    """The most that an angle may be, given in rad, in degrees: as it was given, however small."""
+    return f"{math.degrees(angle):.4g} deg"
+
+
 def mass(value: float | None) -> str:
     """Propellant given in kg, in g below a kilogram."""
     if value is None:

@@ -14,7 +14,7 @@ from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Comparison, Plan
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, sentence
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, sentence
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import obstacle
 from nutdamp.schemes.registry import OPTIMAL
@@ -151,7 +151,7 @@ def shortfall(plan: Plan, bound: Bound) -> str:
         goal = plan.spacecraft.goal.spin or 0.0
         return f"the spin at {_rpm(left.spin)} ({_rpm(goal)} required)"
     allowed = "required" if bound.required else "would count as damped"
-    return f"{degrees(value)} of {bound.part.label} ({degrees(bound.most)} {allowed})"
+    return f"{degrees(value)} of {bound.part.label} ({most(bound.most)} {allowed})"
 
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
@@ -296,7 +296,7 @@ def required(spacecraft: Spacecraft) -> str:
             tolerance = 100.0 * compliance.SPIN_TOLERANCE
             texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
         else:
-            texts.append(f"{bound.part.label} within {degrees(bound.most)}")
+            texts.append(f"{bound.part.label} within {most(bound.most)}")
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 2 else texts)
 
 

@@ -45,7 +45,10 @@ def verdict(found: Verification) -> str:
 
 def conservation(spacecraft: Spacecraft, found: Verification) -> str:
     """How far |H| and the energy change on coasts, in a sentence."""
-    drifts = f"|H| by at most {found.momentum_drift:.1e}, the energy by {found.energy_drift:.1e} of itself"
+    if found.momentum_drift == 0.0 == found.energy_drift:
+        return "On coasts neither |H| nor the energy changes by a single digit."
+    momentum, energy = _difference(found.momentum_drift), _difference(found.energy_drift)
+    drifts = f"|H| by at most {momentum} of itself, the energy by {energy}"
     if spacecraft.disturbances or spacecraft.growth != 0.0:
         return f"On coasts disturbances or dissipation change {drifts}."
     return f"On coasts, where both should stay, rounding changes {drifts}."

@@ -185,3 +185,61 @@ def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib(arguments: s
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "LOADED"
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        (("plan", "--csv", "x"), "got a schedule, as `plan --csv` writes it; name it with --schedule"),
+        (("simulate", "--scheme", "none", "--csv", "x"), "got a track, as `simulate --csv` writes it"),
+        (("plan", "--json", "x"), "got a result in JSON, as nutdamp writes it"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_what_it_is(run: Run, written: tuple[str, ...], said: str) -> None:
+    """Their faults, such as a text where a mapping is expected, named no cure."""
+    assert run(*written).returncode == 0
+    done = run("plan", "x")
+    assert done.returncode == 2
+    assert done.stderr.startswith("x:1:1: expected a spacecraft file, ")
+    assert said in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("COMMENT a\nCCSDS_APM_VERS = 2.0\n", "`nutdamp import apm FILE`"),
+        ('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n', "`nutdamp import apm FILE`"),
+        ("CCSDS_OEM_VERS = 2.0\n", "another XML or HTML text"),
+    ],
+)
+def test_a_ccsds_message_is_called_that(run: Run, tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "x").write_text(text)
+    done = run("check", "x")
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_every_message_about_a_missing_file_has_the_name_of_the_program(run: Run) -> None:
+    for command in ("check", "plan"):
+        assert run(command, "nope.yaml").stderr == "nutdamp: cannot read nope.yaml: no such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "warning"),
+    [
+        (("plan", "--spin", "31"), "--spin: warning: 31 is read as 31 rad/s; write 31 rpm if that is meant"),
+        (("plan", "--spin", "3.25"), None),
+        (("plan", "--spin", "31 rad/s"), None),
+        (
+            ("trade", "--points", "1", "--allow", "0.1"),
+            "--allow: warning: 0.1 is read as 0.1 rad (5.73 deg); write 0.1",
+        ),
+        (("trade", "--points", "1", "--allow", "0.1deg"), None),
+        (("trade", "--points", "1", "--allow", "0"), None),
+    ],
+)
+def test_numbers_without_unit_that_are_hardly_meant_are_named(
+    run: Run, words: tuple[str, ...], warning: str | None
+) -> None:
+    said = run(*words).stderr
+    assert "is read as" not in said if warning is None else warning in said

@@ -138,7 +138,9 @@ def test_schemes_can_be_named(run: Run) -> None:
         (("plan", "--on-time", "20 Hz"), "Hz"),
         (("plan", "--on-time", "0"), "above zero"),
         (("plan", "--no-such-option"), "No such option"),
-        (("fly",), "No such command"),
+        (("fly",), "there is no command 'fly'"),
+        (("simulatte",), "there is no command 'simulatte'; did you mean 'simulate'?"),
+        (("plan", "--scheme", "two-puls"), "did you mean 'two-pulse'?"),
     ],
 )
 def test_a_bad_command_line_is_exit_2_and_writes_nothing(
@@ -337,6 +339,13 @@ def test_each_part_of_the_requirement_is_shown_beside_what_is_left(run: Run) -> 
     said = "momentum_shift bounds the axis error: H from the target"
     assert said in aimed
     assert said not in done.stdout
+
+
+def test_a_requirement_below_rounding_is_shown_as_it_was_given(run: Run) -> None:
+    """It read "shift of H within < 1e-9 deg"."""
+    done = run("plan", "--set", "requirement.momentum_shift=1e-12 deg")
+    assert "nutation within 0.5 deg and shift of H within 1e-12 deg\n" in done.stdout
+    assert "  shift of H ≤ 1e-12 deg " in done.stdout
 
 
 def test_json_holds_each_part_of_the_requirement(run: Run) -> None:

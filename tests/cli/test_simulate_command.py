@@ -105,7 +105,6 @@ def test_binary_and_missing_schedules(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        (),
         ("--scheme", "one-pulse", "--schedule", "x.csv"),
         ("--scheme", "one-pulse", "--until", "-1"),
         ("--scheme", "one-pulse", "--until", "1 m"),
@@ -118,6 +117,14 @@ def test_bad_command_lines_are_exit_2(run: Run, tmp_path: Path, arguments: tuple
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
+    """As `disperse`, `verify` and `report` do; it was refused."""
+    done = run("simulate")
+    assert done.returncode == 0
+    assert "no --scheme and no --schedule named: using the recommended plan, four-pulse\n" in done.stderr
+    assert done.stdout == run("simulate", "--scheme", "four-pulse").stdout
 
 
 def test_free_motion_keeps_its_nutation(run: Run) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterable
 
 from nutdamp.epoch import Epoch
-from nutdamp.errors import Fault
+from nutdamp.errors import Fault, nearest
 from nutdamp.files.ccsds.message import Block, Entry, Keyword
 
 LARGEST = 1e15
@@ -35,8 +34,8 @@ class Checked:
         for entry in self.block.entries:
             name = entry.keyword
             if name not in self._known:
-                close = difflib.get_close_matches(name, order, n=1)
-                cure = f"did you mean {close[0]}?" if close else f"known here: {', '.join(order)}"
+                close = nearest(name, order)
+                cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
                 self.faults.append(Fault(self.file, entry.line, 1, name, f"unknown keyword; {cure}"))
             elif name in self.entries:
                 first = self.entries[name].line

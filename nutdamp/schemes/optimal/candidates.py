@@ -8,13 +8,10 @@ from functools import partial
 
 from nutdamp import work
 from nutdamp.errors import Infeasible
-from nutdamp.limits import keeps_limits, usable
+from nutdamp.limits import keeps_limits
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.spacecraft import Spacecraft
-
-TRAINS = ((1, 12), (2, 24), (1, 24), (2, 12), (1, 48), (2, 48))
-"""Pulses in each spin turn, and in all, of the trains to a target that are tried beside the usual one."""
 
 CONES = (12, 6, 3)
 """Half cones in a row that are tried beside the number that the scheme takes."""
@@ -36,7 +33,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         plans.append(partial(two_pulse.alternatives, body, TwoPulseOptions()))
     else:
         plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
-        plans += [partial(rhumb_line.schedule, body, one) for one in (RhumbLineOptions(), *_trains(body))]
+        plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
         plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
     for plan in plans:
         if work.exhausted():
@@ -47,18 +44,3 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         except Infeasible:
             continue
         yield from (one for one in every if keeps_limits(spacecraft, one))
-
-
-def _trains(body: Spacecraft) -> Iterator[RhumbLineOptions]:
-    """Trains of so many pulses, as long as the channels allow."""
-    channels = usable(body)
-    if not channels:
-        return
-    weakest = min(abs(channel.transverse) for channel in channels)
-    shortest, longest = max(one.min_on_time for one in channels), min(one.max_on_time for one in channels)
-    tried: set[tuple[int, float]] = set()
-    for per_turn, count in TRAINS:
-        on_time = min(max(body.turning_impulse / (count * weakest), shortest), longest)
-        if (per_turn, on_time) not in tried:
-            tried.add((per_turn, on_time))
-            yield RhumbLineOptions(per_turn=per_turn, on_time=on_time)
