@@ -50,7 +50,7 @@ __version__ = "0.2.0"
 if not TYPE_CHECKING:  # or else a type checker would believe in any name
 
     def __getattr__(name: str) -> Any:
-        """Load a public name when it is first asked for: the command line, too, begins here, and must begin fast."""
+        """Load a public name when it is first requested: the command line, too, begins here, and must begin fast."""
         if name not in __all__:
             raise AttributeError(f"module 'nutdamp' has no attribute {name!r}")
         from importlib import import_module

@@ -79,12 +79,12 @@ def aim(spacecraft: Spacecraft) -> Part:
 
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     """The bounds of the requirement, and of the spin where the goal names one; none where nothing is required."""
-    asked, goal = spacecraft.requirement, spacecraft.goal
+    requested, goal = spacecraft.requirement, spacecraft.goal
     bounds = []
-    if asked is not None and asked.nutation is not None:
-        bounds.append(Bound(Part.NUTATION, asked.nutation, True))
-    if asked is not None and asked.momentum_shift is not None:
-        bounds.append(Bound(aim(spacecraft), asked.momentum_shift, True))
+    if requested is not None and requested.nutation is not None:
+        bounds.append(Bound(Part.NUTATION, requested.nutation, True))
+    if requested is not None and requested.momentum_shift is not None:
+        bounds.append(Bound(aim(spacecraft), requested.momentum_shift, True))
     if goal.spin is not None:
         bounds.append(Bound(Part.SPIN, SPIN_TOLERANCE * abs(goal.spin), True))
     return tuple(bounds)

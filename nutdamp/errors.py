@@ -53,7 +53,7 @@ class Fault(NamedTuple):
 
     @property
     def as_warning(self) -> str:
-        """How it is told where the file is taken all the same."""
+        """How it reads where the file is taken all the same."""
         return str(self._replace(problem=f"warning: {self.problem}"))
 
 
@@ -74,11 +74,11 @@ class FaultyFile(NutdampError):
 
 
 class BadRequest(NutdampError):
-    """A call or a command line that asks for something impossible, whatever the spacecraft."""
+    """A call or a command line that needs something impossible, whatever the spacecraft."""
 
 
 class Unsuitable(BadRequest):
-    """A value of the spacecraft file that does not do for what is asked, and else is none of its faults.
+    """A value of the spacecraft file that does not do for what is requested, and else is none of its faults.
 
     ``where`` is the path of keys to it, such as ``("attitude", "epoch")``.
     """

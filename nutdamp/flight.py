@@ -1,7 +1,7 @@
 """Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
 
 Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
-impulses. `flown` is the judge: real widths, true moments. Both give legs that can be asked for the motion at any time.
+impulses. `flown` is the judge: real widths, true moments. Both give legs that can be requested the motion at any time.
 """
 
 from __future__ import annotations
@@ -352,7 +352,7 @@ def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Fli
 
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
     series at rounding accuracy. The last leg reaches at least to ``until`` s. Raises Infeasible where that takes more
-    than `PLANNED_STEPS`, or `rigid.MOST_STEPS` where a later end is asked for.
+    than `PLANNED_STEPS`, or `rigid.MOST_STEPS` where a later end is requested.
     """
     dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end

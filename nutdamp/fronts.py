@@ -21,7 +21,7 @@ SAVES = 1e-3
 """Share of the cost that a later end must save to count as another point."""
 
 EVERYWHERE = math.inf
-"""Shift of H allowed that asks nothing."""
+"""Shift of H allowed that requires nothing."""
 
 
 class Point(NamedTuple):
@@ -66,8 +66,8 @@ def fronts(
     """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    A schedule that keeps a smaller shift stands for the larger ones too, where none beats it. ``progress`` is told
-    how many of the count × len(shifts) searches are done.
+    A schedule that keeps a smaller shift stands for the larger ones too, where none beats it. ``progress`` is called
+    with how many of the count × len(shifts) searches are done.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.

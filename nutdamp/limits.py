@@ -24,7 +24,7 @@ OFF_TICK = 1e-6
 
 
 class Windows:
-    """The limits of one spacecraft, asked about one pulse at a time."""
+    """The limits of one spacecraft, for one pulse at a time."""
 
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
         """``endless`` drops the horizon, to tell what a longer one would allow."""
@@ -106,14 +106,14 @@ class Windows:
         tick = self.limits.tick
         return times if tick is None else np.ceil((times - 0.5 * TOUCHING) / tick) * tick
 
-    def on_time(self, wanted: float, shortest: float, longest: float) -> float:
-        """Commandable on-time nearest to ``wanted`` s within the bounds, and not zero."""
+    def on_time(self, needed: float, shortest: float, longest: float) -> float:
+        """Commandable on-time nearest to ``needed`` s within the bounds, and not zero."""
         tick = self.limits.tick
         if tick is None:
-            return min(max(wanted, shortest), longest)
+            return min(max(needed, shortest), longest)
         least = max(math.ceil((shortest - TOUCHING) / tick), 1)
         most = math.inf if math.isinf(longest) else math.floor((longest + TOUCHING) / tick)
-        return float(min(max(round(wanted / tick), least), most)) * tick
+        return float(min(max(round(needed / tick), least), most)) * tick
 
 
 def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[tuple[float, float]]:

@@ -238,7 +238,7 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = 
 
 
 def known(spacecraft: Spacecraft, options: schemes.SchemeOptions) -> Spacecraft:
-    """The spacecraft as the schemes are to know it: with its disturbances only where they are asked for.
+    """The spacecraft as the schemes are to know it: with its disturbances only where they are requested.
 
     A spin that nothing can change, and that is the one of the goal, is no goal for them.
     """
@@ -263,7 +263,7 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes
 
 
 def _helps(judged: Plan, left: Residual) -> bool:
-    """Whether nutation, distance from the target axis or from the final spin asked for is less than without pulses."""
+    """Whether nutation, distance from the target axis or from the final spin requested is less than without pulses."""
     body = judged.spacecraft
     if body.goal.spin is not None and abs(judged.flight.settled.spin - body.goal.spin) < abs(
         body.spin - body.goal.spin

@@ -136,7 +136,7 @@ def cheapest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     """The plan that leaves least, and what decided; of those that leave as little the nearest to the requirement.
 
-    Angles within `DAMPED_ANGLE` are as little; those as near, but for 0.1 % or rounding, are told apart by `cheapest`.
+    Angles within `DAMPED_ANGLE` are as little; of those as near, but for 0.1 % or rounding, the one by `cheapest`.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY

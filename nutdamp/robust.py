@@ -145,12 +145,12 @@ def compare(
 ) -> RobustComparison:
     """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases; ``watch`` is told how many trials are done. ``impulses``: in closed form. Raises BadRequest for a
-    spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
+    ``samples`` cases; ``watch`` is called with how many trials are done. ``impulses``: in closed form. Raises
+    BadRequest for a spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
     """
     body = comparison.spacecraft
-    asked = body.requirement
-    probability = PROBABILITY if asked is None or asked.probability is None else asked.probability
+    requested = body.requirement
+    probability = PROBABILITY if requested is None or requested.probability is None else requested.probability
     found: dict[object, Candidate] = {}
     for number, trial in enumerate(trials):
         watch(number)

@@ -19,7 +19,7 @@ RESOLUTION = 1e-4
 """Part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more."""
 
 TOUCHING = 1e-9
-"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be told apart."""
+"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be distinguished."""
 
 Label = TypeVar("Label")
 
@@ -52,7 +52,7 @@ class Pulse:
 
     @property
     def resolved(self) -> bool:
-        """Whether times can be told apart finely enough to say how long it is; an ideal impulse has no length."""
+        """Whether times can be distinguished finely enough to say how long it is; an ideal impulse has no length."""
         return self.on_time == 0.0 or math.ulp(self.end) <= RESOLUTION * self.on_time
 
     @property

@@ -106,7 +106,7 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None asks nothing.
+    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
 
     ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
     """

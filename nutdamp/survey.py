@@ -26,7 +26,7 @@ class ChannelSteps:
 
 @dataclass(frozen=True, slots=True)
 class PairFit:
-    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is how far the second is off the direction asked."""
+    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is how far the second is off the direction needed."""
 
     first: Channel
     second: Channel
@@ -59,7 +59,7 @@ def mounting_angle(spacecraft: Spacecraft) -> float:
 
 def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
     """The two channels whose directions come nearest to the turn between two half pulses; None without channels."""
-    wanted = cmath.rect(
+    needed = cmath.rect(
         1.0,
         damping.turn_between_halves(
             spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.transverse_rate, spacecraft.spin
@@ -67,7 +67,7 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
     )
     usable = [channel for channel in spacecraft.channels if channel.damps]
     pairs = [
-        PairFit(one, two, cmath.phase(two.transverse * (one.transverse * wanted).conjugate()))
+        PairFit(one, two, cmath.phase(two.transverse * (one.transverse * needed).conjugate()))
         for one in usable
         for two in usable
     ]
@@ -95,7 +95,7 @@ class Consequence:
 
 
 MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
-"""Nutation angles for which the time is told that a resonant disturbance takes to drive it there."""
+"""Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
 
 
 RESONANT = 3.0

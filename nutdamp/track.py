@@ -21,7 +21,7 @@ PIECE = 20_000
 """Rows of a track that are held at a time where many are written."""
 
 BINS = 7200
-"""Parts of a turn by which a range of right ascension is told apart from a whole turn: 0.05 deg."""
+"""Parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class Kind:
         return f"{', '.join(others)} or {last}" if others else last
 
     @property
-    def wanted(self) -> str:
+    def expected(self) -> str:
         """What may be written, for messages: ``a number in kg, or a text in kg or g``."""
         if not self.factors:
             return "no unit, no quotes"
@@ -83,13 +83,13 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
     Raises ValueError, with a message that says what is wrong and what is allowed; also for NaN, infinite and
     unphysically large values.
     """
-    wanted = KINDS[kind]
+    expected = KINDS[kind]
     if isinstance(value, str):
         number, factor = _split(value, kind, bare)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         number, factor = value, 1.0
     else:
-        raise ValueError(f"expected {wanted.noun} ({wanted.wanted}), got {shown(value)}")
+        raise ValueError(f"expected {expected.noun} ({expected.expected}), got {shown(value)}")
     try:
         result = float(number) * factor
     except OverflowError:
@@ -97,32 +97,32 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
     if not math.isfinite(result):
         raise ValueError(f"{shown(value)} is not a finite number")
     if abs(result) > LARGEST:
-        raise ValueError(f"{shown(value)} is beyond anything physical; at most {LARGEST:g} {wanted.si}".rstrip())
+        raise ValueError(f"{shown(value)} is beyond anything physical; at most {LARGEST:g} {expected.si}".rstrip())
     return result
 
 
 def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     """Number and factor of a text with a unit of ``kind``."""
-    wanted = KINDS[kind]
+    expected = KINDS[kind]
     match = _QUANTITY.fullmatch(text)
     # A "unit" that starts like the rest of a number is a decimal comma or a thousands separator.
     if match is None or re.match(r"[0-9.,_']", match[2]):
-        raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
+        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     number, unit = float(match[1]), re.sub(r"\s+", " ", match[2])
     if not unit and bare:
         return number, 1.0
-    if not wanted.factors:
-        raise ValueError(f"{shown(text)} is not {wanted.noun}: {wanted.wanted}")
+    if not expected.factors:
+        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     if not unit:
-        raise ValueError(f"{shown(text)} has no unit; add {wanted.units}, or leave the quotes out")
+        raise ValueError(f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out")
     found = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
     if found is None:
-        noun = wanted.noun.partition(" ")[2]
+        noun = expected.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
-        raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {wanted.units}{hint}")
+        raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}")
     if found[0] != kind:
-        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; expected {wanted.noun}: {wanted.wanted}")
+        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; expected {expected.noun}: {expected.expected}")
     return number, found[1]
 
 

@@ -227,7 +227,7 @@ def expect_places(*paths: str | None) -> None:
 
 
 def deliver(outputs: Sequence[Output], *screens: RenderableType, unsaved: Sequence[CannotWrite] = ()) -> None:
-    """Write the files asked for, and show results on standard output.
+    """Write the files requested, and show results on standard output.
 
     A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
     those that are ``unsaved`` already. Raises CannotWrite.

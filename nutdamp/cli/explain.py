@@ -30,22 +30,22 @@ def command(topic: tuple[str, ...]) -> None:
     """
     from nutdamp.presentation import explain_tables
 
-    asked = " ".join(topic)
-    if not asked.strip():
+    requested = " ".join(topic)
+    if not requested.strip():
         show(explain_tables.topics_screen())
-    elif asked.strip().casefold() == "equations":
+    elif requested.strip().casefold() == "equations":
         show(explain_tables.equations_screen())
     else:
-        show(explain_tables.topic_screen(_topic(asked.strip())))
+        show(explain_tables.topic_screen(_topic(requested.strip())))
 
 
-def _topic(asked: str) -> Topic:
+def _topic(requested: str) -> Topic:
     """The topic of that name; those on the spacecraft file are made from its models, which take longer to load."""
     from nutdamp import guide
 
-    name, _, below = asked.partition(".")
+    name, _, below = requested.partition(".")
     if name.casefold() == guide.FILE:
         from nutdamp.files.file_guide import file_topic
 
         return file_topic(below)
-    return guide.found(asked)
+    return guide.found(requested)

@@ -26,7 +26,7 @@ def impulse_options(command: Command) -> Command:
 
 
 def expect_impulses(impulses: bool, force: bool, flies: bool, option: str) -> None:
-    """A usage error for ``--impulses`` where no dispersed cases are flown, which ``option`` asks for."""
+    """A usage error for ``--impulses`` where no dispersed cases are flown, which ``option`` needs."""
     if force and not impulses:
         raise click.UsageError("--force is for --impulses")
     if impulses and not flies:

@@ -29,7 +29,7 @@ else:
 
 
 class Named(Choice[str]):
-    """One of some names; a misspelt one is told the nearest."""
+    """One of some names; for a misspelt one the error names the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """The name; a usage error for anything else."""
@@ -56,7 +56,7 @@ def is_number(word: str) -> bool:
 
 
 class FileName(ParamType[str]):
-    """A file name as it stands, which shells complete; whether it can be read or written is seen when it is."""
+    """A file name as it is, which shells complete; whether it can be read or written is seen when it is."""
 
     name = "file"
     completed_as = "file"
@@ -109,7 +109,7 @@ class FinalSpin(Quantity):
     """A rate, or ``keep``."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The rate in rad/s, or ``keep`` as it stands."""
+        """The rate in rad/s, or ``keep`` as it is."""
         return value if value == "keep" else super().convert(value, param, ctx)
 
 

@@ -146,5 +146,5 @@ def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: 
     from nutdamp.cli.progress import progress
 
     trials = robust.attempts(compared, options)
-    with progress("dispersing", len(trials), quiet=quiet) as told:
-        return robust.compare(compared, trials, told, impulses=impulses, force=force)
+    with progress("dispersing", len(trials), quiet=quiet) as advance:
+        return robust.compare(compared, trials, advance, impulses=impulses, force=force)

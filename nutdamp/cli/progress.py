@@ -23,7 +23,7 @@ PATIENCE = 1.0
 
 @contextmanager
 def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> Iterator[Callable[[int], None]]:
-    """A function to be told now and then how many of ``total`` are done; ``done`` were before the run began.
+    """A function to call now and then with how many of ``total`` are done; ``done`` were before the run began.
 
     It shows a bar with rate and time left on standard error: only on a terminal, only after a second, and it leaves
     nothing behind.
@@ -119,7 +119,7 @@ class _Bar:
 
 
 class Stop:
-    """Whether a run was asked to stop, and by which signal."""
+    """Whether a run was requested to stop, and by which signal."""
 
     number: int | None = None
 
@@ -130,7 +130,7 @@ class Stop:
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Tells whether the run was asked to stop, by Ctrl-C or SIGTERM, so that it can end in order.
+    """Tells whether the run was requested to stop, by Ctrl-C or SIGTERM, so that it can end in order.
 
     A second Ctrl-C interrupts at once.
     """

@@ -51,8 +51,8 @@ def console() -> Console:
 
     from rich.console import Console
 
-    asked = os.environ.get("COLUMNS", "")
-    width = shutil.get_terminal_size().columns if asked.isdigit() and int(asked) < NARROWEST else None
+    requested = os.environ.get("COLUMNS", "")
+    width = shutil.get_terminal_size().columns if requested.isdigit() and int(requested) < NARROWEST else None
     if width is not None:
         width = max(width, NARROWEST)
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)

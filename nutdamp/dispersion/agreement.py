@@ -59,12 +59,12 @@ def check_impulses(study: Study, *, force: bool = False) -> str:
             f"--impulses: real widths cannot be flown to check it: {reason}; --force does without"
         ) from None
     level = f"{100.0 * found[0].probability:.10g} % of the first {CASES:,} cases"
-    told = f"the impulse sum (17) errs by up to {' and '.join(map(str, found))} in {level}"
+    text = f"the impulse sum (17) errs by up to {' and '.join(map(str, found))} in {level}"
     beyond = [one for one in found if one.error > one.most]
     if beyond and not force:
         tenth = "a tenth of the requirement" if compliance.required(study.model.spacecraft) else "the most allowed"
         most = " and ".join(str(one._replace(error=one.most)) for one in beyond)
         raise BadRequest(
-            f"--impulses: {told}; {tenth} is {most}. Leave --impulses out to fly real widths, or add --force"
+            f"--impulses: {text}; {tenth} is {most}. Leave --impulses out to fly real widths, or add --force"
         )
-    return told
+    return text

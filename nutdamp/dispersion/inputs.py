@@ -94,35 +94,35 @@ def _no_size(entry: Input) -> str:
 
 
 def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unused]:
-    asked = spacecraft.dispersions
-    if asked is None:
+    requested = spacecraft.dispersions
+    if requested is None:
         return
-    moments = (("A", spacecraft.inertia.A, asked.A), ("C", spacecraft.inertia.C, asked.C))
+    moments = (("A", spacecraft.inertia.A, requested.A), ("C", spacecraft.inertia.C, requested.C))
     rates = spacecraft.inertia.axes @ spacecraft.omega0
     for name, nominal, tolerance in moments:
         if tolerance is not None:
             yield _input(name, name, tolerance, nominal, "kg m²")
-    for number, (tolerance, rate) in enumerate(zip(asked.omega0, rates.tolist(), strict=True), start=1):
+    for number, (tolerance, rate) in enumerate(zip(requested.omega0, rates.tolist(), strict=True), start=1):
         if tolerance is not None:
             yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")
     members = fired(spacecraft, schedule)
-    for name, tolerance in asked.thrust.items():
+    for name, tolerance in requested.thrust.items():
         yield _thrust(name, tolerance, members)
-    for name, tolerance in asked.thrust_direction.items():
+    for name, tolerance in requested.thrust_direction.items():
         yield from _direction(name, tolerance, members)
-    for name, tolerance in asked.position.items():
+    for name, tolerance in requested.position.items():
         yield from _position(name, tolerance, members)
     pulses = range(1, len(schedule) + 1)
-    if asked.thrust_per_pulse is not None:
+    if requested.thrust_per_pulse is not None:
         named = [f"thrust pulse {number}" for number in pulses]
-        yield from _of_pulses("thrust_per_pulse", named, asked.thrust_per_pulse, 1.0, "")
-    if asked.timing is not None:
-        yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], asked.timing, 0.0, "s")
-    if asked.timing_offset is not None:
-        yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), asked.timing_offset, 0.0, "s")
-    if asked.attitude is not None:
+        yield from _of_pulses("thrust_per_pulse", named, requested.thrust_per_pulse, 1.0, "")
+    if requested.timing is not None:
+        yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], requested.timing, 0.0, "s")
+    if requested.timing_offset is not None:
+        yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), requested.timing_offset, 0.0, "s")
+    if requested.attitude is not None:
         for axis in "xy":
-            yield _input(f"attitude {axis}", "attitude", asked.attitude, 0.0, "rad")
+            yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
 
 
 def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:

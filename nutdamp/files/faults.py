@@ -118,8 +118,8 @@ def _description(path: KeyPath) -> str:
     return text[:1].lower() + text[1:].rstrip(".")
 
 
-def _mismatch(details: ErrorDetails, wanted: str) -> str:
-    return f"expected {wanted}, got {shown(details['input'])}"
+def _mismatch(details: ErrorDetails, expected: str) -> str:
+    return f"expected {expected}, got {shown(details['input'])}"
 
 
 def _text(details: ErrorDetails) -> str:
@@ -128,10 +128,10 @@ def _text(details: ErrorDetails) -> str:
 
 
 def _count(details: ErrorDetails) -> str:
-    wanted, found = details["ctx"].get("min_length", details["ctx"].get("max_length")), len(details["input"])
-    if wanted == 1:
+    expected, found = details["ctx"].get("min_length", details["ctx"].get("max_length")), len(details["input"])
+    if expected == 1:
         return "empty; expected an entry"
-    return f"expected {wanted} entries, got {found}"
+    return f"expected {expected} entries, got {found}"
 
 
 def _choice(details: ErrorDetails) -> str:

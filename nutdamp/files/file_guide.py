@@ -81,13 +81,13 @@ def file_topic(below: str = "") -> Topic:
         for key in roots:
             parts += _sections(key, every)
         return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
-    asked = next((key for key in every if key.path == below), None)
-    if asked is None:
+    requested = next((key for key in every if key.path == below), None)
+    if requested is None:
         raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below, every)}")
     return Topic(
         f"{FILE}.{below}",
         "a key of the spacecraft file",
-        (Part("", (Rows((asked.row,)),)), *_sections(asked, every), _SEE),
+        (Part("", (Rows((requested.row,)),)), *_sections(requested, every), _SEE),
     )
 
 

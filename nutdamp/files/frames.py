@@ -80,7 +80,7 @@ def reference(spacecraft: Spacecraft) -> Reference:
 def stretches(flown: Flight, until: float) -> Iterator[Stretch]:
     """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
 
-    Stretches too short to be told apart in nanoseconds are left out. Raises BadRequest for a motion that would take
+    Stretches too short to be distinguished in nanoseconds are left out. Raises BadRequest for a motion that would take
     more than `MOST_RECORDS`.
     """
     legs = [leg for leg in flown.legs if leg.start < until]

@@ -18,7 +18,7 @@ from nutdamp.units import shown
 
 
 def _epoch(text: str) -> str:
-    """Refuses what is not a date and a time; their text is passed on as it stands."""
+    """Refuses what is not a date and a time; their text is passed on as it is."""
     try:
         if not re.fullmatch(_EPOCH, text):
             raise ValueError

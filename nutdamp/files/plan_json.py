@@ -115,7 +115,7 @@ def final_json(flown: Flight) -> dict[str, Any]:
 
 
 def target_json(body: Spacecraft) -> dict[str, Any] | None:
-    """What is asked of the end, in the form of `final_json`; None where nothing is."""
+    """What is required of the end, in the form of `final_json`; None where nothing is."""
     axis, spin = body.goal.axis, body.goal.spin
     if axis is None and spin is None:
         return None

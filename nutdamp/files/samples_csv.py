@@ -38,7 +38,7 @@ class SamplesWriter:
         self._inputs = study.model.inputs.drawn
         header = ["case", *(column(entry) for entry in self._inputs), *OUTPUT_COLUMNS]
         stream.write(csv_text(header, []).encode())
-        stream.flush()  # a full disk may as well be told before the first case is flown
+        stream.flush()  # a full disk is better reported before the first case is flown
 
     def write(self, first: int, values: Array) -> None:
         """The cases from ``first`` (from 0) on, with their outputs (5, n)."""

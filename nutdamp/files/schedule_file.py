@@ -294,13 +294,13 @@ class _Reader:
         if not off <= AGREES * max(pulse.t, 1.0):
             self._warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
 
-    # --- what is told ------------------------------------------------------------------------------------------------
+    # --- the warnings ------------------------------------------------------------------------------------------------
 
     def _fault(self, line: int, where: str, problem: str) -> None:
         self.faults.append(Fault(self.name, line, 1, where, problem))
 
     def _warn(self, line: int, subject: str, text: str) -> None:
-        """Keep a warning; of several on one ``subject`` the first is told, with the number of others."""
+        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
         self.warnings.setdefault(subject, []).append((line, text))
 
     def _told(self, found: list[tuple[int, str]]) -> str:

@@ -45,13 +45,13 @@ def save_results(path: str, results: Results) -> None:
         np.savez(stream, **arrays)
 
 
-def load_results(path: str, study: Study, asked: int) -> Results:
-    """What is done of ``study``, with room for ``asked`` cases; nothing where there is no such file yet.
+def load_results(path: str, study: Study, requested: int) -> Results:
+    """What is done of ``study``, with room for ``requested`` cases; nothing where there is no such file yet.
 
     Raises CannotRead, and BadRequest where the file is of another study or holds more cases.
     """
     if not Path(path).exists():
-        return Results(study, asked)
+        return Results(study, requested)
     try:
         with Path(path).open("rb") as stream:
             _expect_unpacked(stream)
@@ -68,7 +68,7 @@ def load_results(path: str, study: Study, asked: int) -> Results:
     if not belongs:
         raise BadRequest(f"cannot resume from {path}: {ANOTHER}")
     try:
-        return _results(study, arrays).extended(asked)
+        return _results(study, arrays).extended(requested)
     except BadRequest as wrong:
         raise BadRequest(f"cannot resume from {path}: {wrong}") from wrong
 

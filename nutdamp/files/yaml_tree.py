@@ -209,13 +209,13 @@ class _Builder:
             raise self.fatal(place, "not YAML: a number here is out of range") from None
         return event
 
-    def document(self, wanted: str, single: str) -> Node:
-        """The only document of the stream; ``wanted`` and ``single`` say what to do about none and about several."""
+    def document(self, needed: str, single: str) -> Node:
+        """The only document of the stream; ``needed`` and ``single`` say what to do about none and about several."""
         self.next()
         event = self.next()
         if isinstance(event, yaml.StreamEndEvent):
             what = "only comments" if self.text.strip() else "empty"
-            raise self.fatal(Place(1, 1), f"{what}; {wanted}")
+            raise self.fatal(Place(1, 1), f"{what}; {needed}")
         root = self.node(self.next(), ())
         self.next()
         event = self.next()
@@ -304,7 +304,7 @@ class _Builder:
         return float(value) if event.tag == f"{_CORE}float" and isinstance(value, int) else value
 
     def check_tag(self, tag: str | None, allowed: tuple[str, ...], place: Place, path: KeyPath) -> None:
-        """Raises `FaultyFile` for a tag that does not fit the value, above all one that asks for an object."""
+        """Raises `FaultyFile` for a tag that does not fit the value, above all one that needs an object."""
         if tag not in (None, "!", *(f"{_CORE}{name}" for name in allowed)):
             name = str(tag).replace(_CORE, "!!")
             raise self.fatal(place, f"the tag {shown(name)} does not fit here; leave it out", path)

@@ -33,7 +33,7 @@ NUTATION = Topic(
                 "Seen from the body, from the despun frame and from space the same nutation has three rates:",
                 Rows(
                     (
-                        ("in the body", "-aω3 rad/s; period T_ω = 2πA/|(A - C)ω3| s (a sphere: ω stands still)"),
+                        ("in the body", "-aω3 rad/s; period T_ω = 2πA/|(A - C)ω3| s (a sphere: ω does not turn)"),
                         ("despun frame", "Cω3/A rad/s: the rate in the body plus ω3"),
                         ("in space", "|H|/A = √(|ω|² + (C/A)²ω3²) rad/s; period 2πA/|H| s"),
                     )
@@ -43,9 +43,9 @@ NUTATION = Topic(
         Part(
             "Three different moments",
             (
-                "With I1 ≠ I2 the nutation angle swings between two values while H stands still. nutdamp then gives "
+                "With I1 ≠ I2 the nutation angle swings between two values while H is fixed. nutdamp then gives "
                 "the largest of the arc, and both cones of that instant, so that θ = μ + λ everywhere. Schemes plan on "
-                "the symmetric body of the same nutation rate and are trimmed on the true one:",
+                "the symmetric body of the same nutation rate and are corrected on the true one:",
                 Formula(("rate in the body = |ω3| √((I1 - C)(I2 - C)/(I1 I2))",)),
             ),
         ),

@@ -65,7 +65,7 @@ SCHEMES = (
             "back there, and nothing nutates. Any odd number of half turns does as well, and lets fixed channels come "
             "into line.",
             "Of body-fixed channels every pair and wait is looked at. Where the second channel misses the right "
-            "direction by ψ both still damp, at 1/cos(ψ/2) times the impulse. The pulses are trimmed on the flight "
+            "direction by ψ both still damp, at 1/cos(ψ/2) times the impulse. The pulses are corrected on the flight "
             "through their real widths.",
             "With --target, or a goal in the file, two pulses bring H and the spin axis there: H jumps to where the "
             "cone leads the spin axis over the target, and jumps onto it when the axis comes by.",
@@ -79,7 +79,7 @@ SCHEMES = (
         "pulse; exact at every angle for ideal impulses.",
         "Where H must stay where it is, with thrusters strong enough for two pulses: few pulses, least impulse.",
         (
-            ("--literal", "as printed: two equal halves, wait of small angles, no trim"),
+            ("--literal", "as printed: two equal halves, wait of small angles, no correction"),
             _TARGET,
         ),
         (
@@ -120,7 +120,7 @@ SCHEMES = (
         ),
         (
             "H turns, by the full θ0 at C = 0.8 A and C = 4A/3, where every pulse pushes it the same way.",
-            "Near a sphere T_ω grows as 1/|a|, and so does the time it takes. On a sphere ω stands still: the two "
+            "Near a sphere T_ω grows as 1/|a|, and so does the time it takes. On a sphere ω does not turn: the two "
             "channels on either side of it share the impulse.",
             "Below the smallest pulse J_min at most J_min/(2A) remains.",
             "It does not go to a target axis.",
@@ -195,7 +195,7 @@ SCHEMES = (
             "the Sun, as a Sun sensor gives it, and H follows a rhumb line: a curve of constant heading on the sphere "
             "with the Sun as its pole.",
             "Each pulse also starts a nutation; their number is chosen so that these cancel, and the last pulses are "
-            "trimmed on the flight.",
+            "corrected on the flight.",
         ),
         (
             "turn of H per pulse = J sinc(ω3τ/2)/(C|ω3|)",
@@ -216,7 +216,7 @@ SCHEMES = (
             "It needs a target axis (--target, or a goal in the file).",
             "Where C/(A K) is near a whole number, as near C = A with one pulse a turn, every pulse meets the nutation "
             "in the same phase and it piles up; another number of pulses a turn may help.",
-            "Pulses have the length of --on-time within 10 %: all are equal, but for the last few, which are trimmed. "
+            "Pulses have the length of --on-time within 10 %: all are equal, but the last few, which are corrected. "
             "Where no such train ends on the target, the nearest length that works is named.",
             "With --sun neither the spin axis nor the target may point to the Sun or away from it.",
         ),

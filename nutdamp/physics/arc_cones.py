@@ -11,7 +11,7 @@ from nutdamp.physics.cones import Cones, momentary
 def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> Cones:
     """The cones at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
 
-    With I1 = I2 they stay what they are; else θ swings between two values while H stands still in space. The spin
+    With I1 = I2 they stay what they are; else θ swings between two values while H is fixed in space. The spin
     axis is ``sense``·e3.
     """
     if moments[0] == moments[1]:

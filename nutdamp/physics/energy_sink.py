@@ -44,7 +44,7 @@ TINY = 1e-200
 
 
 SMALLEST = 1e-150
-"""Least cosine of a nutation angle that is told from zero: its square is a number still."""
+"""Least cosine of a nutation angle that is distinguished from zero: its square is a number still."""
 
 
 class Course(NamedTuple):

@@ -148,10 +148,10 @@ def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: comp
 
     |ω0 + M t/A| = C|ω3| tan θ/A: the later root, since the pole curve may first run inwards; 0 if it is there already.
     """
-    wanted = C * abs(spin) * math.tan(nutation) / A
+    needed = C * abs(spin) * math.tan(nutation) / A
     speed = torque / A
-    if abs(omega0) >= wanted:
+    if abs(omega0) >= needed:
         return 0.0
     along = (omega0 * speed.conjugate()).real / abs(speed)
     across = abs((omega0 * speed.conjugate()).imag) / abs(speed)
-    return (math.sqrt(wanted * wanted - across * across) - along) / abs(speed)
+    return (math.sqrt(needed * needed - across * across) - along) / abs(speed)

@@ -53,7 +53,7 @@ def free_attitude(moments: ArrayLike, rates0: ArrayLike, quaternion0: ArrayLike,
     """Attitude (n, 4), body -> inertial, of torque-free motion from ``quaternion0`` (4,) at t = 0.
 
     With e the unit vector of axis c on the side of H, and S the shortest turn of H's direction in the body to e,
-    R(t) = R(0) S(0)⁻¹ Rot_e(χ) S(t), because H stands still in space. What is left is the turn χ about it, at
+    R(t) = R(0) S(0)⁻¹ Rot_e(χ) S(t), because H is fixed in space. What is left is the turn χ about it, at
     dχ/dt = (2T + |H| ω_e)/(|H| + I_c ω_e): nowhere singular, since I_c ω_e >= 0. Its integral is summed as a Fourier
     series over a period of ω_e. Errors: a few roundings of the angle turned, below 1e-11 rad over 100 periods.
     """

@@ -93,10 +93,10 @@ def _requirement(results: Results) -> list[RenderableType]:
     if share is None:
         return [Text("The file has no requirement to meet.")]
     low, high = results.interval
-    asked = verdicts.required(results.study.model.spacecraft)
+    requested = verdicts.required(results.study.model.spacecraft)
     verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
     interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
-    text = Text.assemble(("Requirement ", "bold"), f"({asked}) ", verdict, f"; 95 % interval {interval}.")
+    text = Text.assemble(("Requirement ", "bold"), f"({requested}) ", verdict, f"; 95 % interval {interval}.")
     if results.meets_requirement and low < probability:
         few = cases_to_show(probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""
@@ -164,9 +164,9 @@ def _dominating(results: Results) -> list[RenderableType]:
         ranked = sorted(sums.items(), key=lambda one: -one[1])
         leading = [f"{key} ({_percent(share)})" for key, share in ranked if share >= 0.1] or [ranked[0][0]]
         verb = "dominates" if len(leading) == 1 else "dominate"
-        told = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
+        named = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
         if any(sums.values()):
-            lines.append(Text.assemble(f"The {name}: ", (told, "bold"), f" {verb}."))
+            lines.append(Text.assemble(f"The {name}: ", (named, "bold"), f" {verb}."))
     return lines
 
 
@@ -204,8 +204,8 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         outputs = np.degrees(study.outputs_of(draws)[:3])
         sigmas = [draws[entry.name] / entry.sigma if entry.sigma else 0.0 for entry in study.model.inputs.drawn]
         order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
-        told = ", ".join(f"{study.model.inputs.drawn[row].name} {sigmas[row]:+.1f}" for row in order if sigmas[row])
-        table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), told)
+        drawn = ", ".join(f"{study.model.inputs.drawn[row].name} {sigmas[row]:+.1f}" for row in order if sigmas[row])
+        table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), drawn)
     again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
 

@@ -26,7 +26,7 @@ LEAST = 1e-9
 """Degrees or deg/s below which a motion is drawn as a point."""
 
 NO_CONE = 1e-10
-"""Half-angle in rad below which a cone is not told from its axis."""
+"""Half-angle in rad below which a cone is not distinguished from its axis."""
 
 
 def drawn(flight: Flight, track: Track) -> Track:

@@ -62,7 +62,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
     table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
     still = math.isinf(spacecraft.body_period)
-    in_body = "none in the body, where ω stands still" if still else f"{duration(spacecraft.body_period)} in the body"
+    in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
     if spacecraft.dissipation is not None:
         table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))

@@ -32,9 +32,9 @@ def robust_screen(found: RobustComparison) -> RenderableType:
     parts += [Text(), _candidates(found), *reasons, Text()]
     parts.append(Text.assemble("Robust plan: ", (f"{chosen.plan.scheme}, {chosen.variant}", "bold"), f" – {reason}."))
     if chosen.met is not None:
-        asked = verdicts.required(found.comparison.spacecraft)
+        requested = verdicts.required(found.comparison.spacecraft)
         verdict = verdicts.cases_verdict(chosen.met, found.probability)
-        parts.append(Text.assemble(("Requirement ", "bold"), f"({asked}) {verdict}."))
+        parts.append(Text.assemble(("Requirement ", "bold"), f"({requested}) {verdict}."))
     parts.append(Text(verdicts.robust_cost(found)))
     if len(chosen.plan.pulses):
         parts += [Text(), pulse_table(chosen.plan), Text(), end_table(chosen.plan.flight)]

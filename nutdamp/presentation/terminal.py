@@ -57,9 +57,9 @@ class Drawing:
         panel = fitted(width, *geometry.room(points, 0.1, centre=True))
         self._path(panel, points)
         body = self.flight.spacecraft
-        told = "" if body.inertia.aligned else ", principal axes"
-        told += ", spin about -3" if body.spin < 0.0 else ""
-        return framed(panel, "Pole curve", f"ω1, deg/s{told}", "ω2, deg/s")
+        note = "" if body.inertia.aligned else ", principal axes"
+        note += ", spin about -3" if body.spin < 0.0 else ""
+        return framed(panel, "Pole curve", f"ω1, deg/s{note}", "ω2, deg/s")
 
     def axis_track(self, width: int) -> list[Text]:
         """The spin axis in space and where H jumps, as lines of ``width`` characters."""

@@ -41,7 +41,7 @@ def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableTy
 
 
 def front_name(front: Front, *, pointing: bool) -> str:
-    """What is asked of H, in words."""
+    """What is required of H, in words."""
     if math.isinf(front.shift):
         return "H may end anywhere"
     if front.shift == 0.0:

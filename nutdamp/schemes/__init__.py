@@ -59,8 +59,8 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     """Pulses of the scheme ``name``, disturbances and all.
 
     The scheme plans on the symmetric, undisturbed `symmetric_model` of the spacecraft; where that is not exact, the
-    last pulse (the last four of schemes that keep or turn H) is trimmed on the true motion. Raises Infeasible with the
-    reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
+    last pulse (the last four of schemes that keep or turn H) is corrected on the true motion. Raises Infeasible with
+    the reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
     """
     from nutdamp.schemes.tools.symmetric_model import model_of
 
@@ -122,7 +122,7 @@ def _loaded(scheme: Scheme) -> ModuleType:
 
 
 def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
-    """A schedule for the ``model`` as one for the true spacecraft, trimmed on its motion where that differs."""
+    """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
     from nutdamp.schemes.tools import least_squares
 
     made = model.translate(made)

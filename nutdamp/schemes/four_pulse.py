@@ -39,16 +39,16 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     return builder.schedule()
 
 
-def _on_time(builder: ImpulseBuilder, channel: Channel, asked: float | None) -> float:
+def _on_time(builder: ImpulseBuilder, channel: Channel, requested: float | None) -> float:
     """Length of a full pulse of ``channel``, s."""
-    if asked is None:
+    if requested is None:
         return max(min(channel.max_on_time, DEFAULT_SHARE * builder.period), channel.min_on_time)
-    if not (channel.min_on_time <= asked <= channel.max_on_time and 0.0 < asked < math.inf):
+    if not (channel.min_on_time <= requested <= channel.max_on_time and 0.0 < requested < math.inf):
         raise Infeasible(
-            f"an on-time of {asked:.4g} s is outside what {channel.name} allows: "
+            f"an on-time of {requested:.4g} s is outside what {channel.name} allows: "
             f"{channel.min_on_time:.4g} s to {channel.max_on_time:.4g} s"
         )
-    return asked
+    return requested
 
 
 def _turning(
@@ -77,8 +77,8 @@ def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPul
         longest = channel.max_on_time if options.on_time is None else options.on_time
         count = 1 if math.isinf(longest) else max(math.ceil(unit / longest - 1e-9), 1)
         for _ in range(count):
-            wanted = longest if options.coarse and not math.isinf(longest) else unit / count
-            on_time = builder.windows.on_time(wanted, channel.min_on_time, channel.max_on_time)
+            needed = longest if options.coarse and not math.isinf(longest) else unit / count
+            on_time = builder.windows.on_time(needed, channel.min_on_time, channel.max_on_time)
             start = builder.windows.earliest_start(on_time, builder.ready)
             if builder.full or start is None:
                 return

@@ -38,7 +38,7 @@ PATIENCE = 5
 """Numbers of cones that may fail before it is given up."""
 
 SHARES = np.linspace(0.6, 1.3, 15)
-"""Sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone asks for."""
+"""Sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone needs."""
 
 WORTH_WAITING = 0.05
 """Share of one pulse that waiting for a better phase must save."""

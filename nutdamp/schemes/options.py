@@ -18,7 +18,7 @@ ANY_ON_TIME = (0.0, math.inf)
 """Bounds on on-times, s, that bound nothing."""
 
 UNEQUAL = 0.1
-"""Share of a pulse length asked for by which the last pulses may differ from it."""
+"""Share of a pulse length requested by which the last pulses may differ from it."""
 
 LEAST = ("propellant", "impulse", "time", "pulses")
 """What the scheme optimal can save."""
@@ -131,9 +131,9 @@ class RhumbLineOptions(SchemeOptions):
 
     @property
     def on_times(self) -> tuple[float, float]:
-        """About the length asked for."""
-        asked = self.on_time
-        return ANY_ON_TIME if asked is None else ((1.0 - UNEQUAL) * asked, (1.0 + UNEQUAL) * asked)
+        """About the length requested."""
+        requested = self.on_time
+        return ANY_ON_TIME if requested is None else ((1.0 - UNEQUAL) * requested, (1.0 + UNEQUAL) * requested)
 
 
 @dataclass(frozen=True, kw_only=True)

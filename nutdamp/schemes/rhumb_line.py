@@ -2,7 +2,7 @@
 
 Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
 2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
-chosen so that they close, a nutation at t = 0 included, and the last pulses are trimmed on the flown motion. Near
+chosen so that they close, a nutation at t = 0 included, and the last pulses are corrected on the flown motion. Near
 φ = 2π, which is C = A for one pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
 
 The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
@@ -28,8 +28,8 @@ from nutdamp.schemes.tools.pulse_train import LAST, Attempt, Train
 from nutdamp.schemes.tools.reasons import no_channels, no_target
 from nutdamp.spacecraft import Spacecraft
 
-TRIMMED = (4, 6, LAST)
-"""How many of the last pulses are trimmed, one number after the other until nothing is left."""
+CORRECTED = (4, 6, LAST)
+"""How many of the last pulses are corrected, one number after the other until nothing is left."""
 
 EXACT = 1e-10
 """rad of flown residual that counts as nothing."""
@@ -38,7 +38,7 @@ CLEARLY = 0.01
 """Share of the cost of a train that is worth more pulses."""
 
 OTHERS = 4
-"""Other lengths of the pulses that are tried where the one asked for does not do."""
+"""Other lengths of the pulses that are tried where the one requested does not do."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
@@ -76,7 +76,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
-    """Which pulse length would do instead of the one asked for, the nearest first, in words."""
+    """Which pulse length would do instead of the one requested, the nearest first, in words."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
@@ -124,7 +124,7 @@ def _cheaper(made: Schedule, other: Schedule, before: float) -> bool:
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
-    """The train, each pulse aimed from where H then is, the last trimmed; and what it leaves, rad."""
+    """The train, each pulse aimed from where H then is, the last corrected; and what it leaves, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
         pulse = train.next_pulse(builder.here, remaining, attempt)
@@ -132,10 +132,10 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
             break
         builder.fire((pulse,))
     fired = min(count, len(builder.pulses))
-    for last in TRIMMED:
+    for last in CORRECTED:
         if builder.left < EXACT:
             break
-        builder.trim(min(last, fired), attempt.bounds)
+        builder.correct(min(last, fired), attempt.bounds)
     return builder.schedule(_note(builder, train, count)), builder.left
 
 
@@ -156,7 +156,7 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> str:
 
 def _reason(train: Train, best: tuple[float, Schedule] | None) -> str:
     """Why the ``best`` train found, with what it leaves (rad), is none."""
-    asked = train.options.on_time
-    held = "" if asked is None else f" of {asked:.4g} s, the last few within {100 * UNEQUAL:.0f} % of that,"
+    requested = train.options.on_time
+    held = "" if requested is None else f" of {requested:.4g} s, the last few within {100 * UNEQUAL:.0f} % of that,"
     text = f"no train of pulses{held} was found that ends on the target within the limits"
     return text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°"

@@ -5,7 +5,7 @@ With a target axis the two pulses are those of `pair_search`, of which these are
 With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
 torque directions d1, d2 the shift of H closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both
 pulses together then oppose ω at cost 1/cos(ψ/2), where ψ is the angle by which the second direction misses
-the one that Magnus' scheme asks for. The chosen pair is trimmed on the real pulse widths.
+the one that Magnus' scheme needs. The chosen pair is corrected on the real pulse widths.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
 SHORTLIST = 6
-"""Candidates that are flown and trimmed, at most."""
+"""Candidates that are flown and corrected, at most."""
 
 CLEARLY = 0.5
 """A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
 
 EXACT = 1e-11
-"""rad of flown residual below which a trimmed candidate is as good as exact (6e-10 deg)."""
+"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
 
 
 def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     """Two pulses, and a remark on what fixed channels cost or leave.
 
-    ``options.literal``: equal halves and the wait as printed, not trimmed, and the target left alone. Raises Infeasible
-    with the reason.
+    ``options.literal``: equal halves and the wait as printed, not corrected, and the target left alone. Raises
+    Infeasible with the reason.
     """
     if spacecraft.goal.axis is not None and not options.literal:
         try:
@@ -71,7 +71,7 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 
 def _wide(spacecraft: Spacecraft) -> Schedule | None:
-    """The pulses that damp without drift, trimmed to a target nearby; None where they do not come there.
+    """The pulses that damp without drift, corrected to a target nearby; None where they do not come there.
 
     A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
     that are all there is, this finds what an acquisition, which plans for the turn, does not.
@@ -86,7 +86,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """The two pulses that leave H where it was, as far as trimming goes for a target."""
+    """The two pulses that leave H where it was, as far as correction goes for a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
@@ -171,8 +171,8 @@ def _pair(
         begin = builder.windows.nearest_tick(centre - 0.5 * on_time)
         centre = begin + 0.5 * on_time
         angle = cmath.phase(-builder.omega_at(centre))
-        asked = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
-        pulses.append(steerable_pulse(torquer, centre, angle, **asked))
+        requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
+        pulses.append(steerable_pulse(torquer, centre, angle, **requested))
         builder.fire(pulses[-1])
     return pulses[0], pulses[1]
 
@@ -230,7 +230,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
-    """The most promising candidates, trimmed, with the residual (rad) that each leaves when flown."""
+    """The most promising candidates, corrected, with the residual (rad) that each leaves when flown."""
     candidates = sorted(
         (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
         key=lambda found: (found.short, found.cost),
@@ -243,11 +243,11 @@ def _shortlist(
     near.sort(key=lambda found: found.end)
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
-        yield _trimmed(spacecraft, candidate, options.literal)
+        yield _corrected(spacecraft, candidate, options.literal)
 
 
-def _trimmed(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
-    """The candidate's schedule, trimmed on the real widths and made commandable, and its flown residual in rad."""
+def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
+    """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
     pulses = tuple(
         commandable(spacecraft, channel_pulse(channel, t, on_time))
         for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
@@ -355,13 +355,13 @@ def _place(
         return None
     on_times, short = [], 0.0
     for channel, half in ((one, halves.first), (two, halves.second)):
-        wanted = grown * half * factor
+        needed = grown * half * factor
         rate = channel.axial / spacecraft.inertia.C
-        on_time = rates.on_time_for(wanted, abs(channel.transverse), a, spin, rate, channel.max_on_time)
+        on_time = rates.on_time_for(needed, abs(channel.transverse), a, spin, rate, channel.max_on_time)
         longest = longest_useful(channel.max_on_time, spacecraft.body_period)
         on_times.append(max(longest if on_time is None else on_time, channel.min_on_time))
         reached = abs(channel.transverse) * on_times[-1] * abs(rates.width_factor(a, spin, rate, on_times[-1]))
-        short += abs(wanted - reached) / (spacecraft.least_impulse * factor)
+        short += abs(needed - reached) / (spacecraft.least_impulse * factor)
     if short >= 1.0:
         return None
     first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
@@ -395,7 +395,7 @@ def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
     names = ", ".join(channel.name for channel in channels)
     if spacecraft.inertia.a == 0.0:
         return (
-            "in a sphere (a = 0) ω stands still in the body, and no two of the channels "
+            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
             f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
         )
     if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:

@@ -57,8 +57,8 @@ class Checked:
         elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
             self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
         if entry.unit and entry.unit != keyword.unit:
-            wanted = f"[{keyword.unit}]" if keyword.unit else "no unit"
-            self.fault(keyword.name, f"expected {wanted}, got [{entry.unit}]")
+            expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
+            self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
@@ -67,7 +67,7 @@ class Checked:
         self.faults.append(Fault(self.file, line, 1, keyword, problem))
 
     def text(self, keyword: str) -> str | None:
-        """The value as it stands; None where it is missing or empty."""
+        """The value as it is; None where it is missing or empty."""
         entry = self.entries.get(keyword)
         return entry.value or None if entry else None
 
@@ -96,11 +96,11 @@ class Checked:
 
     def has(self, keywords: Iterable[str]) -> bool:
         """Whether all of ``keywords`` stand here; some without the others is a fault."""
-        wanted = list(keywords)
-        there = [keyword for keyword in wanted if keyword in self.entries]
-        if there and len(there) < len(wanted):
-            absent = next(keyword for keyword in wanted if keyword not in there)
-            self.fault(there[0], f"given without {absent}; {', '.join(wanted)} go together")
+        expected = list(keywords)
+        there = [keyword for keyword in expected if keyword in self.entries]
+        if there and len(there) < len(expected):
+            absent = next(keyword for keyword in expected if keyword not in there)
+            self.fault(there[0], f"given without {absent}; {', '.join(expected)} go together")
             return False
         return bool(there)
 

@@ -65,8 +65,8 @@ def from_kvn(text: str, name: str) -> tuple[list[Block], list[Fault]]:
             within, entries = (content.removesuffix("_START"), line), []
         elif _WORD.fullmatch(content) and content.endswith("_STOP"):
             if within is None or content != f"{within[0]}_STOP":
-                wanted = "no block is open" if within is None else f"expected {within[0]}_STOP"
-                faults.append(Fault(name, line, 1, content, wanted))
+                expected = "no block is open" if within is None else f"expected {within[0]}_STOP"
+                faults.append(Fault(name, line, 1, content, expected))
             else:
                 blocks.append(Block(within[0], tuple(entries), line=within[1]))
                 within = None

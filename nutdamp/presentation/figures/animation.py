@@ -109,7 +109,7 @@ def film(
     width: int = 800,
     progress: Callable[[int], object] = lambda _: None,
 ) -> None:
-    """Write the film of ``width`` pixels to ``stream``, frame by frame; ``progress`` is told how many are done.
+    """Write the film of ``width`` pixels to ``stream``, frame by frame; ``progress`` is called with how many are done.
 
     The ending of ``path`` says the format. Raises as `film_format`.
     """
@@ -283,7 +283,7 @@ class Scene:
         return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
 
     def pixels(self) -> NDArray[np.uint8]:
-        """The frame as it stands, (height, width, 3): what changes is drawn over what stands still."""
+        """The frame as it is, (height, width, 3): what changes is drawn over what stands still."""
         self.canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
         for artist in sorted([*self._changing, self.title], key=lambda one: one.get_zorder()):
             artist.draw(self.canvas.get_renderer())  # type: ignore[no-untyped-call]

@@ -26,8 +26,8 @@ def dispersion_figure(results: Results, *, scheme: str) -> Figure:
     figure = style.sheet(7.4, 5.4)
     grid = figure.subplots(2, 2)
     aim = compliance.aim(results.study.model.spacecraft)
-    asked = results.study.model.spacecraft.requirement
-    limits = (None, None) if asked is None else (asked.nutation, asked.momentum_shift)
+    requested = results.study.model.spacecraft.requirement
+    limits = (None, None) if requested is None else (requested.nutation, requested.momentum_shift)
     for row, output, name, limit in zip(
         grid, ("nutation", aim.value), ("nutation left", aim.label), limits, strict=True
     ):

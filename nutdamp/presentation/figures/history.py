@@ -89,9 +89,9 @@ def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, angles[:, 1], color=MOTION, linestyle=(0, (5, 1.5)), label="body cone μ")
     axes.plot(track.t, angles[:, 2], color=MOMENTUM, linestyle=(0, (5, 1.5, 1, 1.5)), label="space cone λ")
     _finish(axes, flight, track, np.append(angles.ravel(), 0.0), "angles, deg")
-    asked = flight.spacecraft.requirement
-    if asked is not None and asked.nutation is not None:
-        axes.axhline(math.degrees(asked.nutation), color=GREY, linewidth=0.9, linestyle=":", label="required θ")
+    requested = flight.spacecraft.requirement
+    if requested is not None and requested.nutation is not None:
+        axes.axhline(math.degrees(requested.nutation), color=GREY, linewidth=0.9, linestyle=":", label="required θ")
     axes.axhline(0.0, color=GREY, linewidth=0.5)
 
 

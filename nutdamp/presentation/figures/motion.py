@@ -71,9 +71,9 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     named = _directions(axes, flight, size)
     style.square(axes, rates, margin=0.45 if named else 0.12, centre=True)
     body = flight.spacecraft
-    told = "" if body.inertia.aligned else ", principal axes"
-    told += ", spin about −3" if body.spin < 0.0 else ""
-    axes.set(xlabel=f"ω1, deg/s{told}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
+    note = "" if body.inertia.aligned else ", principal axes"
+    note += ", spin about −3" if body.spin < 0.0 else ""
+    axes.set(xlabel=f"ω1, deg/s{note}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
 
 
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:

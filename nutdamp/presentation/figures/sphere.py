@@ -31,7 +31,7 @@ WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
 SPACE, BODY = 0.28, 0.15
-"""How dense the cones are filled: told apart in grey print too."""
+"""How dense the cones are filled: distinguished in grey print too."""
 
 MARKS = "+os"
 """Of H, ω and the spin axis in the plane picture."""

@@ -38,13 +38,13 @@ class Problem:
 
     def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
         self.spacecraft, self.options = spacecraft, options
-        asked = spacecraft.goal.spin is not None
-        self.channels = tuple(usable(spacecraft, axial=asked))
+        requested = spacecraft.goal.spin is not None
+        self.channels = tuple(usable(spacecraft, axial=requested))
         if not self.channels:
             raise Infeasible(no_channels(spacecraft))
-        if asked and not any(channel.axial for channel in self.channels):
+        if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
-        self.equations = Equations(shift=not options.free_axis, spin=asked)
+        self.equations = Equations(shift=not options.free_axis, spin=requested)
         flows = [channel.mass_flow for channel in self.channels]
         known = [flow for flow in flows if flow is not None]
         if options.least != "impulse" and len(known) == len(flows):
@@ -124,7 +124,7 @@ class Problem:
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
     def leaves(self, flown: flight.Flight) -> Allowed:
-        """What a flight leaves of what is asked for."""
+        """What a flight leaves of what is requested."""
         residual, goal = flown.residual, self.spacecraft.goal
         off = residual.axis_error if self.equations.shift else 0.0
         return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
@@ -161,11 +161,11 @@ class Problem:
         nutation = Equations(shift=False)
         left = self.program(body, nutation).solve().unmet
         if left <= UNMET:
-            wanted = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
+            failing = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
             if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
-                wanted = "the spin cannot be brought to the rate of the goal"
+                failing = "the spin cannot be brought to the rate of the goal"
             out = "the nutation can be taken out, but " if body.transverse_rate > 0.0 else ""
-            what = f"within {horizon:.4g} s {out}{wanted}"
+            what = f"within {horizon:.4g} s {out}{failing}"
         else:
             what = (
                 f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "

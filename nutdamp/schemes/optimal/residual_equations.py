@@ -30,7 +30,7 @@ KNOTS = 400
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """Which of the five are asked for; the nutation always is."""
+    """Which of the five are requested; the nutation always is."""
 
     shift: bool = True
     spin: bool = False
@@ -111,7 +111,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
 
 
 def misses(flight: Flight, equations: Equations) -> Vector:
-    """What a flight leaves of the equations, (equations,) N m s; zero where it ends as asked."""
+    """What a flight leaves of the equations, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back

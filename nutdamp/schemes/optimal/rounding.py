@@ -62,11 +62,11 @@ class _Lattice:
     def __init__(self, spacecraft: Spacecraft, parameters: PulseParameters, x: Vector) -> None:
         windows, channels = Windows(spacecraft), parameters.channels
         self.tick = spacecraft.limits.tick or 0.0
-        centres, wanted = x.reshape(-1, 2).T
+        centres, needed = x.reshape(-1, 2).T
         self.bounds = np.array([[channel.min_on_time, channel.max_on_time] for channel in channels]).T
         self.room = np.array(parameters.room).T
-        self.exact = np.column_stack([centres - 0.5 * wanted, wanted]) / self.tick
-        on_times = [windows.on_time(on_time, *bounds) for on_time, bounds in zip(wanted, self.bounds.T, strict=True)]
+        self.exact = np.column_stack([centres - 0.5 * needed, needed]) / self.tick
+        on_times = [windows.on_time(on_time, *bounds) for on_time, bounds in zip(needed, self.bounds.T, strict=True)]
         self.rounded = np.rint(np.column_stack([self.exact[:, 0], np.array(on_times) / self.tick]))
 
     def settings(self, ticks: Vector) -> Vector:

@@ -1,8 +1,8 @@
-"""Least propellant over channels and firing times: no nutation left, H on its target, and the spin as asked.
+"""Least propellant over channels and firing times: no nutation left, H on its target, and the spin as requested.
 
 The program of `linear_program` finds the burns, at first with small angles. The schedule is flown, the program's
 equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
-and on-times are polished on it. Where that finds nothing, where the horizon is no longer than a few nutation periods
+and on-times are refined on it. Where that finds nothing, where the horizon is no longer than a few nutation periods
 and where the schedule is dear, `starting_points` looks for a cheaper one from very many starts. Two bounds go with the
 plan: the program's first least cost, of first order, and a rigorous one.
 """
@@ -66,7 +66,7 @@ HASTE = 0.0008
 """How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
 
 NEAR = 0.05
-"""rad left from which a flight is near enough to be polished."""
+"""rad left from which a flight is near enough to be refined."""
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""

@@ -72,8 +72,8 @@ class FlownBuilder:
             self.pulses.append(timed)
             self.now = timed.end
 
-    def trim(self, last: int, on_times: tuple[float, float] = ANY_ON_TIME) -> None:
-        """Trim the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
+    def correct(self, last: int, on_times: tuple[float, float] = ANY_ON_TIME) -> None:
+        """Correct the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
 
         Their on-times stay within the bounds ``on_times`` s.
         """

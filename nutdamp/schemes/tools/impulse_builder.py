@@ -22,8 +22,8 @@ MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
 
 
-TRIMMED = 1e-4
-"""Share of A|ω0| that is left to trimming under dissipation: `rates.width_factor` knows it at small angles only."""
+CORRECTED = 1e-4
+"""Share of A|ω0| that is left to correction under dissipation: `rates.width_factor` knows it at small angles only."""
 
 
 class ImpulseBuilder:
@@ -50,9 +50,9 @@ class ImpulseBuilder:
 
     @property
     def settled(self) -> bool:
-        """Whether what is left is rounding; under dissipation, what the last pulse can be trimmed by."""
-        trimmed = 0.0 if self.spacecraft.growth == 0.0 else TRIMMED * self.spacecraft.least_impulse
-        return self.left <= max(1e-13 * self.C * abs(self.spin), trimmed)
+        """Whether what is left is rounding; under dissipation, what the last pulse can be corrected by."""
+        corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
+        return self.left <= max(1e-13 * self.C * abs(self.spin), corrected)
 
     @property
     def growing(self) -> bool:
@@ -222,10 +222,10 @@ class ImpulseBuilder:
             if start is None:
                 return None
             return steerable_pulse(steerable, start, cmath.phase(-self.omega_at(start)), impulse=impulse)
-        wanted = rates.on_time_for(impulse, steerable.torque, self.a, self.spin, 0.0, math.inf)
-        if wanted is None:
+        needed = rates.on_time_for(impulse, steerable.torque, self.a, self.spin, 0.0, math.inf)
+        if needed is None:
             return None
-        on_time = self.windows.on_time(wanted, 0.0, math.inf)
+        on_time = self.windows.on_time(needed, 0.0, math.inf)
         start = self.windows.earliest_start(on_time, self.ready)
         if start is None:
             return None

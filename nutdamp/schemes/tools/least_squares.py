@@ -1,4 +1,4 @@
-"""Trim a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
+"""Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
 
 A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
 takes longer than a whole plan.
@@ -28,7 +28,7 @@ DIFFERENCE = 1e-6
 STEPS = 30
 
 INTEGRATED = 50_000
-"""Steps of integration after which a trim is left as it is: some seconds."""
+"""Steps of integration after which a correction is left as it is: some seconds."""
 
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
@@ -37,7 +37,7 @@ PROGRESS = 0.01
 def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) -> Vector:
     """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
 
-    ``spin`` adds a fifth, by how much of itself the final spin asked for is missed.
+    ``spin`` adds a fifth, by how much of itself the final spin requested is missed.
 
     The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
@@ -74,11 +74,11 @@ def correct(
     spin: bool = False,
     on_times: tuple[float, float] = ANY_ON_TIME,
 ) -> Schedule:
-    """``made`` with the ``chosen`` pulses trimmed on the flown motion of ``spacecraft``, if that leaves less.
+    """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds and ``on_times`` s, and directions of steerable pulses are free. ``momentum``:
     H too is to be brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the
-    spin to the rate asked for. A schedule without pulses stays as it is.
+    spin to the rate requested. A schedule without pulses stays as it is.
     """
     if not made.pulses:
         return made
@@ -106,9 +106,9 @@ def correct(
         np.concatenate([getattr(one, name) for one in pulses]) for name in ("start", "scale", "lower", "upper")
     )
     x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED or work.exhausted())
-    trimmed = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
-    better = np.linalg.norm(left(trimmed)) < np.linalg.norm(left(made))
-    return trimmed if better and keeps_limits(spacecraft, trimmed.pulses) else made
+    corrected = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
+    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
+    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
 
 
 class _Movable:

@@ -2,7 +2,7 @@
 
 A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
 says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
-comes there; the moments are kept at which the second channel then stands the right way. Both are trimmed on the real
+comes there; the moments are kept at which the second channel then points the right way. Both are corrected on the real
 widths.
 """
 
@@ -33,7 +33,7 @@ CLOSE_IN_COST = 1.02
 """Among candidates within this factor of the cheapest the one that ends first is preferred."""
 
 SHORTLIST = 8
-"""Candidates that are flown and trimmed, at most."""
+"""Candidates that are flown and corrected, at most."""
 
 SAMPLES = 96
 """Moments looked at in each turn of the body."""
@@ -45,7 +45,7 @@ FURTHER = 60
 """Further whole turns of the spin axis that the second pulse may wait for, at most."""
 
 EXACT = 1e-11
-"""rad of flown residual below which a trimmed candidate is as good as exact (6e-10 deg)."""
+"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
 
 CLEARLY = 0.5
 """A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
@@ -95,7 +95,7 @@ def _off_limits() -> str:
 def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
     widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in pulses), default=0.0)
     if widest == 0.0:
-        return "placed for free motion of a symmetric body, two impulses could not be trimmed to the target"
+        return "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
     return (
         f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
         "target; half-cone with more cones or rhumb-line take smaller ones"
@@ -119,7 +119,7 @@ class Candidate(NamedTuple):
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
-    """Fly and trim the most promising candidates; the smallest flown residual wins, exact ones in order."""
+    """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
     search = _Search(spacecraft, channels)
     candidates = sorted(search.all_candidates(), key=lambda found: found.cost)
     if not candidates:
@@ -166,7 +166,7 @@ class _Search:
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
         self.floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
         self.arc = Arc(inertia.A, inertia.C, 0.0, spacecraft.initial)
-        self.within_reach = False  # whether a pair closed, before on-times and windows were asked
+        self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
 
     def times(self) -> Vector:
         """Moments (n,) s of the first pulse that are looked at."""
@@ -200,7 +200,7 @@ class _Search:
         return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
 
     def all_candidates(self) -> list[Candidate]:
-        """Candidates for the target; where the first jump would be nothing, for targets beside it, to be trimmed.
+        """Candidates for the target; where the first jump would be nothing, for targets beside it, to be corrected.
 
         That is where the target lies on the cone of the spin axis itself.
         """
@@ -230,9 +230,9 @@ class _Search:
             for further in range(FURTHER):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
-                wanted = after.body * np.exp(-1j * self.turning * further * after.turn)
+                needed = after.body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
-                    off = np.angle(wanted * two.transverse.conjugate())
+                    off = np.angle(needed * two.transverse.conjugate())
                     near = np.abs(off) < 0.5 * math.pi
                     crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
                     found += self._placed(one, two, further, times, after, off, crosses)

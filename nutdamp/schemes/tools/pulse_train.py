@@ -30,15 +30,15 @@ STEP = math.radians(2.0)
 """Angle that one ideal impulse turns H by, at most."""
 
 CLOSED = 0.3
-"""Phasors that sum to less than this many pulses count as closed: the rest is trimmed."""
+"""Phasors that sum to less than this many pulses count as closed: the rest is corrected."""
 
 OPEN = 1.2
-"""Sum of the phasors, in pulses, beyond which trimming has no hope."""
+"""Sum of the phasors, in pulses, beyond which correction has no hope."""
 
 MOST_PULSES = 600
 
 LAST = 10
-"""How many of the last pulses may be trimmed, at most."""
+"""How many of the last pulses may be corrected, at most."""
 
 TRIES = 4
 """Counts that are flown, at most; twice as many where pulses are to have a given length."""
@@ -52,9 +52,9 @@ class Shot(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A train to fly: so many ``pulses`` of ``on_time`` s, the last few trimmed within ``bounds`` (s).
+    """A train to fly: so many ``pulses`` of ``on_time`` s, the last few corrected within ``bounds`` (s).
 
-    ``closes``: whether the pulses leave little nutation as they are, so that trimming costs little.
+    ``closes``: whether the pulses leave little nutation as they are, so that correction costs little.
     """
 
     pulses: int
@@ -81,10 +81,10 @@ class Train:
             assert here.torquer is not None
             self.torque = math.inf if here.torquer.torque is None else here.torquer.torque
             self.shortest, self.longest = 0.0, math.inf
-        asked = options.on_time
-        if asked is not None:
-            self._check(asked)
-        self.on_time = min(self.longest, TURN_SHARE * self.turn) if asked is None else asked
+        given = options.on_time
+        if given is not None:
+            self._check(given)
+        self.on_time = min(self.longest, TURN_SHARE * self.turn) if given is None else given
         self.on_time = max(self.on_time, self.shortest)
         if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
             raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
@@ -99,17 +99,17 @@ class Train:
         """By how much a full pulse of the train turns H, N m s."""
         return STEP * self.h if math.isinf(self.torque) else self.turns_by(self.on_time)
 
-    def _check(self, asked: float) -> None:
-        """Raises Infeasible where no pulse can be ``asked`` s long, or should."""
+    def _check(self, given: float) -> None:
+        """Raises Infeasible where no pulse can be ``given`` s long, or should."""
         if math.isinf(self.torque):
             raise Infeasible("an on-time is for pulses that last: ideal impulses have none; give the torquer a torque")
-        if not self.shortest <= asked <= self.longest:
+        if not self.shortest <= given <= self.longest:
             raise Infeasible(
-                f"an on-time of {asked:.4g} s is outside what the channels allow: "
+                f"an on-time of {given:.4g} s is outside what the channels allow: "
                 f"{self.shortest:.4g} s to {self.longest:.4g} s"
             )
-        if asked > 0.5 * self.turn:
-            raise Infeasible(f"an on-time of {asked:.4g} s {_too_long(self.turn)}")
+        if given > 0.5 * self.turn:
+            raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
 
     def length(self, count: int) -> float:
         """On-time (s) of ``count`` equal pulses that turn H all the way; not a number where that is too far."""
@@ -143,25 +143,25 @@ class Train:
             if left[best - 1] > OPEN:
                 raise Infeasible(self._in_phase(fewest, most, float(left[best - 1])))
             closing = [best]
-        # Of the next few counts the one that closes best, then in turn; at last with trims of any size.
+        # Of the next few counts the one that closes best, then in turn; at last with corrections of any size.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
         near = sorted(near, key=lambda count: left[count - 1])[:TRIES]
         tried = [self._attempt(count, self.length(count), self.length(count), left) for count in near]
         bounds = self.shortest, max(self.on_time, self.widest)
         return [*tried, Attempt(near[0], self.length(near[0]), bounds, closes=False)]
 
-    def _held(self, left: Vector, asked: float) -> list[Attempt]:
-        """Trains of pulses ``asked`` s long, or equal ones hardly shorter, the fewest first: ``left`` as in `_free`."""
+    def _held(self, left: Vector, given: float) -> list[Attempt]:
+        """Trains of pulses ``given`` s long, or equal ones hardly shorter, the fewest first: ``left`` as in `_free`."""
         fewest = self.fewest()
-        most = min(self._most(), math.floor(_ratio(self.h * self.way, self.turns_by((1.0 - UNEQUAL) * asked)) + 1e-9))
+        most = min(self._most(), math.floor(_ratio(self.h * self.way, self.turns_by((1.0 - UNEQUAL) * given)) + 1e-9))
         if fewest > min(self._most(), len(left)):
             raise self._too_few(fewest, len(left))
         if fewest > most:
-            within = f"within {100 * UNEQUAL:.0f} % of {asked:.4g} s"
+            within = f"within {100 * UNEQUAL:.0f} % of {given:.4g} s"
             raise Infeasible(f"{fewest} pulses {within} turn H too far, and {fewest - 1} not far enough")
         counts = range(fewest, min(most, len(left)) + 1)
-        tried = [self._attempt(fewest, asked, asked, left)] if left[fewest - 1] <= OPEN else []
-        tried += [self._attempt(count, self.length(count), asked, left) for count in counts if left[count - 1] <= OPEN]
+        tried = [self._attempt(fewest, given, given, left)] if left[fewest - 1] <= OPEN else []
+        tried += [self._attempt(count, self.length(count), given, left) for count in counts if left[count - 1] <= OPEN]
         if not tried:
             least = float(left[fewest - 1 : counts[-1]].min())
             raise Infeasible(self._in_phase(fewest, counts[-1], least))
@@ -173,21 +173,21 @@ class Train:
         shortest = 0.0 if math.isinf(self.torque) else max((1.0 - UNEQUAL) * self.on_time, self.shortest)
         return self.h * self.way / pointing.arc_efficiency(self.here.spin, shortest)
 
-    def lengths_near(self, asked: float) -> list[float]:
-        """On-times (s) of trains that may close, in the order of how near they are to the one ``asked``."""
+    def lengths_near(self, given: float) -> list[float]:
+        """On-times (s) of trains that may close, in the order of how near they are to the one ``given``."""
         left = self.left_by(self.shots())
         most = min(len(left), self._most())
         closing = [self.length(count) for count in range(2, most + 1) if left[count - 1] <= OPEN]
         possible = [one for one in closing if self.shortest <= one <= self.widest and one > 0.0]
-        return sorted(possible, key=lambda one: abs(one - asked))
+        return sorted(possible, key=lambda one: abs(one - given))
 
     @property
     def widest(self) -> float:
-        """Longest pulse (s) worth firing, unless a longer one is asked for."""
+        """Longest pulse (s) worth firing, unless a longer one is given."""
         return min(self.longest, WIDEST * self.turn)
 
     def fewest(self) -> int:
-        """Pulses that it takes with the on-time wanted; two at least, to close."""
+        """Pulses that it takes with the on-time given; two at least, to close."""
         return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
 
     def _most(self) -> int:
@@ -264,10 +264,10 @@ class Train:
         on_time = 0.0
         if not math.isinf(self.torque):
             least, most = max(attempt.bounds[0], self.shortest), min(attempt.bounds[1], self.longest)
-            wanted = attempt.on_time
+            each = attempt.on_time
             if remaining <= LAST:
-                wanted = float(pointing.on_times_to_turn(np.array([share]), self.torque, here.spin)[0])
-            on_time = windows.on_time(wanted if math.isfinite(wanted) else most, least, most)
+                each = float(pointing.on_times_to_turn(np.array([share]), self.torque, here.spin)[0])
+            on_time = windows.on_time(each if math.isfinite(each) else most, least, most)
         ready, turn = limits.earliest, self.turn / self.options.per_turn
         begun = here is not self.here
         if self.channels:  # no two in the same passage of the phase

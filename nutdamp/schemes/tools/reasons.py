@@ -23,8 +23,8 @@ def no_channels(spacecraft: Spacecraft) -> str:
         if time <= 0.0:  # where other pulses of the scheme come first
             return "the pulses before leave no time within limits.horizon"
         return (
-            f"no channel can be on for as long as its min_on_time asks{ticks}, at most for its max_on_time, within the "
-            f"{time:.4g} s from limits.earliest to limits.horizon"
+            f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
+            f"the {time:.4g} s from limits.earliest to limits.horizon"
         )
     if spacecraft.channels:
         return "no channel has a torque more transverse than axial, so none can damp a nutation"

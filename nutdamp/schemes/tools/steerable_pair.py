@@ -103,9 +103,9 @@ class SteerablePair:
             push = complex(body[0], body[1])
             if abs(push) > NOTHING * self.h:
                 on_time = float(self.on_times(np.array([abs(push)]))[0])
-                asked = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
+                requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
-                pulse = steerable_pulse(self.torquer, moment, angle, **asked)
+                pulse = steerable_pulse(self.torquer, moment, angle, **requested)
                 made.append(commandable(self.spacecraft, pulse))
             state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
             now, momentum = moment, after
@@ -183,7 +183,7 @@ class SteerablePair:
         allowed = self.windows.allowed(times - 0.5 * long, long, self.spacecraft.limits.earliest)
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
         if self.torquer.torque is not None:
-            # Widths are trimmed on both pulses: both must be there, and not do the same a whole turn apart.
+            # Widths are corrected on both pulses: both must be there, and not do the same a whole turn apart.
             allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
             allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART
         spent = self.spent(jumps.first) + self.spent(jumps.second)

@@ -2,7 +2,7 @@
 
 Three different moments turn in the body at another rate than their mean, on an ellipse instead of a circle; lasting
 disturbances move the point about which ω turns. Both are taken out here, so that every scheme plans free motion of
-a symmetric body, and put back in: the schedule is translated to the true actuators and trimmed on the true motion.
+a symmetric body, and put back in: the schedule is translated to the true actuators and corrected on the true motion.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class SymmetricModel:
 
     @property
     def exact(self) -> bool:
-        """Whether the model moves as the spacecraft does, so that nothing has to be trimmed."""
+        """Whether the model moves as the spacecraft does, so that nothing has to be corrected."""
         return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
     def translate(self, made: Schedule) -> Schedule:
@@ -111,7 +111,7 @@ def _stretched(channel: Channel, stretch: Vector) -> Channel:
 
 
 def _stretched_torquer(torquer: Steerable | None, stretch: Vector) -> Steerable | None:
-    """The stretch differs by direction; its mean is near enough for a plan that is trimmed."""
+    """The stretch differs by direction; its mean is near enough for a plan that is corrected."""
     if torquer is None or torquer.torque is None:
         return torquer
     return replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
