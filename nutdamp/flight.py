@@ -32,10 +32,10 @@ IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
 """The two models by which a schedule is flown."""
 
-LEG, PULSE = 0.03, 0.3
+LEG, PULSE = 0.03, 0.4
 """Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
 
-SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.5
+SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
 """Units of a step of a symmetric body, of any other, and of one with dissipation."""
 
 PLANNED_STEPS = 30_000

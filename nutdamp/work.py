@@ -1,8 +1,8 @@
 """Work, counted: what bounds a search on every machine alike, and tells how far it is.
 
-One unit is about a millisecond of a core of 2020. Flights, linear programs and descents `spend` what they take, by
-counts that do not depend on the clock; searches ask whether the budget that they run in is `exhausted` and end with
-the best found so far.
+One unit is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents `spend` what they
+take, by counts that do not depend on the clock; searches ask whether the budget that they run in is `exhausted` and end
+with the best found so far.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-SCHEME = 5000.0
+SCHEME = 12_000.0
 """Units that the search of one scheme may spend."""
 
-COMMAND = 6500.0
+COMMAND = 13_000.0
 """Units that the searches of one comparison or front may spend together."""
 
 

@@ -56,6 +56,10 @@ LONGEST_SEARCH = 6000
 """Moments looked at for one pulse, at most."""
 
 
+PLACE = 1e-3
+"""Units of `work` of each moment at which a channel is looked at for the first pulse of a row."""
+
+
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     """``options.cones`` half cones; where that is None the fewest of which one more would save less than 1 %.
 
@@ -188,6 +192,7 @@ def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
     _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(times)
     best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
+    work.spend(PLACE * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))

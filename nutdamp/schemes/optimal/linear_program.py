@@ -27,7 +27,7 @@ SLOTS = 64
 MOST_SLOTS = 600_000
 """Slots of all channels together: a horizon of more is looked at as far as they reach."""
 
-SOLVED, SLOT = 2.0, 2e-4
+SOLVED, SLOT = 3.0, 3e-4
 """Units of `work` of a program's solution, and of each of its slots."""
 
 SLACK_COST = 1e3

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import work
 from nutdamp.errors import Infeasible
 from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.motion import Arc
@@ -49,6 +50,9 @@ EXACT = 1e-11
 
 CLEARLY = 0.5
 """A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+
+PAIR = 5e-5
+"""Units of `work` of each moment of each pair of channels."""
 
 ON_CONE = 1e-3
 """Share of its natural size below which the first jump counts as nothing."""
@@ -225,11 +229,14 @@ class _Search:
             return found
         adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / abs(self.spacecraft.spin) / SAMPLES
         for one in self.channels:
+            if work.exhausted():
+                break
             after = self.after(one, times)
             promising = adjoining & (after.first + after.second <= DEAREST * self.floor)[:-1]
             for further in range(FURTHER):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
+                work.spend(PAIR * len(times) * len(self.channels))
                 needed = after.body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())
