@@ -334,17 +334,24 @@ class Comparison(views.Shown):
     def with_disturbances(self) -> Plan | None:
         """What would be recommended of the same schemes if they planned with the disturbances, where they did not.
 
-        None where that is the case already, and where it is not looked at: of schemes that are slow.
+        None where that is the case already. A scheme that is slow is planned only where no other one complies.
         """
-        quick = [one for one in self.plans if not schemes.SCHEMES[one.scheme].slow]
         chosen, body = self.recommended, self.spacecraft
-        if chosen is None or not quick or not body.disturbances or chosen.options.with_disturbances:
+        if chosen is None or not body.disturbances or chosen.options.with_disturbances:
             return None
+        others: tuple[Plan, ...] = ()
         try:
-            others = (attempt(body, one.scheme, replace(one.options, with_disturbances=True)) for one in quick)
-            return Comparison(body, tuple(others)).recommended
+            for slow in (False, True):
+                for one in self.plans:
+                    if schemes.SCHEMES[one.scheme].slow == slow:
+                        aware = replace(one.options, with_disturbances=True)
+                        others = (*others, attempt(body, one.scheme, aware))
+                best = Comparison(body, others).recommended
+                if best is not None and best.standing is Standing.COMPLIES:
+                    break
         except NutdampError:
             return None
+        return best
 
     @property
     def failed(self) -> tuple[Plan, ...]:
@@ -353,11 +360,11 @@ class Comparison(views.Shown):
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """The schemes to compare where none is named: the classic ones, with a target those that can point.
+    """The schemes to compare where none is named: the classic ones and optimal, with a target those that can point.
 
     Those that can set the spin are among them where it has to change.
     """
-    names = schemes.CLASSIC if spacecraft.goal.axis is None else schemes.POINTING
+    names = schemes.COMPARED if spacecraft.goal.axis is None else schemes.POINTING
     return names if _spun(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 

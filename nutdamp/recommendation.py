@@ -28,6 +28,13 @@ STEADIER_COST = 1.1
 """... that it is worth a remark, if it costs at most so many times as much."""
 
 
+FEWER_PULSES = 0.5
+"""Share of the recommended plan's pulses up to which another one is so much simpler..."""
+
+FEWER_COST = 1.05
+"""... that it is worth a remark, if it costs at most so many times as much."""
+
+
 class Standing(Enum):
     """What the recommended plan reaches, and so what it was chosen among; from the best down."""
 
@@ -87,7 +94,7 @@ class Recommendation(Generic[Plan]):
     """The plan to fly; None, as ``standing`` and ``ground``, where none is feasible.
 
     It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
-    ``steadier`` would keep H much better for little more.
+    ``steadier`` would keep H much better for little more, ``simpler`` takes far fewer pulses for little more.
     """
 
     plan: Plan | None = None
@@ -96,6 +103,7 @@ class Recommendation(Generic[Plan]):
     count: int = 0
     by_propellant: bool = True
     steadier: Plan | None = None
+    simpler: Plan | None = None
 
 
 def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
@@ -111,7 +119,8 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
     those = [one for one in feasible if one.standing is standing]
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
-        return Recommendation(best, standing, ground, len(those), by_propellant(those), _steadier(best, those))
+        notable = _steadier(best, those), _simpler(best, those)
+        return Recommendation(best, standing, ground, len(those), by_propellant(those), *notable)
     best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
@@ -159,6 +168,14 @@ def _steadier(best: Plan, plans: Sequence[Plan]) -> Plan | None:
     most = STEADIER_COST * _cost(best, known)
     steadier = [one for one in plans if _off(one) < STEADIER_SHIFT * _off(best) and _cost(one, known) <= most]
     return min(steadier, key=lambda one: _cost(one, known), default=None)
+
+
+def _simpler(best: Plan, plans: Sequence[Plan]) -> Plan | None:
+    """The cheapest plan of half the pulses or fewer for at most a twentieth more."""
+    known = by_propellant(plans)
+    most, fewer = FEWER_COST * _cost(best, known), FEWER_PULSES * len(best.pulses)
+    simpler = [one for one in plans if 0 < len(one.pulses) <= fewer and _cost(one, known) <= most]
+    return min(simpler, key=lambda one: _cost(one, known), default=None)
 
 
 def by_propellant(plans: Sequence[Plan]) -> bool:

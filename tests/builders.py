@@ -185,10 +185,16 @@ def judged(
     asked: Requirement | None = None,
     goal: Goal | None = None,
     spin: float | None = None,
+    pulses: int = 1,
 ) -> Plan:
-    """A plan for 5° of nutation that leaves so much, flown; angles in degrees."""
+    """A plan for 5° of nutation that leaves so much, flown; angles in degrees.
+
+    Its pulses share impulse and propellant.
+    """
     spacecraft = replace(spinner(requirement=asked), goal=goal or Goal())
-    fired = Pulse(end, 0.0, "T", np.array([impulse, 0.0, 0.0]), propellant=propellant)
+    share = None if propellant is None else propellant / max(pulses, 1)
+    each = np.array([impulse / max(pulses, 1), 0.0, 0.0])
+    fired = tuple(Pulse(end * (one + 1) / pulses, 0.0, "T", each, propellant=share) for one in range(pulses))
     theta, turned = math.radians(nutation), math.radians(shift)
     ended = Residual(theta, theta, 0.0, turned, turned)
-    return Judged(spacecraft, name, Schedule((fired,)), ended=ended, ended_spin=spin)
+    return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)

@@ -255,7 +255,7 @@ def test_a_scheme_that_cannot_set_the_spin_says_so() -> None:
     assert planning.plan(body, "none").meets_requirement is False
     kept = replace(body, goal=Goal(spin=3.0))
     assert planning.plan(kept, "two-pulse").meets_requirement is True
-    assert planning.usual(kept) == schemes.CLASSIC
+    assert planning.usual(kept) == (*schemes.CLASSIC, "optimal")
 
 
 def test_a_spin_that_is_kept_by_itself_takes_no_channel() -> None:
@@ -288,6 +288,26 @@ def test_of_plans_that_keep_h_for_little_more_the_cheapest_is_mentioned() -> Non
     dear, cheap = (judged(name, 0.0, shift=0.1, propellant=cost) for name, cost in (("dear", 0.108), ("cheap", 0.105)))
     for plans in ((best, dear, cheap), (best, cheap, dear)):
         assert recommend(plans).steadier is cheap
+
+
+def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
+    many = judged("many", 0.0, propellant=0.1, pulses=10)
+    few = judged("few", 0.0, propellant=0.1049, pulses=5)
+    found = Comparison(many.spacecraft, (many, few))
+    assert found.recommended is many
+    assert verdicts.hints(found) == ("few takes 5 pulses instead of 10, for 4.9 g more propellant (4.9 %).",)
+    for pulses, propellant in ((6, 0.1049), (5, 0.1051)):
+        other = judged("few", 0.0, propellant=propellant, pulses=pulses)
+        assert recommend([many, other]).simpler is None
+    single = judged("single", 0.0, propellant=0.101, pulses=1)
+    assert recommend([many, few, single]).simpler is single
+    both = judged("both", 0.0, shift=0.01, propellant=0.104, pulses=1)
+    (hint,) = verdicts.hints(
+        Comparison(many.spacecraft, (judged("many", 0.0, shift=1.0, propellant=0.1, pulses=2), both))
+    )
+    assert hint.startswith("both shifts H by 0.01 deg instead of 1 deg and takes 1 pulse instead of 2, for 4 g more")
+    nothing = judged("a", 0.0, pulses=0), judged("b", 0.0, pulses=0)
+    assert recommend(nothing).simpler is None
 
 
 def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:

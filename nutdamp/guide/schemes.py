@@ -158,7 +158,6 @@ SCHEMES = (
             "Body-fixed channels only.",
             "The plan is a local optimum of the true motion. The bound of first order is that of the program and holds "
             "for small angles; a rigorous one is printed where there is one.",
-            "It is compared with the others only when it is named or where there is a target.",
         ),
         "explain 17, nutdamp trade --help",
     ),

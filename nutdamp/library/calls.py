@@ -27,7 +27,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
 def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice = None) -> Comparison:
     """Plan the schemes named and recommend one; raises as `plan` does.
 
-    Default: the classic three, or those that point where the file has a target axis.
+    Default: the classic three and optimal, or those that point where the file has a target axis.
     """
     chosen = _names(names) or planning.usual(expected(spacecraft))
     return planning.compare(expected(spacecraft), chosen, _options(options))

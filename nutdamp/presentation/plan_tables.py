@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 
 from rich.console import Group, RenderableType
@@ -139,6 +140,9 @@ Cell = Callable[[Plan], str]
 NOT = "✗"
 """Stands before what is more than required."""
 
+UNIT = re.compile(r"\d (\D+)$")
+"""What follows the last digit of a cell and a space."""
+
 SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
 
@@ -213,15 +217,25 @@ def _speed(plan: Plan) -> float | None:
 
 
 def _comparison(compared: Comparison) -> Table:
-    """Quantities down, schemes across: so three schemes fit a screen of 80 columns."""
+    """Quantities and their units down, schemes across: so four schemes fit a screen of 80 columns."""
     table = columns("", *(plan.scheme for plan in compared.plans))
     rows = _rows(compared) if any(plan.feasible for plan in compared.plans) else _rows(compared)[:1]
     for name, cell in rows:
         cells = [cell(plan) if plan.feasible else "" for plan in compared.plans]
         if name == "pulses":
             cells = [text or verdicts.no_plan(plan) for text, plan in zip(cells, compared.plans, strict=True)]
+        name, cells = _unit_first(name, cells)
         table.add_row(Text(name, style="dim"), *cells)
     return table
+
+
+def _unit_first(name: str, cells: list[str]) -> tuple[str, list[str]]:
+    """The name of a row with the unit that all its numbers share, and these without it; else both as they are."""
+    units = {found.group(1) for found in map(UNIT.search, cells) if found}
+    if len(units) != 1:
+        return name, cells
+    (unit,) = units
+    return name if name.endswith(f" {unit}") else f"{name}, {unit}", [text.removesuffix(f" {unit}") for text in cells]
 
 
 def _reasons(compared: Comparison) -> list[RenderableType]:

@@ -30,7 +30,8 @@ VERDICT = {True: "met", False: "not met", None: MISSING}
 def no_plan(plan: Plan) -> str:
     """What stands in the column of a scheme that has no plan."""
     if plan.failure is None:
-        return "infeasible"
+        without = schemes.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
+        return "no thrusters" if without else "infeasible"
     return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 
@@ -206,21 +207,32 @@ def _spent(plan: Plan) -> str:
 
 
 def hints(compared: Comparison) -> tuple[str, ...]:
-    """What the reader may prefer: a plan that keeps H much better for little more."""
-    found = compared.recommendation
-    chosen, steadier = found.plan, found.steadier
-    if chosen is None or steadier is None or chosen.flown is None or steadier.flown is None:
-        return ()
-    if found.by_propellant:
-        more, less = steadier.pulses.propellant or 0.0, chosen.pulses.propellant or 0.0
+    """What the reader may prefer: a plan that keeps H much better, or takes far fewer pulses, for little more."""
+    found, said = compared.recommendation, []
+    chosen = found.plan
+    for other in dict.fromkeys((found.steadier, found.simpler)):
+        if chosen is None or other is None or chosen.flown is None or other.flown is None:
+            continue
+        gains = []
+        if other is found.steadier:
+            shift, instead = degrees(other.flown.momentum_shift), degrees(chosen.flown.momentum_shift)
+            gains.append(f"shifts H by {shift} instead of {instead}")
+        if other is found.simpler:
+            pulses = f"{len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)}"
+            gains.append(f"takes {pulses} instead of {len(chosen.pulses)}")
+        said.append(f"{other.scheme} {' and '.join(gains)}, for {_dearer(other, chosen, found.by_propellant)}.")
+    return tuple(said)
+
+
+def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
+    """How much more a plan costs than another, with the share of it."""
+    if by_propellant:
+        more, less = one.pulses.propellant or 0.0, other.pulses.propellant or 0.0
         extra = f"{mass(more - less)} more propellant"
     else:
-        more, less = steadier.pulses.total_impulse, chosen.pulses.total_impulse
+        more, less = one.pulses.total_impulse, other.pulses.total_impulse
         extra = f"{quantity(more - less, 'N m s')} more impulse"
-    return (
-        f"{steadier.scheme} shifts H by {degrees(steadier.flown.momentum_shift)} instead of "
-        f"{degrees(chosen.flown.momentum_shift)}, for {extra} ({100.0 * (more / less - 1.0):.2g} %).",
-    )
+    return f"{extra} ({100.0 * (more / less - 1.0):.2g} %)"
 
 
 def spoken(compared: Comparison) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 from nutdamp.arguments import shown
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.options import LEAST, Options, SchemeOptions
-from nutdamp.schemes.registry import CLASSIC, NAMES, PLANNED, POINTING, SCHEMES, SPINNING, SUNLIT, Scheme
+from nutdamp.schemes.registry import CLASSIC, COMPARED, NAMES, PLANNED, POINTING, SCHEMES, SPINNING, SUNLIT, Scheme
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # so that the command line can know the names without loading
 
 __all__ = [
     "CLASSIC",
+    "COMPARED",
     "LEAST",
     "NAMES",
     "PLANNED",

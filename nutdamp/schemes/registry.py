@@ -18,10 +18,11 @@ from nutdamp.schemes.options import (
 class Scheme:
     """A scheme: its ``name``, the ``module`` with its function ``schedule``, and the class of its ``options``.
 
-    ``classic``: of Magnus 1970, planned when none is named. ``points``: can turn the spin axis to a target, and is
-    planned when there is one and none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps
-    its pulses at a fixed phase to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
-    function ``alternatives`` too, of schedules about as good. ``slow``: takes seconds.
+    ``classic``: of Magnus 1970. ``points``: can turn the spin axis to a target, and is planned when there is one and
+    none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
+    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
+    function ``alternatives`` too, of schedules about as good. ``body_fixed``: fires channels of
+    the file only, no steerable torquer. ``slow``: may take seconds.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Scheme:
     reads_sun: bool = False
     sets_spin: bool = False
     weighs_alternatives: bool = False
+    body_fixed: bool = False
     slow: bool = False
 
 
@@ -41,11 +43,27 @@ ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
 TWO_PULSE = Scheme(
     "two-pulse", "nutdamp.schemes.two_pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
 )
-FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True)
-OPTIMAL = Scheme("optimal", "nutdamp.schemes.optimal.search", OptimalOptions, points=True, sets_spin=True, slow=True)
-HALF_CONE = Scheme("half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True)
+FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True, body_fixed=True)
+OPTIMAL = Scheme(
+    "optimal",
+    "nutdamp.schemes.optimal.search",
+    OptimalOptions,
+    points=True,
+    sets_spin=True,
+    body_fixed=True,
+    slow=True,
+)
+HALF_CONE = Scheme(
+    "half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True, body_fixed=True
+)
 RHUMB_LINE = Scheme(
-    "rhumb-line", "nutdamp.schemes.rhumb_line", RhumbLineOptions, points=True, only_points=True, reads_sun=True
+    "rhumb-line",
+    "nutdamp.schemes.rhumb_line",
+    RhumbLineOptions,
+    points=True,
+    only_points=True,
+    reads_sun=True,
+    body_fixed=True,
 )
 NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
 """Free motion, for comparison."""
@@ -54,6 +72,8 @@ SCHEMES = {scheme.name: scheme for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, 
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
+COMPARED = (*CLASSIC, OPTIMAL.name)
+"""What is planned where none is named and there is no target."""
 POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda one: one.slow) if scheme.points)
 """In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)

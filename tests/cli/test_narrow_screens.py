@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from process import Run
 from rich.console import Console
 
 from nutdamp.presentation.layout import NARROW, columns
+
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 COMMANDS = [
     ("plan",),
@@ -78,3 +81,20 @@ def test_a_table_that_does_not_fit_stands_as_blocks_on_wide_screens_too() -> Non
     text = "".join(line.strip() for line in captured.get().splitlines())
     assert "b" * 80 in text
     assert "2.5" in text
+
+
+@pytest.mark.parametrize("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"])
+def test_four_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
+    """Each row of the comparison is one line, for units stand with the names of the rows."""
+    done = run("plan", str(CONFIGS / f"{name}.yaml"), "--quiet", columns=80)
+    wide = run("plan", str(CONFIGS / f"{name}.yaml"), "--quiet", columns=300)
+    head, *rows = done.stdout.split("\n\n")[1].splitlines()
+    assert head.split() == ["one-pulse", "two-pulse", "four-pulse", "optimal"]
+    assert [row.split("  ")[0] for row in rows[:3]] == ["pulses", "ends at, s", "impulse, N m s"]
+    assert len(rows) == len(wide.stdout.split("\n\n")[1].splitlines()) - 1
+
+
+def test_a_scheme_without_thrusters_says_so_in_its_column(run: Run) -> None:
+    done = run("plan", str(CONFIGS / "steerable-stage.yaml"), "--quiet", columns=80)
+    (row,) = (row for row in done.stdout.splitlines() if row.startswith("pulses"))
+    assert re.split(r"  +", row) == ["pulses", "1", "2", "no thrusters", "no thrusters"]

@@ -34,12 +34,12 @@ def test_another_figure_can_be_chosen(run: Run, tmp_path: Path) -> None:
 
 
 def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> None:
-    """four-pulse for the built-in example: the same picture as that scheme alone, and not that of another."""
+    """optimal for the built-in example: the same picture as that scheme alone, and not that of another."""
     run("plan", "--plot", "recommended.png", "--figure", "timeline")
-    run("plan", "--scheme", "four-pulse", "--plot", "four.png", "--figure", "timeline")
+    run("plan", "--scheme", "optimal", "--plot", "optimal.png", "--figure", "timeline")
     run("plan", "--scheme", "two-pulse", "--plot", "two.png", "--figure", "timeline")
-    recommended, four, two = ((tmp_path / f"{name}.png").read_bytes() for name in ("recommended", "four", "two"))
-    assert recommended == four
+    recommended, optimal, two = ((tmp_path / f"{name}.png").read_bytes() for name in ("recommended", "optimal", "two"))
+    assert recommended == optimal
     assert recommended != two
 
 

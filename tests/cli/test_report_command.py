@@ -50,8 +50,8 @@ def test_standard_output_holds_the_page_alone(run: Run) -> None:
 def test_markdown_needs_no_pictures(run: Run, tmp_path: Path) -> None:
     assert run("report", "-q", "-o", "report.md").returncode == 0
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    assert text.startswith("# Sounder-1: damping 5 deg of nutation\n\n✅ **Recommended: four-pulse")
-    assert "| **four-pulse** |" in text
+    assert text.startswith("# Sounder-1: damping 5 deg of nutation\n\n✅ **Recommended: optimal")
+    assert "| **optimal** |" in text
     assert "<svg" not in text
 
 

@@ -123,8 +123,8 @@ def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run)
     """As `disperse`, `verify` and `report` do; it was refused."""
     done = run("simulate")
     assert done.returncode == 0
-    assert "no --scheme and no --schedule named: using the recommended plan, four-pulse\n" in done.stderr
-    assert done.stdout == run("simulate", "--scheme", "four-pulse").stdout
+    assert "no --scheme and no --schedule named: using the recommended plan, optimal\n" in done.stderr
+    assert done.stdout == run("simulate", "--scheme", "optimal").stdout
 
 
 def test_free_motion_keeps_its_nutation(run: Run) -> None:

@@ -16,7 +16,7 @@ from nutdamp.cli.root import COMMANDS
         ("plan --scheme one-pulse --least time", "--least", "optimal"),
         ("plan --scheme two-pulse --on-time 200ms", "--on-time", "four-pulse"),
         ("plan --scheme four-pulse --literal", "--literal", "two-pulse"),
-        ("plan --shift 0.2deg", "--shift", "optimal"),
+        ("plan --scheme two-pulse --shift 0.2deg", "--shift", "optimal"),
         ("plan --scheme half-cone --target 10deg,45deg --per-turn 2", "--per-turn", "rhumb-line"),
     ],
 )
@@ -28,9 +28,7 @@ def test_an_option_that_no_scheme_planned_reads_is_told(run: Run, command: str, 
     assert "does nothing here" not in run(*command.split(), "--quiet").stderr
 
 
-@pytest.mark.parametrize(
-    "command", ["plan --on-time 700ms", "plan --literal", "plan --scheme optimal --shift 0.2deg", "plan"]
-)
+@pytest.mark.parametrize("command", ["plan --on-time 700ms", "plan --literal", "plan --shift 0.2deg", "plan"])
 def test_an_option_that_one_scheme_reads_is_no_matter(run: Run, command: str) -> None:
     assert "does nothing" not in run(*command.split()).stderr
 

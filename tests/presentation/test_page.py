@@ -194,7 +194,7 @@ def test_without_a_feasible_plan_the_page_says_why() -> None:
     assert not made.good
     assert [section.name for section in made.sections] == ["spacecraft", "schemes", "repeat"]
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
-    assert sheet(tree, "schemes")[1][0][1].text == "infeasible"
+    assert sheet(tree, "schemes")[1][0][1].text == "no thrusters"
     assert "the file names no thrusters" in tree.text
 
 
