@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits, longest_useful
+from nutdamp.limits import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.physics import damping, energy_sink, rates
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import TwoPulseOptions
@@ -43,12 +43,6 @@ MANY = 2000
 
 SHORTLIST = 6
 """Candidates that are flown and corrected, at most."""
-
-CLEARLY = 0.5
-"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
-
-EXACT = 1e-11
-"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
 
 
 def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
@@ -211,20 +205,11 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 
     Where every one breaks a limit, the first of them: the judge says which.
     """
-    best: tuple[float, Schedule] | None = None
-    broken: Schedule | None = None
-    for made, left in _shortlist(spacecraft, channels, options):
-        if not keeps_limits(spacecraft, made.pulses):
-            broken = broken or made
-        elif best is None or left < CLEARLY * best[0]:
-            best = left, made
-            if left <= EXACT:
-                break
-    if best is not None:
-        return best[1]
-    if broken is None:
+    best, broken = least_squares.best_of(spacecraft, _shortlist(spacecraft, channels, options))
+    made = best or broken
+    if made is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
-    return broken
+    return made
 
 
 def _shortlist(
@@ -248,11 +233,7 @@ def _shortlist(
 
 def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    pulses = tuple(
-        commandable(spacecraft, channel_pulse(channel, t, on_time))
-        for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
-    )
-    made = Schedule(pulses)
+    made = least_squares.fired(spacecraft, candidate.channels, candidate.timing)
     if not literal:
         made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
     left = float(np.linalg.norm(least_squares.misses(spacecraft, made)))

@@ -7,7 +7,7 @@ takes longer than a whole plan.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import ANY_ON_TIME
 from nutdamp.schemes.tools.symmetric_model import steady_omega
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 CONVERGED = 1e-14
 """rad; a few roundings of the integration."""
@@ -32,6 +32,40 @@ INTEGRATED = 50_000
 
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
+
+
+CLEARLY = 0.5
+"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+
+EXACT = 1e-11
+"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
+
+
+def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[tuple[float, float]]) -> Schedule:
+    """One pulse of each channel, commandable: ``timing`` has the centre and the on-time of each, s."""
+    return Schedule(
+        tuple(
+            commandable(spacecraft, channel_pulse(channel, t, on_time))
+            for channel, (t, on_time) in zip(channels, timing, strict=True)
+        )
+    )
+
+
+def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
+    """Of schedules with what they leave (rad), the preferred first, the one to take; and the first that breaks a limit.
+
+    The first that is exact is taken, else the first that none behind it beats clearly.
+    """
+    best: tuple[float, Schedule] | None = None
+    broken: Schedule | None = None
+    for made, left in tried:
+        if not keeps_limits(spacecraft, made.pulses):
+            broken = broken or made
+        elif best is None or left < CLEARLY * best[0]:
+            best = left, made
+            if left <= EXACT:
+                break
+    return None if best is None else best[1], broken
 
 
 def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) -> Vector:

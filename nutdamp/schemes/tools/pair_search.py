@@ -9,6 +9,7 @@ widths.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 
 from nutdamp import work
 from nutdamp.errors import Infeasible
-from nutdamp.limits import Windows, commandable, for_pairs, keeps_limits
+from nutdamp.limits import Windows, for_pairs, keeps_limits
 from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.flown_builder import tolerable
 from nutdamp.schemes.tools.reasons import no_channels, turn_of
@@ -44,12 +45,6 @@ TURNS = 24
 
 FURTHER = 60
 """Further whole turns of the spin axis that the second pulse may wait for, at most."""
-
-EXACT = 1e-11
-"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
-
-CLEARLY = 0.5
-"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
 
 PAIR = 5e-5
 """Units of `work` of each moment of each pair of channels."""
@@ -131,29 +126,23 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     near = [one for one in candidates if one.cost <= candidates[0].cost * CLOSE_IN_COST]
     near.sort(key=lambda found: found.end)
     others = [one for one in candidates if one.cost > candidates[0].cost * CLOSE_IN_COST]
-    best: tuple[float, Schedule] | None = None
-    for candidate in [*near[: SHORTLIST // 2], *others][:SHORTLIST]:
-        made = Schedule(
-            tuple(
-                commandable(spacecraft, channel_pulse(channel, t, on_time))
-                for channel, (t, on_time) in zip(candidate.channels, candidate.timing, strict=True)
-            )
-        )
-        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
-            continue
-        made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
-        left = _left(spacecraft, made)
-        if keeps_limits(spacecraft, made.pulses) and (best is None or left < CLEARLY * best[0]):
-            best = left, made
-            if left <= EXACT:
-                break
+    best, _ = least_squares.best_of(spacecraft, _tried(spacecraft, [*near[: SHORTLIST // 2], *others][:SHORTLIST]))
     if best is None:
         raise Infeasible(search.reason())
-    made = _checked(spacecraft, best[1])
+    made = _checked(spacecraft, best)
     floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
     one, two = (pulse.channel for pulse in made)
     note = f"{one} then {two} after {made.pulses[1].t - made.pulses[0].t:.4g} s"
     return Schedule(made.pulses, (f"{note}; {made.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
+
+
+def _tried(spacecraft: Spacecraft, candidates: list[Candidate]) -> Iterator[tuple[Schedule, float]]:
+    """The candidates, corrected on the flown motion, with the residual (rad) that each leaves."""
+    for candidate in candidates:
+        made = least_squares.fired(spacecraft, candidate.channels, candidate.timing)
+        if spacecraft.limits.tick is None or keeps_limits(spacecraft, made.pulses):
+            made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
+            yield made, _left(spacecraft, made)
 
 
 Indices = NDArray[np.intp]
