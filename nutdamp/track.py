@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -87,12 +87,6 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
     """The track with rates and quaternion in the axes of the file."""
     rates, quaternion = inertia.in_file_axes(track.rates, track.quaternion)
     return replace(track, rates=rates, quaternion=quaternion)
-
-
-def in_pieces(track: Track) -> Iterator[Track]:
-    """The rows of a track, `PIECE` at a time."""
-    for begin in range(0, len(track.t), PIECE):
-        yield Track(**{one.name: getattr(track, one.name)[begin : begin + PIECE] for one in fields(track)})
 
 
 class EvenTimes(NamedTuple):

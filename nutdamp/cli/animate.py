@@ -5,28 +5,27 @@ from __future__ import annotations
 import click
 
 from nutdamp.cli.common import (
+    Flown,
     Input,
     deliver,
     expect_places,
+    flown_options,
     load,
     plan_or_read,
     quiet_option,
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Named, Quantity
+from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import progress
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
-from nutdamp.schemes import NAMES, Options
+from nutdamp.schemes import Options
 
 
 @click.command("animate", cls=PlanningCommand)
 @spacecraft_argument
-@click.option(
-    "--scheme", type=Named(NAMES), help="Show this scheme with default options; without it the recommended one."
-)
-@click.option("--schedule", type=FILE, help="Show the pulses of a CSV file, as `plan --csv` writes it.")
+@flown_options("Show")
 @goal_options
 @click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")
@@ -38,8 +37,7 @@ from nutdamp.schemes import NAMES, Options
 @quiet_option
 def command(
     spacecraft: Input,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     aim: Aim,
     output: str,
@@ -54,18 +52,16 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as GIF.
     """
-    if scheme is not None and schedule is not None:
-        raise click.UsageError("name what to show: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    expect_outputs(spacecraft, schedule, output=output)
+    expect_outputs(spacecraft, flown.schedule, output=output)
     from nutdamp.presentation.figures import animation
 
     animation.film_format(output)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(output)
-    pulses = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet).pulses
+    pulses = plan_or_read(body, flown, options, remark, quiet=quiet).pulses
 
     from nutdamp import flight
 
@@ -78,6 +74,6 @@ def command(
         )
     made = flight.flown(body, pulses, end)
     with progress("filming", timed.frames, quiet=quiet) as step:
-        deliver([(output, lambda stream: animation.film(stream, made, timed, output, width, step))])
+        deliver([(output, lambda: lambda stream: animation.film(stream, made, timed, output, width, step))])
     if output != "-":
         remark(f"wrote {output}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")

@@ -52,10 +52,9 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
                 click.echo()
     if json is not None:
         from nutdamp.files.check_json import check_json
-        from nutdamp.files.output import json_text
 
         try:
-            deliver([(json, json_text(check_json(reports)))])
+            deliver([(json, lambda: check_json(reports))])
         except CannotWrite as wrong:
             tell(wrong)
             failures.add(UNREADABLE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import click
 
@@ -13,7 +13,7 @@ from nutdamp.cli.parameters import FILE, Named
 from nutdamp.cli.scheme_options import Aim, expect_read
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
-from nutdamp.schemes import Options, SchemeOptions
+from nutdamp.schemes import NAMES, Options, SchemeOptions
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -38,8 +38,11 @@ dispersions:
   timing: {uniform: 5 ms}"""
 """What is said of a file that should have dispersions."""
 
-Output = tuple[str, "str | bytes | Callable[[IO[bytes]], object]"]
-"""Path of a file to write, and its content or what writes it."""
+File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
+"""What `write_whole` takes."""
+
+Output = tuple[str | None, Callable[[], "File | dict[str, Any]"]]
+"""Path of a file to write, if it is asked for, and what makes its content; a dict is written as JSON."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -155,19 +158,45 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
     return built_in_example_text(), "example.yaml"
 
 
+class Flown(NamedTuple):
+    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, else the recommended plan."""
+
+    scheme: str | None
+    schedule: str | None
+
+
+def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
+    """``--scheme`` and ``--schedule``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
+
+    ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
+    A usage error for both.
+    """
+    default = f"{verb} this scheme with default options; without it the recommended one."
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def gathered(*args: Any, scheme: str | None, schedule: str | None, **parameters: Any) -> Any:
+            if scheme is not None and schedule is not None:
+                raise click.UsageError(f"name what to {verb.lower()}: either --scheme or --schedule")
+            return command(*args, flown=Flown(scheme, schedule), **parameters)
+
+        read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
+        option = click.option("--schedule", type=FILE, help=read)(gathered)
+        return cast(Command, click.option("--scheme", type=Named(NAMES), help=scheme or default)(option))
+
+    return decorate
+
+
 def plan_or_read(
     body: Spacecraft,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     remark: Callable[[str], None],
     *,
     quiet: bool,
 ) -> Plan:
-    """The plan of ``scheme`` (the recommended one where it is None), or the pulses of a ``schedule`` file as a plan.
-
-    Raises Infeasible where there is no such plan.
-    """
+    """What a command flies, as a plan; raises Infeasible where there is none."""
+    scheme, schedule = flown
     from nutdamp import planning
     from nutdamp.cli.progress import working
     from nutdamp.errors import Infeasible
@@ -226,25 +255,38 @@ def expect_places(*paths: str | None) -> None:
             check_place(path)
 
 
-def deliver(outputs: Sequence[Output], *screens: RenderableType, unsaved: Sequence[CannotWrite] = ()) -> None:
+def deliver(
+    outputs: Sequence[Output], *screens: Callable[[], RenderableType], unsaved: Sequence[CannotWrite] = ()
+) -> None:
     """Write the files requested, and show results on standard output.
 
     A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
     those that are ``unsaved`` already. Raises CannotWrite.
     """
     failures = list(unsaved)
-    if outputs:
+    # All is made before anything is written: what cannot be made leaves nothing behind.
+    contents = [(path, _file_of(make())) for path, make in outputs if path is not None]
+    results = [make() for make in screens]
+    if contents:
         from nutdamp.errors import CannotWrite
         from nutdamp.files.output import write_whole
 
-        for path, content in outputs:
+        for path, content in contents:
             try:
                 write_whole(path, content)
             except CannotWrite as wrong:
                 failures.append(wrong)
-    for screen in screens:
-        show(screen)
+    for result in results:
+        show(result)
     for failure in failures[:-1]:
         say(f"nutdamp: {failure}")
     if failures:
         raise failures[-1]
+
+
+def _file_of(content: File | dict[str, Any]) -> File:
+    if not isinstance(content, dict):
+        return content
+    from nutdamp.files.output import json_text
+
+    return json_text(content)

@@ -6,17 +6,18 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from nutdamp.cli.boundary import REQUIREMENT_MISSED, interruption
 from nutdamp.cli.common import (
+    Flown,
     Input,
-    Output,
     deliver,
     expect_picture,
     expect_places,
+    flown_options,
     load,
     plan_or_read,
     quiet_option,
@@ -25,11 +26,11 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Count, Named
+from nutdamp.cli.parameters import FILE, Count
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
-from nutdamp.schemes import NAMES, Options
+from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -47,12 +48,7 @@ SAVED_EVERY = 30.0
 
 @click.command("disperse", cls=PlanningCommand)
 @spacecraft_argument
-@click.option(
-    "--scheme",
-    type=Named(NAMES),
-    help="Disperse this scheme with default options; without it the recommended one.",
-)
-@click.option("--schedule", type=FILE, help="Disperse the pulses of a CSV file, as `plan --csv` writes it.")
+@flown_options("Disperse")
 @goal_options
 @click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
 @click.option(
@@ -60,7 +56,7 @@ SAVED_EVERY = 30.0
 )
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
 @impulse_options
-@click.option("--flown", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
+@click.option("--flown", "real", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @click.option(
     "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
@@ -72,14 +68,13 @@ SAVED_EVERY = 30.0
 @quiet_option
 def command(
     spacecraft: Input,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     aim: Aim,
     samples: int,
     seed: int,
     threads: int | None,
-    flown: bool,
+    real: bool,
     impulses: bool,
     force: bool,
     case: int | None,
@@ -95,23 +90,21 @@ def command(
     Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    if scheme is not None and schedule is not None:
-        raise click.UsageError("name what to disperse: either --scheme or --schedule")
-    if flown and impulses:
+    if real and impulses:
         raise click.UsageError("--flown or --impulses: the cases are flown in one way")
     expect_impulses(impulses, force, True, "disperse")
     if case is not None and (csv or plot or resume):
         raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
     if resume == "-":
         raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
-    silent = expect_outputs(spacecraft, schedule, csv=csv, json=json, plot=plot, resume=resume)
+    silent = expect_outputs(spacecraft, flown.schedule, csv=csv, json=json, plot=plot, resume=resume)
     expect_picture(plot)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot, resume)
 
     require_dispersions(body)
-    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
+    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
 
     from nutdamp.dispersion import study_of
 
@@ -124,22 +117,24 @@ def command(
         _one_case(study, case - 1, plan.scheme, json, silent)
         return
     results, unsaved, stopped_by = fly(study, samples, threads, csv, resume, quiet)
-    outputs: list[Output] = []
-    if json is not None:
-        from nutdamp.files.dispersion_json import dispersion_json
-        from nutdamp.files.output import json_text
 
-        outputs.append((json, json_text(dispersion_json(results, scheme=plan.scheme, worst=worst))))
-    if plot is not None:
+    def data() -> dict[str, Any]:
+        from nutdamp.files.dispersion_json import dispersion_json
+
+        return dispersion_json(results, scheme=plan.scheme, worst=worst)
+
+    def picture() -> bytes:
         from nutdamp.presentation import figures
 
-        outputs.append((plot, figures.rendered(figures.dispersion_figure(results, scheme=plan.scheme), plot)))
-    screens: list[RenderableType] = []
-    if not silent:
+        assert plot is not None
+        return figures.rendered(figures.dispersion_figure(results, scheme=plan.scheme), plot)
+
+    def screen() -> RenderableType:
         from nutdamp.presentation.dispersion_tables import dispersion_screen
 
-        screens.append(dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal))
-    deliver(outputs, *screens, unsaved=unsaved)
+        return dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal)
+
+    deliver([(json, data), (plot, picture)], *[screen] * (not silent), unsaved=unsaved)
     if stopped_by is not None and results.done < results.asked:
         say(f"interrupted: {results.done} of {results.asked} cases are done")
         sys.exit(128 + stopped_by)
@@ -147,7 +142,7 @@ def command(
         sys.exit(REQUIREMENT_MISSED)
 
 
-class Flown(NamedTuple):
+class Run(NamedTuple):
     """A study after its run: the results, the files that could not be saved, and the signal that ended it, if any."""
 
     results: Results
@@ -155,7 +150,7 @@ class Flown(NamedTuple):
     stopped_by: int | None
 
 
-def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Flown:
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Run:
     """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.dispersion.study import Results, run, threads_here
@@ -191,7 +186,7 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume
                 save_results(resume, results)
             except CannotWrite as wrong:
                 unsaved.append(wrong)
-    return Flown(results, tuple(unsaved), stopped.number)
+    return Run(results, tuple(unsaved), stopped.number)
 
 
 def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Collect | None], None]) -> None:
@@ -227,23 +222,16 @@ def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bo
     from nutdamp.dispersion.single import flown_outputs
 
     draws = study.draws_of(case)
-    outputs: list[Output] = []
-    if json is not None:
-        from nutdamp.files.dispersion_json import case_json
-        from nutdamp.files.output import json_text
 
-        outputs.append(
-            (
-                json,
-                json_text(
-                    {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
-                ),
-            )
-        )
-    screens: list[RenderableType] = []
-    if not silent:
+    def data() -> dict[str, Any]:
+        from nutdamp.files.dispersion_json import case_json
+
+        return {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
+
+    def screen() -> RenderableType:
         from nutdamp.presentation.dispersion_tables import case_screen
 
         flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
-        screens.append(case_screen(study, case, draws, flown, scheme=scheme))
-    deliver(outputs, *screens)
+        return case_screen(study, case, draws, flown, scheme=scheme)
+
+    deliver([(json, data)], *[screen] * (not silent))

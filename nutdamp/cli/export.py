@@ -9,9 +9,11 @@ import click
 
 from nutdamp.cli.boundary import REQUIREMENT_MISSED
 from nutdamp.cli.common import (
+    Flown,
     Input,
     deliver,
     expect_places,
+    flown_options,
     load,
     plan_or_read,
     quiet_option,
@@ -22,7 +24,7 @@ from nutdamp.cli.parameters import FILE, Named, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
-from nutdamp.schemes import NAMES, PLANNED, Options
+from nutdamp.schemes import PLANNED, Options
 
 
 @click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
@@ -35,12 +37,7 @@ from nutdamp.schemes import NAMES, PLANNED, Options
     "script that flies the schedule; json: as `plan --json`.",
 )
 @click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
-@click.option(
-    "--scheme",
-    type=Named(NAMES),
-    help="Export this scheme with default options; without it the recommended one.",
-)
-@click.option("--schedule", type=FILE, help="Export the pulses of a CSV file, as `plan --csv` writes it.")
+@flown_options("Export")
 @goal_options
 @click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
@@ -51,8 +48,7 @@ def command(
     spacecraft: Input,
     form: str | None,
     xml: bool,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     aim: Aim,
     until: float | None,
@@ -65,20 +61,18 @@ def command(
     file.
     """
     form = _format(form, spacecraft, ctx.args)
-    if scheme is not None and schedule is not None:
-        raise click.UsageError("name what to export: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    expect_outputs(spacecraft, schedule, output=output)
+    expect_outputs(spacecraft, flown.schedule, output=output)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(output)
-    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
+    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
-    deliver([(output, export_text(plan, form, xml=notation, until=until))])
+    deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
     if output != "-":
         remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
-    if plan.meets_requirement is False and (scheme is None or scheme in PLANNED):
+    if plan.meets_requirement is False and (flown.scheme is None or flown.scheme in PLANNED):
         remark(f"{plan.scheme} does not meet the requirement")
         sys.exit(REQUIREMENT_MISSED)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from nutdamp.cli.common import Output, deliver, quiet_option, remarks
+from nutdamp.cli.common import deliver, quiet_option, remarks
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 
@@ -31,10 +31,7 @@ def command(form: str, file: str, output: str, schedule: str | None, quiet: bool
 
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
-    outputs: list[Output] = [(output, text)]
-    if schedule is not None:
-        outputs.append((schedule, pulses_csv(flown(body, pulses))))
-    deliver(outputs)
+    deliver([(output, lambda: text), (schedule, lambda: pulses_csv(flown(body, pulses)))])
     remark = remarks(quiet)
     for entry in contents.remarks:
         remark(f"{file}: {entry}")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -32,7 +33,7 @@ from nutdamp.schemes import PLANNED, Options
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from nutdamp.planning import Comparison
+    from nutdamp.planning import Comparison, Plan
     from nutdamp.robust import RobustComparison
 
 
@@ -94,44 +95,30 @@ def command(
     else:
         chosen = None if dispersed.chosen is None else dispersed.chosen.plan
         met = dispersed.meets_requirement
-    outputs: list[Output] = []
-    if json is not None:
-        from nutdamp.files.output import json_text
-        from nutdamp.files.plan_json import comparison_json
-        from nutdamp.presentation import verdicts
-
-        data = comparison_json(compared, verdicts.spoken(compared))
-        if dispersed is not None:
-            from nutdamp.files.robust_json import robust_json
-
-            data["robust"] = robust_json(dispersed, verdicts.robust_reason(dispersed))
-        outputs.append((json, json_text(data)))
-    if csv is not None and chosen is not None:
-        from nutdamp.files.pulses_csv import pulses_csv
-
-        outputs.append((csv, pulses_csv(chosen.flight)))
-    if plot is not None and chosen is not None:
-        from nutdamp.presentation import figures
-
-        outputs.append((plot, figures.plan_picture(figure, chosen, plot)))
     for path in (csv, plot):
         if path is not None and chosen is None:
             say(f"{path} was not written: no plan is feasible")
-    screens: list[RenderableType] = []
-    if not silent and dispersed is not None:
-        from nutdamp.presentation.robust_tables import robust_screen
 
-        screens.append(robust_screen(dispersed))
-    elif not silent:
-        from nutdamp.presentation.plan_tables import comparison_screen
+    def data() -> dict[str, Any]:
+        from nutdamp.files.plan_json import comparison_json
+        from nutdamp.presentation import verdicts
 
-        screens.append(comparison_screen(compared))
-    else:
+        made = comparison_json(compared, verdicts.spoken(compared))
+        if dispersed is None:
+            return made
+        from nutdamp.files.robust_json import robust_json
+
+        return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
+
+    outputs: list[Output] = [(json, data)]
+    if chosen is not None:
+        outputs += [(csv, partial(_pulses, chosen)), (plot, partial(_picture, chosen, figure, plot))]
+    if silent:
         from nutdamp.presentation import verdicts
 
         for warning in verdicts.warnings(compared):
             remark(f"warning: {warning}")
-    deliver(outputs, *screens)
+    deliver(outputs, *[partial(_screen, compared, dispersed)] * (not silent))
     if show_failures(compared):
         sys.exit(INTERNAL)
     if chosen is None:
@@ -148,3 +135,26 @@ def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: 
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=quiet) as advance:
         return robust.compare(compared, trials, advance, impulses=impulses, force=force)
+
+
+def _pulses(chosen: Plan) -> str:
+    from nutdamp.files.pulses_csv import pulses_csv
+
+    return pulses_csv(chosen.flight)
+
+
+def _picture(chosen: Plan, figure: str, path: str | None) -> bytes:
+    from nutdamp.presentation import figures
+
+    assert path is not None
+    return figures.plan_picture(figure, chosen, path)
+
+
+def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:
+    if dispersed is not None:
+        from nutdamp.presentation.robust_tables import robust_screen
+
+        return robust_screen(dispersed)
+    from nutdamp.presentation.plan_tables import comparison_screen
+
+    return comparison_screen(compared)

@@ -113,7 +113,7 @@ def command(
         dispersed, note = _dispersed(chosen, disperse, impulses=impulses, force=force, quiet=quiet)
     with working("writing the page", quiet=quiet):
         made = made_of(compared, repeat, output, dispersed, note)
-    deliver([(output, made.content)])
+    deliver([(output, lambda: made.content)])
     if not made.good:
         remark(made.verdict)
     if output != "-":

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
 from nutdamp.cli.common import (
+    Flown,
     Input,
-    Output,
     deliver,
     expect_picture,
     expect_places,
+    flown_options,
     load,
     plan_or_read,
     plot_options,
@@ -19,10 +21,10 @@ from nutdamp.cli.common import (
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Named, Quantity
+from nutdamp.cli.parameters import FILE, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
-from nutdamp.schemes import NAMES, Options
+from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -34,12 +36,9 @@ PICTURED = 100_000
 
 @click.command("simulate", cls=PlanningCommand)
 @spacecraft_argument
-@click.option(
-    "--scheme",
-    type=Named(NAMES),
-    help="Plan this scheme with default options and propagate it, not the recommended one; none is free motion.",
+@flown_options(
+    "Propagate", "Plan this scheme with default options and propagate it, not the recommended one; none is free motion."
 )
-@click.option("--schedule", type=FILE, help="Propagate the pulses of a CSV file, as `plan --csv` writes it.")
 @goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(
@@ -57,8 +56,7 @@ PICTURED = 100_000
 @quiet_option
 def command(
     spacecraft: Input,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     aim: Aim,
     real: bool,
@@ -76,11 +74,9 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
     example. A FILE of - is standard output, for --schedule standard input.
     """
-    if scheme is not None and schedule is not None:
-        raise click.UsageError("name what to propagate: either --scheme or --schedule")
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    silent = expect_outputs(spacecraft, schedule, csv=csv, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, flown.schedule, csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
     expect_picture(plot, figure)
@@ -92,43 +88,48 @@ def command(
     from nutdamp.outcome import seen_at
     from nutdamp.track import extremes
 
-    plan = plan_or_read(body, scheme, schedule, options, remark, quiet=quiet)
+    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
     pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
-    impulses, flown = ends = tuple(seen_at(one, end) for one in flights)
+    ends = tuple(seen_at(one, end) for one in flights)
     moving, chosen = flights[real], ends[real]
     found = extremes(moving.pieces(samples, end))
     track = moving.sampled(min(samples, PICTURED), end) if plot is not None or drawn else None
-    outputs: list[Output] = []
-    if csv is not None:
+
+    def rows() -> Callable[[IO[bytes]], None]:
         from nutdamp.files.track_csv import write_track
 
-        outputs.append((csv, lambda stream: write_track(stream, moving.pieces(samples, end), body.inertia)))
-    if json is not None:
-        from nutdamp.files.output import json_text
+        return lambda stream: write_track(stream, moving.pieces(samples, end), body.inertia)
+
+    def data() -> dict[str, Any]:
         from nutdamp.files.simulation_json import simulation_json
 
-        outputs.append(
-            (json, json_text(simulation_json(chosen, found, impulses, flown, scheme=plan.scheme, real=real)))
-        )
-    if plot is not None and track is not None:
+        return simulation_json(chosen, found, *ends, scheme=plan.scheme, real=real)
+
+    def picture() -> bytes:
         from nutdamp.presentation import figures
 
-        outputs.append((plot, figures.picture(figure, chosen, track, plot)))
-    screens: list[RenderableType] = []
+        assert plot is not None
+        assert track is not None
+        return figures.picture(figure, chosen, track, plot)
+
+    def screen() -> RenderableType:
+        from nutdamp.presentation.simulate_tables import simulation_screen
+
+        how = f"{plan.scheme}, propagated by the {chosen.model}"
+        return simulation_screen(chosen, found, *ends, how=how, pulses=len(pulses))
+
+    def drawing() -> RenderableType:
+        from nutdamp.presentation.terminal import motion_drawing
+
+        assert track is not None
+        return motion_drawing(chosen, track)
+
     if silent:
         from nutdamp.presentation.verdicts import model_warnings
 
-        for warning in model_warnings(impulses, flown):
+        for warning in model_warnings(*ends):
             remark(f"warning: {warning}")
-    else:
-        from nutdamp.presentation.simulate_tables import simulation_screen
-
-        how = f"{plan.scheme}, propagated by the {'real pulse widths' if real else 'impulse sum (17)'}"
-        screens.append(simulation_screen(chosen, found, impulses, flown, how=how, pulses=len(pulses)))
-    if track is not None and drawn:
-        from nutdamp.presentation.terminal import motion_drawing
-
-        screens.append(motion_drawing(chosen, track))
-    deliver(outputs, *screens)
+    screens = [*[screen] * (not silent), *[drawing] * drawn]
+    deliver([(csv, rows), (json, data), (plot, picture)], *screens)

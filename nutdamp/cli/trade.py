@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -22,7 +24,7 @@ from nutdamp.cli.common import (
 from nutdamp.cli.parameters import FILE, FOLDER, Bare, Named, Quantity, reading_of
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
-from nutdamp.schemes.options import LEAST, OptimalOptions, Options
+from nutdamp.schemes.options import LEAST, Options
 from nutdamp.schemes.registry import OPTIMAL
 
 if TYPE_CHECKING:
@@ -82,10 +84,10 @@ def command(
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
-    from nutdamp import fronts
-    from nutdamp.files.trade_files import schedule_files, schedule_path
+    from nutdamp.files.trade_files import schedule_files, schedule_path, trade_csv
+    from nutdamp.library.studies import trade
 
-    shifts = allow or (0.0, fronts.EVERYWHERE)
+    shifts = allow or (0.0, math.inf)
     most = points * len(set(shifts))
     written = [] if schedules is None else [schedule_path(schedules, index) for index in range(1, most + 1)]
     silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot, schedules=written)
@@ -96,26 +98,27 @@ def command(
             remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot)
-    chosen = OptimalOptions(least=least, with_disturbances=options.with_disturbances)
     expect_read((OPTIMAL.name,), options, body, remark)
 
     from nutdamp.cli.progress import progress
 
+    known = options.with_disturbances
     with progress("searching", most, quiet=quiet) as step:
-        found = fronts.fronts(body, chosen, count=points, shifts=shifts, progress=step)
-    outputs: list[Output] = []
-    if csv is not None or json is not None:
-        from nutdamp.files.output import json_text
-        from nutdamp.files.trade_files import trade_csv, trade_json
+        traded = trade(body, points, shifts, least, with_disturbances=known, progress=step)
+    found = traded.fronts
 
-        if csv is not None:
-            outputs.append((csv, trade_csv(found)))
-        if json is not None:
-            outputs.append((json, json_text(trade_json(body, found))))
-    if plot is not None:
+    def picture() -> bytes:
         from nutdamp.presentation import figures
 
-        outputs.append((plot, figures.rendered(figures.trade_figure(body, found), plot)))
+        assert plot is not None
+        return figures.rendered(figures.trade_figure(body, found), plot)
+
+    def screen() -> RenderableType:
+        from nutdamp.presentation.trade_tables import trade_screen
+
+        return trade_screen(body, found)
+
+    outputs: list[Output] = [(csv, lambda: trade_csv(found)), (json, traded.to_dict), (plot, picture)]
     unsaved: list[CannotWrite] = []
     if schedules is not None:
         from nutdamp.errors import CannotWrite
@@ -123,14 +126,9 @@ def command(
 
         try:
             make_folder(schedules)
-            outputs.extend(schedule_files(found, schedules))
+            outputs += [(path, partial(str, text)) for path, text in schedule_files(found, schedules)]
         except CannotWrite as wrong:
             unsaved.append(wrong)
-    screens: list[RenderableType] = []
-    if not silent:
-        from nutdamp.presentation.trade_tables import trade_screen
-
-        screens.append(trade_screen(body, found))
-    deliver(outputs, *screens, unsaved=unsaved)
+    deliver(outputs, *[screen] * (not silent), unsaved=unsaved)
     if not any(front.points for front in found):
         sys.exit(INFEASIBLE)

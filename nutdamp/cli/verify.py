@@ -9,21 +9,22 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, UNREADABLE
 from nutdamp.cli.common import (
+    Flown,
     Input,
-    Output,
     deliver,
     expect_places,
+    flown_options,
     load,
     plan_or_read,
     quiet_option,
     remarks,
     spacecraft_argument,
 )
-from nutdamp.cli.parameters import FILE, Named
+from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
-from nutdamp.schemes import NAMES, Options
+from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -31,19 +32,13 @@ if TYPE_CHECKING:
 
 @click.command("verify", cls=PlanningCommand)
 @spacecraft_argument
-@click.option(
-    "--scheme",
-    type=Named(NAMES),
-    help="Verify this scheme with default options; without it the recommended one.",
-)
-@click.option("--schedule", type=FILE, help="Verify the pulses of a CSV file, as `plan --csv` writes it.")
+@flown_options("Verify")
 @goal_options
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def command(
     spacecraft: Input,
-    scheme: str | None,
-    schedule: str | None,
+    flown: Flown,
     options: Options,
     aim: Aim,
     json: str | None,
@@ -54,30 +49,24 @@ def command(
     Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
     DOP853 and Basilisk are not confirmed: exit status 3.
     """
-    if scheme is not None and schedule is not None:
-        raise click.UsageError("name what to verify: either --scheme or --schedule")
-    silent = expect_outputs(spacecraft, schedule, json=json)
+    silent = expect_outputs(spacecraft, flown.schedule, json=json)
     body = load(spacecraft, remarks(quiet), aim)
     expect_places(json)
 
     from nutdamp.cli.progress import working
     from nutdamp.library.studies import verify
 
-    plan = plan_or_read(body, scheme, schedule, options, remarks(quiet), quiet=quiet)
+    plan = plan_or_read(body, flown, options, remarks(quiet), quiet=quiet)
     with working("verifying", quiet=quiet):
         verified = verify(plan)
     found = verified.core
-    outputs: list[Output] = []
-    if json is not None:
-        from nutdamp.files.output import json_text
 
-        outputs.append((json, json_text(verified.to_dict())))
-    screens: list[RenderableType] = []
-    if not silent:
+    def screen() -> RenderableType:
         from nutdamp.presentation.verify_tables import verification_screen
 
-        screens.append(verification_screen(body, plan.scheme, found))
-    deliver(outputs, *screens)
+        return verification_screen(body, plan.scheme, found)
+
+    deliver([(json, verified.to_dict)], *[screen] * (not silent))
     if found.disagreeing:
         others = " and ".join(found.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")

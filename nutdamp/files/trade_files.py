@@ -64,7 +64,7 @@ def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]
     }
 
 
-def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str | bytes]]:
+def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
     return [(schedule_path(folder, index), pulses_csv(point.plan.flight)) for index, _, point in numbered(found)]
 

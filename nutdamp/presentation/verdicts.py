@@ -19,6 +19,7 @@ from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import obstacle
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
+from nutdamp.words import listed
 
 if TYPE_CHECKING:  # few runs look for a robust plan
     from nutdamp.robust import RobustComparison
@@ -309,7 +310,7 @@ def required(spacecraft: Spacecraft) -> str:
             texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
         else:
             texts.append(f"{bound.part.label} within {most(bound.most)}")
-    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 2 else texts)
+    return listed(texts)
 
 
 def cases_verdict(share: float, probability: float) -> str:

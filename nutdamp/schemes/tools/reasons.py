@@ -10,6 +10,7 @@ from nutdamp.limits import longest_useful
 from nutdamp.schedule import Pulse
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.words import listed
 
 FADED = 1e-6
 """Share of the nutation below which there is nothing left for pulses to do: dissipation has taken it out before."""
@@ -41,7 +42,7 @@ def bounded_by(spacecraft: Spacecraft) -> str:
         "blackout windows": bool(limits.blackout),
     }
     names = [f"the horizon of {spacecraft.horizon:.4g} s", *(name for name in there if there[name])]
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return listed(names)
 
 
 def no_target() -> str:
