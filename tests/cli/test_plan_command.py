@@ -314,7 +314,7 @@ def test_without_nutation_the_screen_says_so(run: Run, tmp_path: Path) -> None:
 
 def test_the_nutation_of_a_sphere_has_no_period_in_the_body(run: Run, tmp_path: Path) -> None:
     (tmp_path / "sphere.yaml").write_text(SPHERE)
-    assert "none in the body, where ω stands still, 1.992 s inertially" in run("plan", "sphere.yaml").stdout
+    assert "none in the body, where ω does not turn, 1.992 s inertially" in run("plan", "sphere.yaml").stdout
 
 
 def test_a_target_without_unit_is_read_as_rad_and_says_so(run: Run) -> None:
