@@ -41,6 +41,23 @@ def test_peers_fly_the_same_cases(run_py: dict[str, Any], tmp_path: Path, monkey
     assert works["one flight"]() == works["solve_ivp"]() > 10
 
 
+def test_the_files_of_the_benchmarks_are_there_and_each_is_compared_with_something(run_py: dict[str, Any]) -> None:
+    names = {*run_py["BASES"], *(process.name for process in run_py["PROCESSES"])}
+    for process in run_py["PROCESSES"]:
+        assert process.against in names
+        made = {"four.yaml", "sixteen.yaml", "dispersed.yaml"}
+        files = [part for part in process.arguments if part.endswith(".yaml") and part not in made]
+        assert all(Path(part).is_file() for part in files)
+
+
+def test_the_table_of_the_readme(run_py: dict[str, Any]) -> None:
+    rows = [run_py["Row"]("plan", 0.25, 3.04, "import numpy"), run_py["Row"]("a case", 3e-7, 5432.1, "faster than it")]
+    assert run_py["markdown"](rows).splitlines()[2:] == [
+        "| plan | 250 ms | 3.0 × import numpy |",
+        "| a case | 300 ns | 5,432 × faster than it |",
+    ]
+
+
 def test_a_missed_limit_is_marked(run_py: dict[str, Any]) -> None:
     row, line = run_py["Row"], run_py["line"]
     assert "MISSED" not in line(row("name", 0.1, 1.4, "import numpy", 1.5, memory=200.0, memory_limit=250.0))

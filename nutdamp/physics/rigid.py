@@ -29,6 +29,9 @@ AT_REST = 1e-9
 LONGEST = 3e5
 """Radians that one integration may run over: some two hundred thousand steps."""
 
+SHORT = 8.0
+"""Radians up to which one step after the other is quicker than all at once."""
+
 MOST_STEPS = 400_000
 """Steps of one integration, at most: enough for `LONGEST`, whatever becomes of the rates on the way."""
 
@@ -90,13 +93,14 @@ def integrate(
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
     Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
-    if moments[0] == moments[1] and forcing.growth == 0.0:
-        return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
+    if moments[0] == moments[1] and forcing.growth == 0.0 and not turned <= SHORT:
+        return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
     size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
     gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step

@@ -1,9 +1,10 @@
 """Benchmarks of the whole command and of the work inside, as ratios of one run.
 
-    python tests/benchmarks/run.py [--runs 9] [--json FILE]
+    python tests/benchmarks/run.py [--runs 9] [--json FILE] [--markdown]
 
 Whole processes take turns with what they are compared with, after one unmeasured turn, so that a machine that slows
-down slows them all; times are medians. What a process works inside is timed by `inside.py`, in a process of its own.
+down slows them all; times are medians: of processor time, but of the time passed where several threads work.
+`--markdown` prints the table of README. What a process works inside is timed by `inside.py`, in a process of its own.
 A limit that is missed is marked, and the exit status is 1.
 """
 
@@ -25,13 +26,17 @@ from typing import Any, NamedTuple
 
 
 class Process(NamedTuple):
-    """A command, what it is compared with, and the most that its ratio and its peak memory (MiB) may be."""
+    """A command, what it is compared with, and the most that its ratio and its peak memory (MiB) may be.
+
+    ``threads``: several work, and the time that passes counts.
+    """
 
     name: str
     arguments: tuple[str, ...]
     against: str
     limit: float | None = None
     memory: float | None = None
+    threads: bool = False
 
 
 class Row(NamedTuple):
@@ -62,25 +67,39 @@ BASES = {
 NUTDAMP = ("-m", "nutdamp")
 DISPERSE = (*NUTDAMP, "disperse", "dispersed.yaml", "--scheme", "two-pulse", "--samples")
 
+CASES = Path(__file__).parents[1] / "cases"
+SINK = ("--set", "dissipation={time_constant: 500 s}")
+
+
+def plan(file: str, *arguments: str) -> tuple[str, ...]:
+    """A plan of a file of this folder, or of one of `tests/cases`."""
+    path = file if file in ("four.yaml", "sixteen.yaml", "dispersed.yaml") else str(CASES / file)
+    return (*NUTDAMP, "plan", path, *arguments)
+
+
+CLASSIC = tuple(part for name in ("one-pulse", "two-pulse", "four-pulse") for part in ("--scheme", name))
+TO_270 = ("--target", "270deg,-66.56deg")
+
 PROCESSES = (
-    Process("nutdamp --help", (*NUTDAMP, "--help"), "import click", 1.5),
-    Process("nutdamp plan", (*NUTDAMP, "plan"), "import numpy", 4.0),
-    Process(
-        "optimal, 4 channels, 40 periods",
-        (*NUTDAMP, "plan", "four.yaml", "--scheme", "optimal"),
-        "import scipy.optimize",
-        2.5,
+    Process("nutdamp --help", (*NUTDAMP, "--help"), "import click", 1.4),
+    Process("nutdamp plan", (*NUTDAMP, "plan"), "import numpy", 4.5),
+    Process("plan, three classic schemes", (*NUTDAMP, "plan", *CLASSIC), "import numpy", 3.0),
+    Process("optimal, 4 channels, 40 periods", plan("four.yaml", "--scheme", "optimal"), "import numpy", 4.0),
+    Process("optimal, 16 channels, 100 periods", plan("sixteen.yaml", "--scheme", "optimal"), "import numpy", 6.0),
+    Process("plan, 4 channels", plan("four.yaml", *CLASSIC), "import numpy"),
+    Process("the same with dissipation", plan("four.yaml", *CLASSIC, *SINK), "plan, 4 channels", 1.5),
+    Process("geo-dissipation", plan("geo-dissipation.yaml"), "import numpy", 20.0),
+    Process("kick-stage, optimal", plan("kick-stage.yaml", "--scheme", "optimal"), "import numpy", 20.0),
+    Process("geo-target, 68 deg away", plan("geo-target.yaml", *TO_270), "import numpy", 20.0),
+    *(
+        Process(name, plan(f"{name}.yaml"), "import numpy", 100.0)
+        for name in ("slow-89-deg", "slow-dissipation", "slow-dissipation-two-pulse", "slow-goal", "slow-optimal")
     ),
-    Process(
-        "optimal, 16 channels, 100 periods",
-        (*NUTDAMP, "plan", "sixteen.yaml", "--scheme", "optimal"),
-        "import scipy.optimize",
-        5.0,
-    ),
-    Process("disperse --impulses, 1e5 cases", (*DISPERSE, "1e5", "--impulses"), "import numpy", None, 250.0),
-    Process("disperse --impulses, 1e6 cases", (*DISPERSE, "1e6", "--impulses"), "import numpy", 15.0, 250.0),
-    Process("disperse, 2e4 cases", (*DISPERSE, "2e4"), "import numpy", None, 250.0),
-    Process("disperse, 1e5 cases", (*DISPERSE, "1e5"), "import numpy", None, 250.0),
+    Process("disperse --impulses, 1e5 cases", (*DISPERSE, "1e5", "--impulses"), "import numpy", None, 250.0, True),
+    Process("disperse --impulses, 1e6 cases", (*DISPERSE, "1e6", "--impulses"), "import numpy", 8.0, 250.0, True),
+    Process("with dissipation, 1e6", (*DISPERSE, "1e6", "--impulses", *SINK), "import numpy", 10.0, 250.0, True),
+    Process("disperse, 2e4 cases", (*DISPERSE, "2e4"), "import numpy", None, 250.0, True),
+    Process("disperse, 1e5 cases", (*DISPERSE, "1e5"), "import numpy", None, 250.0, True),
 )
 
 BODY = """\
@@ -118,8 +137,16 @@ def fan(channels: int, periods: float) -> str:
     return f"{BODY}thrusters:\n{''.join(thrusters)}limits: {{horizon: {horizon} s}}\n"
 
 
-def measured(arguments: tuple[str, ...], folder: str) -> tuple[float, float]:
-    """Wall time in s and peak memory in MiB of one process."""
+class Taken(NamedTuple):
+    """Time passed and processor time, s, and peak memory, MiB, of one process."""
+
+    passed: float
+    worked: float
+    memory: float
+
+
+def measured(arguments: tuple[str, ...], folder: str) -> Taken:
+    """What one process takes."""
     start = time.perf_counter()
     with (Path(folder) / "errors").open("w+b") as errors:
         process = subprocess.Popen(
@@ -128,32 +155,33 @@ def measured(arguments: tuple[str, ...], folder: str) -> tuple[float, float]:
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode not in (0, 4):  # 4: done, and the requirement is missed
+        if process.returncode not in (0, 3, 4):  # 3: no schedule is feasible, 4: the requirement is missed
             errors.seek(0)
             raise SystemExit(f"{' '.join(arguments)} failed:\n{errors.read().decode()}")
-    return seconds, used.ru_maxrss / 1024.0
+    return Taken(seconds, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
 
 
 def processes(runs: int, folder: str) -> list[Row]:
     """All `PROCESSES`, in turn with what they are compared with."""
     commands = {**BASES, **{process.name: process.arguments for process in PROCESSES}}
-    times: dict[str, list[float]] = {name: [] for name in commands}
-    memory: dict[str, float] = dict.fromkeys(commands, 0.0)
+    taken: dict[str, list[Taken]] = {name: [] for name in commands}
     for turn in range(runs + 1):
         for name, arguments in commands.items():
-            seconds, peak = measured(arguments, folder)
-            memory[name] = max(memory[name], peak)
+            one = measured(arguments, folder)
             if turn > 0:
-                times[name].append(seconds)
-    medians = {name: statistics.median(values) for name, values in times.items()}
+                taken[name].append(one)
+
+    def median(name: str, threads: bool) -> float:
+        return statistics.median(one.passed if threads else one.worked for one in taken[name])
+
     return [
         Row(
             process.name,
-            medians[process.name],
-            medians[process.name] / medians[process.against],
+            median(process.name, process.threads),
+            median(process.name, process.threads) / median(process.against, process.threads),
             process.against,
             process.limit,
-            memory=memory[process.name],
+            memory=max(one.memory for one in taken[process.name]),
             memory_limit=process.memory,
         )
         for process in PROCESSES
@@ -177,6 +205,18 @@ def line(row: Row) -> str:
     return text + ("" if row.holds else "  MISSED")
 
 
+def markdown(rows: list[Row]) -> str:
+    """The rows as a table of README."""
+    lines = ["| what | time | ratio |", "|---|---|---|"]
+    for row in rows:
+        scale, unit = next(
+            (s, u) for s, u in ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if row.seconds * s >= 1
+        )
+        ratio = f"{row.ratio:.1f}" if row.ratio < 100 else f"{row.ratio:,.0f}"
+        lines.append(f"| {row.name} | {row.seconds * scale:.3g} {unit} | {ratio} × {row.against} |")
+    return "\n".join(lines)
+
+
 def machine() -> dict[str, Any]:
     """What the numbers belong to."""
     processor = platform.processor() or platform.machine()
@@ -192,6 +232,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=9)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--markdown", action="store_true")
     chosen = parser.parse_args()
     on = machine()
     print(f"{on['processor']}, {on['cores']} cores, Python {on['python']}, {chosen.runs} runs", flush=True)
@@ -199,8 +240,10 @@ def main() -> int:
         for name, text in (("dispersed", DISPERSED), ("four", fan(4, 40)), ("sixteen", fan(16, 100))):
             (Path(folder) / f"{name}.yaml").write_text(text, encoding="utf-8")
         rows = [*processes(chosen.runs, folder), *inside(folder)]
-    for row in rows:
-        print(line(row))
+    if chosen.markdown:
+        print(markdown(rows))
+    else:
+        print(*(line(row) for row in rows), sep="\n")
     if chosen.json is not None:
         table = [{**row._asdict(), "holds": row.holds} for row in rows]
         chosen.json.write_text(json.dumps({"machine": on, "rows": table}, indent=2) + "\n", encoding="utf-8")
