@@ -44,4 +44,4 @@ def test_ci_tries_the_lowest_versions_that_are_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     for entry in project["dependencies"] + project["optional-dependencies"]["plot"]:
         # what .ci/run makes of it is then a requirement of exactly this version
-        assert re.fullmatch(r"[a-z]+>=[0-9.]+", entry)
+        assert re.fullmatch(r"[a-z][a-z0-9-]*>=[0-9.]+", entry)
