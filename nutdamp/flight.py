@@ -150,7 +150,7 @@ class Flight(Tabled):
         times = np.asarray(times, dtype=float)
         owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
         body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index in np.unique(owner):
+        for index in np.flatnonzero(np.bincount(owner + 1)) - 1:  # np.unique would load numpy.ma
             rows = owner == index
             body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
         return body, quaternion

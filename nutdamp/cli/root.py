@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 from importlib import import_module
 from keyword import iskeyword
 
@@ -77,6 +79,16 @@ def group() -> None:
     """
 
 
+RARELY = 100_000
+"""New objects between two searches for cycles: loading modules makes very many objects, and few that are garbage."""
+
+
 def main() -> None:
     """Entry point: run the command line and leave with its exit status."""
+    gc.set_threshold(RARELY)
+    # Read when numpy is loaded. Matrices are small here, so that threads within their products cost more than they
+    # save; dispersed cases have threads of their own.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Else pydantic looks through all packages installed for plugins.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     run(group)

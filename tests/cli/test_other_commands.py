@@ -243,3 +243,33 @@ def test_numbers_without_unit_that_are_hardly_meant_are_named(
 ) -> None:
     said = run(*words).stderr
     assert "is read as" not in said if warning is None else warning in said
+
+
+@pytest.mark.parametrize("arguments", ["plan", "plan --scheme optimal --free-axis"])
+def test_planning_loads_no_masked_arrays(arguments: str) -> None:
+    """As `numpy.unique` does, which is a tenth of the start-up of the command."""
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\nfrom nutdamp.cli.root import group\n"
+        f"group.main({[*arguments.split(), '-q']}, standalone_mode=False)\nprint('LOADED', 'numpy.ma' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "LOADED False"
+
+
+def test_products_of_small_matrices_have_one_thread() -> None:
+    """Unless the environment says otherwise."""
+    import os
+    import subprocess
+    import sys
+
+    code = "import os, sys\nfrom nutdamp.cli import main\nsys.argv = ['nutdamp', '--version']\ntry: main()\nfinally: "
+    code += "print(os.environ['OPENBLAS_NUM_THREADS'])"
+    for given, used in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
+        kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**kept, **given}
+        )
+        assert done.stdout.splitlines()[-1] == used

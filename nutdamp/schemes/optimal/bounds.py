@@ -222,7 +222,7 @@ class _Gains:
         rates = program.influence.turning
         bend = sum(
             float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
-            for rate in np.unique(rates)
+            for rate in sorted(set(rates.tolist()))
         )
         self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
 

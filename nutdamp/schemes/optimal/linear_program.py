@@ -227,8 +227,9 @@ class Program:
         """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
         bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
-        numbers, row = np.unique(columns.burn[bounded], return_inverse=True)
-        rows = np.zeros((len(numbers), len(columns.t)))
+        used = np.bincount(columns.burn[bounded]) > 0
+        row = (np.cumsum(used) - 1)[columns.burn[bounded]]
+        rows = np.zeros((int(used.sum()), len(columns.t)))
         rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
         return rows
 
@@ -267,12 +268,16 @@ class Program:
         """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
         grid = self._slot_rows()
         worth = self._direction @ (weights @ grid.reshape(len(weights), -1)).reshape(3, -1)
-        worth[self.forbidden] = -np.inf
+        if self.forbidden.any():
+            worth[self.forbidden] = -np.inf
         return np.asarray(worth)
 
     def _gains(self, weights: Vector) -> Vector:
         """The same, less what it costs."""
-        return np.asarray(self._worth(weights) - (self._price / self._dearest)[:, None] * self._dearness(self.centres))
+        gains = self._worth(weights)
+        cost = (self._price / self._dearest)[:, None]
+        gains -= cost * self._dearness(self.centres) if self.haste else cost  # large: in place
+        return gains
 
     def reachable(self) -> bool | None:
         """Whether all slots together can supply the goal, by `reach`; None where that is not known."""
@@ -349,7 +354,7 @@ class Program:
     def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
         """Neighbouring columns of a channel as one burn about their common centre."""
         burns: list[Burn] = []
-        for index in np.unique(columns.channel):
+        for index in np.flatnonzero(np.bincount(columns.channel)):
             mine = np.flatnonzero(columns.channel == index)
             mine = mine[np.argsort(columns.t[mine], kind="stable")]
             apart = (np.diff(columns.t[mine]) > 1.01 * self.width) | (np.diff(columns.burn[mine]) != 0)
@@ -378,7 +383,8 @@ class Program:
             reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
             if self._strong[index]:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
-                times = np.unique(np.clip(times, self.centres[0] - half, self.centres[-1] + half))
+                times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
+                times = times[np.diff(times, prepend=-np.inf) > 0.0]
                 times = times[~self.forbidden[index, self._slot(times)]]
                 same = np.full(len(times), index)
                 impulses = impulses.joined(Columns(same, times, np.zeros(len(times)), np.full(len(times), number)))
