@@ -70,7 +70,7 @@ def test_a_message_of_such_a_name_becomes_a_spacecraft_file(run: Run, tmp_path: 
 def test_json_gives_the_name_back(run: Run, odd: str) -> None:
     done = run("check", f"{odd}.yaml", "missing" + odd, "--json", "-")
     assert [entry["file"] for entry in json.loads(done.stdout)["files"]] == [f"{odd}.yaml", "missing" + odd]
-    assert done.stderr == "cannot read missingd\\udcfcse: no such file or directory\n"
+    assert done.stderr == "nutdamp: cannot read missingd\\udcfcse: no such file or directory\n"
 
 
 def test_messages_show_no_control_characters_of_names(run: Run, tmp_path: Path) -> None:
