@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp import work
 from nutdamp.planning import Plan, plan
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Bounds
@@ -73,10 +73,14 @@ def fronts(
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = _of_unknown_propellant(spacecraft)
     made: list[Front] = []
-    for index, shift in enumerate(sorted(set(shifts))):
-        front = _front(spacecraft, _allowing(options, shift), count, shift, partial(_told, progress, index * count))
-        points = (*front.points, *(point for other in made for point in other.points))
-        made.append(Front(shift, _undominated(points), None if points else front.why))
+    ordered = sorted(set(shifts))
+    with work.budget("the fronts", work.FRONTS) as spent:
+        searches = _Searches(count * len(ordered), spent, progress)
+        for shift in ordered:
+            front = _front(spacecraft, _allowing(options, shift), count, shift, searches)
+            points = (*front.points, *(point for other in made for point in other.points))
+            made.append(Front(shift, _undominated(points), None if points else front.why))
+            searches.done = count * len(made)
     return tuple(made)
 
 
@@ -88,8 +92,26 @@ def _of_unknown_propellant(spacecraft: Spacecraft) -> Spacecraft:
     return replace(spacecraft, channels=tuple(channels))
 
 
-def _told(progress: Callable[[int], None], before: int, done: int) -> None:
-    progress(before + done)
+@dataclass(eq=False)
+class _Searches:
+    """The searches of all fronts, within their ``budget``.
+
+    The fastest schedule of each, without which there is no front, may cost what a scheme may; of what that leaves, all
+    searches to come have equal shares.
+    """
+
+    count: int
+    budget: work.Budget
+    progress: Callable[[int], None]
+    done: int = 0
+
+    def __call__(self, spacecraft: Spacecraft, options: OptimalOptions) -> Plan:
+        left = self.budget.most - self.budget.done
+        with work.budget("a point", left if options.least == "time" else left / (self.count - self.done)):
+            found = plan(spacecraft, OPTIMAL.name, options)
+        self.done += 1
+        self.progress(self.done)
+        return found
 
 
 def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
@@ -97,21 +119,17 @@ def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
     return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
 
 
-def _front(
-    spacecraft: Spacecraft, options: OptimalOptions, count: int, shift: float, progress: Callable[[int], None]
-) -> Front:
+def _front(spacecraft: Spacecraft, options: OptimalOptions, count: int, shift: float, searches: _Searches) -> Front:
     """The fastest schedule, then horizons from its end to that of the file, evenly by their ratios."""
-    fastest = plan(spacecraft, OPTIMAL.name, replace(options, least="time"))
-    progress(1)
+    fastest = searches(spacecraft, replace(options, least="time"))
     if fastest.schedule is None or fastest.schedule.bounds is None:
         return Front(shift, (), infeasibility(fastest) or "there is nothing to do")
     points = [Point(fastest, spacecraft.horizon)]
     begin, end = spacecraft.limits.earliest, fastest.pulses.end
-    for index, share in enumerate(np.linspace(0.0, 1.0, count)[1:], start=2):
+    for share in np.linspace(0.0, 1.0, count)[1:]:
         horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        found = plan(body, OPTIMAL.name, options)
-        progress(index)
+        found = searches(body, options)
         if found.schedule is not None and found.schedule.bounds is not None:
             points.append(Point(found, horizon))
     return Front(shift, tuple(points))

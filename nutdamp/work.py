@@ -16,7 +16,10 @@ SCHEME = 12_000.0
 """Units that the search of one scheme may spend."""
 
 COMMAND = 13_000.0
-"""Units that the searches of one comparison or front may spend together."""
+"""Units that the searches of one comparison may spend together."""
+
+FRONTS = 60_000.0
+"""Units that the searches of all points of `trade` may spend together."""
 
 
 @dataclass(eq=False)

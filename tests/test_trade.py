@@ -15,7 +15,7 @@ from builders import cross, spinner
 from checker import violations
 from process import Run
 
-from nutdamp import fronts
+from nutdamp import fronts, work
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Spacecraft
 
@@ -110,3 +110,18 @@ def test_nothing_feasible_ends_with_status_3(run: Run, tmp_path: Path) -> None:
     assert done.returncode == 3
     assert "none:" in done.stdout
     assert run("trade", "--allow", "-1deg").returncode == 2
+
+
+def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last point of the example is cut at 500 units, of which all three searches together would take 600."""
+    monkeypatch.setattr(work, "FRONTS", 500.0)
+    with work.budget("test", 1e9) as spent:
+        done = run("trade", "--points", "3", "--allow", "0deg")
+    assert done.returncode == 0
+    assert "point 2: the search ended at its limit of work" in done.stderr
+    assert "point 1: " not in done.stderr
+    assert spent.done < 1.2 * work.FRONTS
+    monkeypatch.setattr(work, "FRONTS", 50.0)
+    none = run("trade", "--points", "3", "--allow", "0deg")
+    assert none.returncode == 3
+    assert "the search ended at its limit of work" in " ".join(none.stdout.split())

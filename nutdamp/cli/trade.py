@@ -85,7 +85,9 @@ def command(
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
     from nutdamp.files.trade_files import schedule_files, schedule_path, trade_csv
+    from nutdamp.fronts import numbered
     from nutdamp.library.studies import trade
+    from nutdamp.remarks import CUT
 
     shifts = allow or (0.0, math.inf)
     most = points * len(set(shifts))
@@ -106,6 +108,9 @@ def command(
     with progress("searching", most, quiet=quiet) as step:
         traded = trade(body, points, shifts, least, with_disturbances=known, progress=step)
     found = traded.fronts
+    for index, _, point in numbered(found):
+        if point.plan.cut:
+            remark(f"point {index}: {CUT}")
 
     def picture() -> bytes:
         from nutdamp.presentation import figures
