@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
@@ -13,6 +15,9 @@ NARROW = 60
 
 GAP = 2
 """Characters between two columns."""
+
+WORD = re.compile(r"(?:[<≤✗] )?\S+")
+"""What a column keeps on one line."""
 
 
 def facts() -> Table:
@@ -60,8 +65,11 @@ def _text(cell: RenderableType) -> Text:
 
 
 def _widths(columns: list[list[str]], room: int) -> list[int] | None:
-    """Characters for each column such that no word is cut; None where there is no ``room`` for that."""
-    least = [max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns]
+    """Characters for each column such that no word is cut; None where there is no ``room`` for that.
+
+    A number with its sign, as in "< 1e-9", is one word.
+    """
+    least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
     whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
     spare = room - sum(least)
     if spare < 0:

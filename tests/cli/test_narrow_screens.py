@@ -98,3 +98,10 @@ def test_a_scheme_without_thrusters_says_so_in_its_column(run: Run) -> None:
     done = run("plan", str(CONFIGS / "steerable-stage.yaml"), "--quiet", columns=80)
     (row,) = (row for row in done.stdout.splitlines() if row.startswith("pulses"))
     assert re.split(r"  +", row) == ["pulses", "1", "2", "no thrusters", "no thrusters"]
+
+
+def test_a_bound_keeps_its_sign_on_the_same_line(run: Run) -> None:
+    """Long names of channels are broken, not "< 1e-9" after the last pulse."""
+    shown = run("plan", str(CONFIGS / "steerable-stage.yaml"), "--scheme", "two-pulse", "--quiet").stdout
+    assert any(line.endswith("  < 1e-9") for line in shown.splitlines())
+    assert not any(line.endswith("<") for line in shown.splitlines())
