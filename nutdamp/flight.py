@@ -1,7 +1,7 @@
 """Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
 
 Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
-impulses. `flown` is the judge: real widths, true moments. Both give legs that can be requested the motion at any time.
+impulses. `flown` is the judge: real widths, true moments. Both give legs that tell the motion at any time.
 """
 
 from __future__ import annotations
