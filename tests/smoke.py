@@ -45,6 +45,9 @@ CALLS = """
 --help
 init
 init; 1
+init --list
+init --from ace ace.yaml
+plan ace.yaml --scheme two-pulse
 check
 check smoke.yaml --json check.json
 check broken.yaml; 2

@@ -12,7 +12,8 @@ import pytest
 from nutdamp import flight, schemes
 from nutdamp.basilisk import BasiliskFlight, fly
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
@@ -111,7 +112,7 @@ def test_plans_with_real_widths(name: str, scheme: str) -> None:
 
 @pytest.mark.basilisk
 def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
-    body = read_spacecraft(built_in_example_text(), "example")
+    body = read_spacecraft(example_text(), "example")
     schedule = schemes.schedule("two-pulse", body, schemes.Options())
     until = schedule.end + body.inertial_period
     found = fly(body, schedule, until)

@@ -587,3 +587,9 @@ def test_dictionaries_hold_no_number_that_json_has_not() -> None:
     assert ball.to_dict()["body_nutation_period_s"] is None
     for one in (ball, compared, *compared):
         json.dumps(one.to_dict(), allow_nan=False)
+
+
+def test_the_examples_that_ship_are_loaded_by_name() -> None:
+    assert nutdamp.example("ace").name == "ACE"
+    with pytest.raises(nutdamp.NutdampError, match="lunar-prospector"):
+        nutdamp.example("lunar-prospecter")

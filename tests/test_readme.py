@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from process import Run
 
+from nutdamp import __version__
 from nutdamp.files.spacecraft_file import read_spacecraft
 
 ROOT = Path(__file__).parent.parent
@@ -59,3 +60,8 @@ def test_the_library_examples_are_those_that_are_run(index: int, name: str) -> N
 
 def test_the_sweep_takes_at_most_ten_lines() -> None:
     assert len(re.findall(r"```python\n(.+?)```", TEXT, re.DOTALL)[1].splitlines()) <= 10
+
+
+def test_the_wheel_and_the_changes_are_those_of_this_version() -> None:
+    assert f"nutdamp-{__version__}-py3-none-any.whl" in TEXT
+    assert f"- {__version__}: " in TEXT.split("## What changed")[1]

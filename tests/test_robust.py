@@ -16,7 +16,8 @@ from nutdamp.dispersion import study_of
 from nutdamp.dispersion.single import flown_outputs
 from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation import verdicts
 from nutdamp.schemes import CLASSIC, four_pulse
 from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
@@ -126,7 +127,7 @@ def test_how_far_it_is_can_be_watched() -> None:
 
 def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
     """Four pulses of the example cost less, but turn H more; two pulses bring it back."""
-    example = read_spacecraft(built_in_example_text(), "example.yaml")
+    example = read_spacecraft(example_text(), "example.yaml")
     body = replace(example, dispersions=Dispersions(thrust_per_pulse=normal(0.001)))
     for shift, scheme in ((5.0, "four-pulse"), (0.1, "two-pulse")):
         asked = Requirement(math.radians(0.5), math.radians(shift), 0.99)

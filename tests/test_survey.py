@@ -12,12 +12,13 @@ import pytest
 from process import Run
 
 from nutdamp import flight, survey
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import forced
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance
 
-EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 CALM = replace(EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]))
 
 

@@ -20,7 +20,8 @@ from nutdamp import basilisk, flight, planning
 from nutdamp.basilisk import BasiliskFlight
 from nutdamp.cli.verify import command as verify_command
 from nutdamp.errors import MissingExtra
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.presentation.verify_tables import conservation, verdict
 from nutdamp.schedule import Schedule, channel_pulse
@@ -28,7 +29,7 @@ from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.verification import AGREE, Verification, integrate, verify
 
-EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 
 
 def tilted() -> Spacecraft:

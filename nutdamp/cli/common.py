@@ -146,7 +146,7 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
     """The text of the spacecraft file that `load` reads, and its name."""
     from pathlib import Path
 
-    from nutdamp.files.spacecraft_file import built_in_example_text
+    from nutdamp.files.examples import example_text
     from nutdamp.files.yaml_tree import read_text
 
     if path is None and Path(DEFAULT_FILE).exists():
@@ -155,7 +155,7 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
     if path is not None:
         return read_text(Path(path)), path
     remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
-    return built_in_example_text(), "example.yaml"
+    return example_text(), "example.yaml"
 
 
 class Flown(NamedTuple):

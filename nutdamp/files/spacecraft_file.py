@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -44,7 +43,7 @@ from nutdamp.spacecraft import (
     Thruster,
 )
 
-__all__ = ["built_in_example_text", "json_schema", "load_spacecraft", "read_spacecraft"]
+__all__ = ["json_schema", "load_spacecraft", "read_spacecraft"]
 
 Vector = NDArray[np.float64]
 
@@ -88,14 +87,6 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         object_id=contents.object_id,
     )
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
-
-
-def built_in_example_text() -> str:
-    """The commented spacecraft file that ships with the package: the built-in example, and what `init` writes."""
-    data = pkgutil.get_data("nutdamp", "data/example.yaml")
-    if data is None:
-        raise FileNotFoundError("nutdamp/data/example.yaml is not installed")
-    return data.decode("utf-8")
 
 
 def _inertia(section: InertiaSection) -> Inertia:

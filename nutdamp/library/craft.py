@@ -56,11 +56,15 @@ def read(text: str, name: str = "text") -> Spacecraft:
     return _read(Source(text, arguments.instance("name", name, str, "a text")))
 
 
-def example() -> Spacecraft:
-    """The built-in example, which ``nutdamp init`` writes."""
-    from nutdamp.files.spacecraft_file import built_in_example_text
+def example(name: str = "example") -> Spacecraft:
+    """The built-in example, or the one of that ``name`` among those of ``nutdamp init --list``.
 
-    return _read(Source(built_in_example_text(), "example.yaml"))
+    Raises BadRequest for any other name.
+    """
+    from nutdamp.files.examples import example_names, example_text
+
+    known = arguments.one_of("name", name, example_names())
+    return _read(Source(example_text(known), f"{known}.yaml"))
 
 
 def _read(source: Source, above: int = 3) -> Spacecraft:

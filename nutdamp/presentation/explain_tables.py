@@ -28,6 +28,11 @@ def topics_screen() -> RenderableType:
     return Constrain(Group(*parts), WIDEST)
 
 
+def pairs_screen(title: str, rows: tuple[tuple[str, str], ...]) -> RenderableType:
+    """Names with what they are, under a title."""
+    return Constrain(Group(Text(title), Text(), _Pairs(rows)), WIDEST)
+
+
 def topic_screen(topic: Topic) -> RenderableType:
     """One topic."""
     parts: list[RenderableType] = [Text.assemble((topic.name, "bold"), f" – {topic.summary}")]

@@ -56,6 +56,7 @@ def test_commands_options_and_choices_are_completed() -> None:
     assert completed("ver") == ["plain,verify"]
     assert completed("plan", "--targ") == ["plain,--target"]
     assert completed("plan", "--scheme", "two") == ["plain,two-pulse"]
+    assert completed("init", "--from", "lun") == ["plain,lunar-prospector"]
 
 
 def test_every_file_of_every_command_is_completed() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from process import Run
 
-from nutdamp.files.spacecraft_file import built_in_example_text
+from nutdamp.files.examples import example_text
 
 ODD = os.fsdecode(b"d\xfcse")
 """A name in Latin-1."""
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="names of files 
 def odd(run: Run, tmp_path: Path) -> str:
     """A spacecraft with an attitude; beside it a schedule, odd as well."""
     attitude = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
-    (tmp_path / f"{ODD}.yaml").write_text(built_in_example_text() + attitude)
+    (tmp_path / f"{ODD}.yaml").write_text(example_text() + attitude)
     assert run("plan", f"{ODD}.yaml", "--scheme", "two-pulse", "--csv", f"{ODD}.csv", "--quiet").returncode == 0
     return ODD
 

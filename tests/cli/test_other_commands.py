@@ -36,6 +36,28 @@ def test_init_writes_a_file_that_plans(run: Run, tmp_path: Path) -> None:
     assert run("init", "-").stdout == (tmp_path / "other.yaml").read_text()
 
 
+def test_init_lists_the_spacecraft_that_ship_with_nutdamp(run: Run, tmp_path: Path) -> None:
+    shown = run("init", "--list").stdout
+    configs = [path.stem for path in (Path(__file__).parents[2] / "configs").glob("*.yaml")]
+    assert configs
+    assert [name for name in configs if name not in shown] == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_init_writes_the_one_that_is_named(run: Run, tmp_path: Path) -> None:
+    assert run("init", "--from", "ace", "mine.yaml").returncode == 0
+    assert (tmp_path / "mine.yaml").read_bytes() == (Path(__file__).parents[2] / "configs" / "ace.yaml").read_bytes()
+    assert "ACE" in run("check", "mine.yaml").stdout
+
+
+def test_init_names_the_nearest_of_the_examples(run: Run, tmp_path: Path) -> None:
+    done = run("init", "--from", "lunar-prospecter")
+    assert done.returncode == 2
+    assert "there is no example 'lunar-prospecter'; did you mean 'lunar-prospector'?" in done.stderr
+    assert "--list" in run("init", "--from", "zzz").stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_check_prints_derived_quantities(run: Run) -> None:
     done = run("check")
     assert done.returncode == 0

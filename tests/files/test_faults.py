@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nutdamp.errors import Fault, FaultyFile
-from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.spacecraft import Spacecraft
 
 
@@ -92,7 +93,7 @@ def test_very_many_faults_are_found_in_good_time() -> None:
     assert len(faults_of(f"{BASE}thrusters:\n{thrusters}channels: {{a: [{names}]}}\n")) == 4800
 
 
-EXAMPLE = built_in_example_text()
+EXAMPLE = example_text()
 LINES = EXAMPLE.splitlines(keepends=True)
 SLIPS = ["", "~", "true", ".nan", "1e999", "-1", "0", "[]", "{}", "'", "\t", "*a", "&a x", "!!x y", "5 Hz", "- a"]
 

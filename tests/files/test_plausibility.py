@@ -10,8 +10,9 @@ from broken import BASE, BODY
 
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
+from nutdamp.files.examples import example_text
 from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.spacecraft_file import read_spacecraft
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 THRUSTER = "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, min_on_time: {}}}]\n"
@@ -147,7 +148,7 @@ def test_warnings_come_in_the_order_of_the_file() -> None:
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: str(path.name))
 def test_no_file_that_comes_along_is_doubted(path: Path) -> None:
     assert doubts_of(path.read_text(encoding="utf-8")) == []
-    assert doubts_of(built_in_example_text()) == []
+    assert doubts_of(example_text()) == []
 
 
 @pytest.mark.parametrize(

@@ -17,14 +17,15 @@ from process import Run
 from nutdamp import flight, planning
 from nutdamp.errors import FaultyFile
 from nutdamp.files import schedule_file
+from nutdamp.files.examples import example_text
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.files.schedule_file import read_pulses
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Pulse, Schedule, overlapping
 from nutdamp.spacecraft import Limits, Spacecraft, Steerable
 
-EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 
 
 @pytest.fixture(name="written")

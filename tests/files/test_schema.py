@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from nutdamp.files.spacecraft_file import built_in_example_text, json_schema, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import json_schema, read_spacecraft
 from nutdamp.files.yaml_tree import read_tree
 
 SCHEMA = json_schema()
@@ -84,7 +85,7 @@ def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
 
 
 def test_the_example_and_everything_else_validate() -> None:
-    VALIDATOR.validate(read_tree(built_in_example_text(), "example.yaml")[0].plain())
+    VALIDATOR.validate(read_tree(example_text(), "example.yaml")[0].plain())
     VALIDATOR.validate(EVERYTHING)
     VALIDATOR.validate(
         changed("dispersions", {"omega0": {"normal": 0.1}, "thrust": {"normal": "3 %"}, "A": {"bias": -1}})

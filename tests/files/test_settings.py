@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.files.examples import example_text
 from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.files.yaml_tree import KeyPath, dotted, read_tree
 from nutdamp.spacecraft import Spacecraft
 
-EXAMPLE = built_in_example_text()
+EXAMPLE = example_text()
 
 
 def with_settings(text: str, *settings: str) -> Spacecraft:

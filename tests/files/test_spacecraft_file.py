@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.spacecraft_file import built_in_example_text, load_spacecraft, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft
 from nutdamp.tolerances import Tolerance
@@ -323,7 +324,7 @@ def test_spin_about_an_outer_axis_or_of_a_sphere_is_sound(tensor: str) -> None:
 
 
 def test_the_example_is_the_one_it_describes() -> None:
-    craft = read(built_in_example_text())
+    craft = read(example_text())
     assert (craft.name, craft.mass, craft.inertia.moments) == ("Sounder-1", 250.0, (120.0, 120.0, 80.0))
     assert craft.spin == pytest.approx(math.pi)
     assert craft.nutation == pytest.approx(math.radians(5))
@@ -344,7 +345,7 @@ def uncommented(text: str, *keys: str) -> str:
 
 def test_what_the_example_shows_in_comments_works() -> None:
     text = uncommented(
-        built_in_example_text(),
+        example_text(),
         "attitude",
         "channels",
         "steerable",
@@ -367,7 +368,7 @@ def test_what_the_example_shows_in_comments_works() -> None:
     assert craft.dispersions is not None
     assert craft.dispersions.thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"}
     assert craft.dispersions.timing_offset == Tolerance("bias", 0.002)
-    others = re.sub(r"^(state|inertia): .*\n", "", built_in_example_text(), flags=re.MULTILINE)
+    others = re.sub(r"^(state|inertia): .*\n", "", example_text(), flags=re.MULTILINE)
     craft = read(uncommented(others, "inertia", "omega0"))
     assert craft.nutation == pytest.approx(math.radians(5), rel=0.05)
 
@@ -379,4 +380,4 @@ def test_the_example_shows_every_key() -> None:
     assert sections[0]["properties"].keys() == SpacecraftFile.model_fields.keys()
     for section in sections:
         for key in section["properties"]:
-            assert re.search(rf"\b{key}:", built_in_example_text()), key
+            assert re.search(rf"\b{key}:", example_text()), key

@@ -10,7 +10,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from nutdamp import planning
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation import figures
 
 FILE = Path(__file__).with_name("two-pulse.png")
@@ -18,7 +19,7 @@ FILE = Path(__file__).with_name("two-pulse.png")
 
 def main() -> None:
     """Draw it."""
-    body = read_spacecraft(built_in_example_text(), "example.yaml")
+    body = read_spacecraft(example_text(), "example.yaml")
     FILE.write_bytes(figures.plan_picture("motion", planning.plan(body, "two-pulse"), str(FILE)))
 
 

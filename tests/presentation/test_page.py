@@ -14,8 +14,9 @@ from markup import Node, parsed
 
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results, run
+from nutdamp.files.examples import example_text
 from nutdamp.files.plan_json import comparison_json
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Comparison, compare
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.page.content import Repeat, report_page
@@ -52,7 +53,7 @@ def page(text: str, *, pictured: bool = False) -> str:
 
 @pytest.fixture(scope="module")
 def example() -> str:
-    return page(built_in_example_text(), pictured=True)
+    return page(example_text(), pictured=True)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +116,7 @@ def test_what_a_file_says_stays_text(nasty: str) -> None:
 
 
 def test_the_input_file_stands_there_to_the_letter(nasty: str, example: str) -> None:
-    for text, source in ((nasty, NASTY), (example, built_in_example_text())):
+    for text, source in ((nasty, NASTY), (example, example_text())):
         shown = parsed(text.removeprefix("<!DOCTYPE html>")).all("pre")[1].text
         assert shown == source.rstrip("\n")
 
@@ -132,11 +133,11 @@ def test_no_other_script_may_run(example: str) -> None:
 
 
 def test_the_same_input_gives_the_same_page(example: str) -> None:
-    assert page(built_in_example_text(), pictured=True) == example
+    assert page(example_text(), pictured=True) == example
 
 
 def test_the_comparison_says_what_the_json_says(example: str) -> None:
-    data = comparison_json(compared(built_in_example_text()), {})
+    data = comparison_json(compared(example_text()), {})
     heads, rows = sheet(parsed(example), "schemes")
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
     for row, plan in zip(rows, data["plans"], strict=True):
@@ -157,13 +158,13 @@ def test_the_comparison_says_what_the_json_says(example: str) -> None:
 
 
 def test_the_requirement_is_given_once() -> None:
-    names = [name for name, _ in spacecraft_facts(read_spacecraft(built_in_example_text(), "example")).rows]
+    names = [name for name, _ in spacecraft_facts(read_spacecraft(example_text(), "example")).rows]
     assert names.count("requirement") == 1
     assert names[-1] == "horizon"
 
 
 def test_the_schedule_is_the_recommended_one(example: str) -> None:
-    chosen = compared(built_in_example_text()).recommended
+    chosen = compared(example_text()).recommended
     assert chosen is not None
     heads, rows = sheet(parsed(example), "schedule")
     assert len(rows) == len(chosen.pulses)

@@ -15,7 +15,8 @@ from builders import Outcome, aimed, channel, cross, events, fan, off_target, sp
 from checker import violations
 
 from nutdamp import planning
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import pointing
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schemes import Choice, Options
@@ -115,7 +116,7 @@ def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
 
 def test_fewer_pulses_than_close_by_themselves_are_trimmed_to_close() -> None:
     """The example to 14 deg: 53 pulses of 0.1328 s were made of 0.2 s before, where 42 do."""
-    example = read_spacecraft(built_in_example_text(), "example.yaml")
+    example = read_spacecraft(example_text(), "example.yaml")
     for azimuth, most in ((0.0, 42), (90.0, 33)):
         plan = train(aimed(example, 14.0, azimuth), Options(on_time=0.2))
         assert len(plan.pulses) <= most

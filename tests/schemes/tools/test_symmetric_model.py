@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from nutdamp import flight
-from nutdamp.files.spacecraft_file import built_in_example_text, read_spacecraft
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import forced
 from nutdamp.planning import Plan, plan
 from nutdamp.remarks import infeasibility, remarks
@@ -17,7 +18,7 @@ from nutdamp.schemes import CLASSIC, Options
 from nutdamp.schemes.tools.symmetric_model import model_of, steady_omega
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft, Steerable
 
-EXAMPLE = read_spacecraft(built_in_example_text(), "example.yaml")
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 DISTURBED = Options(with_disturbances=True)
 NEARLY_NOTHING = math.radians(1e-7)
 
