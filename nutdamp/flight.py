@@ -7,7 +7,7 @@ impulses. `flown` is the judge: real widths, true moments. Both give legs that t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING
@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import work
-from nutdamp.motion import Arc, Integrated, Path
+from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.motion import Path
 from nutdamp.physics import attitude, rates, rigid
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.physics.rigid import Forcing
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import PIECE, Track, even_times, in_file_axes, make_track, widest
@@ -31,12 +30,6 @@ if TYPE_CHECKING:
 IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
 """The two models by which a schedule is flown."""
-
-LEG, PULSE = 0.03, 0.4
-"""Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
-
-SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
-"""Units of a step of a symmetric body, of any other, and of one with dissipation."""
 
 PLANNED_STEPS = 30_000
 """Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
@@ -238,66 +231,6 @@ class Flight(Tabled):
         return math.copysign(1.0, self.spacecraft.spin)
 
 
-@dataclass(frozen=True, slots=True)
-class Dynamics:
-    """The body as one of the two models flies it, and what acts on it besides the pulses."""
-
-    moments: tuple[float, float, float]
-    constant: Vector
-    forcing: Forcing
-
-    @property
-    def free(self) -> bool:
-        """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
-        return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
-
-    @property
-    def step_cost(self) -> float:
-        """Units of `work` of one step of integration."""
-        if self.forcing.growth != 0.0:
-            return SUNK_STEP
-        return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
-
-    def path(
-        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = (), *, most: int
-    ) -> tuple[Path, SpinState]:
-        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
-
-        Raises Infeasible where it takes more than ``most`` steps of integration.
-        """
-        work.spend(LEG)
-        if end == start or (self.free and not torques):
-            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
-            return arc, state if end == start else arc.end(end)
-        torque = np.asarray(sum(torques, self.constant))
-        pieces = rigid.integrate(
-            self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing, most=most
-        )
-        work.spend(PULSE + self.step_cost * len(pieces))
-        rates_, quaternion_ = pieces[-1].final
-        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
-
-    def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
-        """The state after an ``impulse`` (3,) N m s."""
-        body = state.rates + impulse / np.asarray(self.moments)
-        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
-
-
-def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
-    """What is flown: the true principal moments, and what acts besides the pulses."""
-    disturbances = spacecraft.disturbances
-    fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
-    transverse = sum(disturbance.transverse for disturbance in fixed)
-    return Dynamics(
-        moments=spacecraft.inertia.moments,
-        constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
-        forcing=Forcing(
-            turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
-            growth=spacecraft.growth,
-        ),
-    )
-
-
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """The impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
@@ -347,14 +280,18 @@ def _effective_impulse(spacecraft: Spacecraft, pulse: Pulse, spin: float) -> com
     return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
 
-def flown(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
+def flown(
+    spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0, *, dynamics: Dynamics | None = None
+) -> Flight:
     """Euler's equations through the real pulse widths, with the true principal moments.
 
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
-    series at rounding accuracy. The last leg reaches at least to ``until`` s. Raises Infeasible where that takes more
-    than `PLANNED_STEPS`, or `rigid.MOST_STEPS` where a later end is requested.
+    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics`` are those of the
+    spacecraft, where they are known. Raises Infeasible where that takes more than `PLANNED_STEPS`, or
+    `rigid.MOST_STEPS` where a later end is requested.
     """
-    dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
+    dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
+    allowed = _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end
     spans = tuple((pulse.start, pulse.end) for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T

@@ -8,7 +8,7 @@ import pytest
 from builders import cross, spinner
 from cases_dir import CASES
 
-from nutdamp import flight, planning, remarks, work
+from nutdamp import dynamics, flight, planning, remarks, work
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.schedule import Schedule
 
@@ -45,11 +45,11 @@ def test_flights_count_by_legs_and_steps() -> None:
     body = spinner(channels=cross(8.0))
     with work.budget("flight", 1e9) as short:
         flown = flight.flown(body, Schedule(), 10.0)
-    assert 0.0 < short.done == flight.LEG * len(flown.legs)
+    assert 0.0 < short.done == dynamics.LEG * len(flown.legs)
     tumbling = spinner(moments=(100.0, 120.0, 80.0))
     with work.budget("flight", 1e9) as long:
         flown = flight.flown(tumbling, Schedule(), 100.0)
-    assert long.done > flight.STEP * flown.steps > 10.0
+    assert long.done > dynamics.STEP * flown.steps > 10.0
 
 
 @pytest.mark.parametrize("most", [20.0, 500.0])

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import flight
 from nutdamp.dispersion.cases import DispersedCases, Model, Triple, rotated
 from nutdamp.dispersion.kernel import Ends, carried
+from nutdamp.dynamics import Dynamics, make_dynamics
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
 
@@ -28,8 +28,8 @@ class RealWidths:
     model: Model
 
     @cached_property
-    def _dynamics(self) -> flight.Dynamics:
-        return flight.make_dynamics(self.model.spacecraft)
+    def _dynamics(self) -> Dynamics:
+        return make_dynamics(self.model.spacecraft)
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""

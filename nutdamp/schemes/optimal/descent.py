@@ -16,7 +16,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import flight, work
+from nutdamp import work
+from nutdamp.dynamics import make_dynamics
 from nutdamp.physics import attitude, rigid_cases
 from nutdamp.schemes.optimal import residual_equations
 from nutdamp.schemes.optimal.residual_equations import Equations
@@ -92,7 +93,7 @@ class Task:
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
         self.pace = min(1.0 / abs(body.spin), body.inertial_period)
-        dynamics, start = flight.make_dynamics(body), body.initial
+        dynamics, start = make_dynamics(body), body.initial
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion

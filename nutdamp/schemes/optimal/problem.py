@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from nutdamp import flight, work
+from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
+from nutdamp.flight import Flight
 from nutdamp.limits import usable
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes.optimal import bounds, residual_equations
@@ -52,6 +54,11 @@ class Problem:
         else:
             self.costs = np.array([channel.strength for channel in self.channels])
             self.unit = "N m s"
+        self._dynamics = make_dynamics(spacecraft).remembering()
+
+    def flown(self, made: Schedule) -> Flight:
+        """The schedule through its real pulse widths; what was flown before is remembered."""
+        return flight.flown(self.spacecraft, made, dynamics=self._dynamics)
 
     def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
@@ -103,7 +110,7 @@ class Problem:
     def rigorous(self, made: Schedule) -> float | None:
         """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""
         body = self.spacecraft
-        left = self.leaves(flight.flown(body, made))
+        left = self.leaves(self.flown(made))
         return bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
 
     def prices(self) -> dict[str, float]:
@@ -118,12 +125,12 @@ class Problem:
         price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
         return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
 
-    def left(self, flown: flight.Flight) -> float:
+    def left(self, flown: Flight) -> float:
         """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
         nutation, off, spin = self.leaves(flown)
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
-    def leaves(self, flown: flight.Flight) -> Allowed:
+    def leaves(self, flown: Flight) -> Allowed:
         """What a flight leaves of what is requested."""
         residual, goal = flown.residual, self.spacecraft.goal
         off = residual.axis_error if self.equations.shift else 0.0

@@ -7,9 +7,11 @@ Room is shared between neighbours beforehand, so that no limit can be broken.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from nutdamp import flight
+from nutdamp.flight import Flight
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.optimal import residual_equations
 from nutdamp.schemes.optimal.pulse_parameters import PulseParameters
@@ -24,10 +26,18 @@ CONVERGED = 1e-13
 STEPS = 25
 
 
-def refine(spacecraft: Spacecraft, made: Schedule, equations: Equations, off: Vector, step: float) -> Schedule:
+def refine(
+    spacecraft: Spacecraft,
+    made: Schedule,
+    equations: Equations,
+    off: Vector,
+    step: float,
+    fly: Callable[[Schedule], Flight],
+) -> Schedule:
     """``made`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
 
-    ``off`` (2,) N m s is where H is to end beside its target. What it leaves is for the caller to judge.
+    ``fly`` flies schedules of the ``spacecraft``; ``off`` (2,) N m s is where H is to end beside its target. What it
+    leaves is for the caller to judge.
     """
     parameters = PulseParameters(spacecraft, made)
     size = float(np.linalg.norm(spacecraft.momentum))
@@ -35,11 +45,11 @@ def refine(spacecraft: Spacecraft, made: Schedule, equations: Equations, off: Ve
     if equations.shift:
         aside[2:4] = off
 
-    def left(schedule: Schedule) -> tuple[Vector, flight.Flight]:
-        flown = flight.flown(spacecraft, schedule)
+    def left(schedule: Schedule) -> tuple[Vector, Flight]:
+        flown = fly(schedule)
         return (residual_equations.misses(flown, equations) - aside) / size, flown
 
-    def slopes_of(schedule: Schedule, flown: flight.Flight) -> Vector:
+    def slopes_of(schedule: Schedule, flown: Flight) -> Vector:
         return parameters.slopes(schedule, flown, equations, step) / size
 
     x = parameters.start

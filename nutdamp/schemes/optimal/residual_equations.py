@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -153,15 +154,20 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
 def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
     """`_turned_back` where dissipation changes ω3: on coasts it is ω/ω3, or tan θ, that grows by e^{κt} exactly."""
     body = flight.spacecraft
-    edges = [leg.start for leg in flight.legs]
-    knots = np.unique(np.concatenate([edges, np.linspace(0.0, max(float(np.max(times)), edges[-1]), KNOTS)]))
-    spins = flight.motion(knots)[0][:, 2]
-    turned = np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))])
+    knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
     grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
     least = math.exp(-MOST_GROWN) * abs(body.spin)
     now, then = (np.maximum(np.abs(np.interp(at, knots, spins)), least) for at in (times, flight.schedule.end))
     phase = body.inertia.a * np.interp(times, knots, turned)
     return np.asarray(np.exp(1j * phase + grown) * then / now)
+
+
+@lru_cache(maxsize=2)
+def _spins(flight: Flight, last: float) -> tuple[Vector, Vector, Vector]:
+    """Moments up to ``last`` s, ω3 there in rad/s, and by how much it has turned the body since t = 0, (n,) each."""
+    knots = np.unique(np.concatenate([[leg.start for leg in flight.legs], np.linspace(0.0, last, KNOTS)]))
+    spins = flight.motion(knots)[0][:, 2]
+    return knots, spins, np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))])
 
 
 def _complex_product(factors: Vector) -> Vector:

@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp import flight, work
+from nutdamp import work
 from nutdamp.compliance import DAMPED_ANGLE
 from nutdamp.errors import Infeasible
+from nutdamp.flight import Flight
 from nutdamp.limits import keeps_limits
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
@@ -109,7 +110,7 @@ def _fewest(search: _Search) -> Schedule:
                 made = two_pulse.schedule(body, TwoPulseOptions())
         except Infeasible:
             made = Schedule()
-        if made.pulses and keeps_limits(body, made) and search.left(flight.flown(body, made)) <= LEFT:
+        if made.pulses and keeps_limits(body, made) and search.left(search.flown(made)) <= LEFT:
             return search.with_bounds(made)
     return search.schedule()
 
@@ -230,16 +231,16 @@ class _Search(Problem):
         if self.spacecraft.limits.tick is not None:
             every = [self.on_ticks(made) for made in every[:WAYS]]
         for made in every:
-            left = self.left(flight.flown(self.spacecraft, made))
+            left = self.left(self.flown(made))
             if keeps_limits(self.spacecraft, made.pulses):
                 found.append(_Found(0.0 if left <= LEFT else left, self.worth(made), made))
         return self.best(found)
 
     def on_ticks(self, made: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
-        missed = residual_equations.misses(flight.flown(self.spacecraft, made), self.equations)
+        missed = residual_equations.misses(self.flown(made), self.equations)
         off = missed[2:4] if self.options.shift is not None else np.zeros(2)
-        return refine(self.spacecraft, made, self.equations, off, self.program().width)
+        return refine(self.spacecraft, made, self.equations, off, self.program().width, self.flown)
 
     def worth(self, made: Schedule) -> float:
         """What is to be least: the cost, or the number of pulses."""
@@ -275,9 +276,9 @@ class _Search(Problem):
         """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
         names = {channel.name: channel for channel in self.channels}
         found: list[_Found] = []
-        flights: list[flight.Flight] = []
+        flights: list[Flight] = []
         for made in candidates.by_other_schemes(self.spacecraft, shift=self.equations.shift):
-            flights.append(flight.flown(self.spacecraft, Schedule(made.pulses)))
+            flights.append(self.flown(Schedule(made.pulses)))
             if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR)):
                 break
         for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
@@ -303,11 +304,11 @@ class _Search(Problem):
             except Unrepairable:
                 break
             made = as_pulses(self.spacecraft, solution.burns)
-            flown = flight.flown(self.spacecraft, made)
+            flown = self.flown(made)
             program.aim(residual_equations.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                made = refine(self.spacecraft, made, self.equations, solution.off, program.width)
-                left, price = self.left(flight.flown(self.spacecraft, made)), self.price(made)
+                made = refine(self.spacecraft, made, self.equations, solution.off, program.width, self.flown)
+                left, price = self.left(self.flown(made)), self.price(made)
                 found.append(_Found(0.0 if left <= LEFT else left, price, made))
                 if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
                     break

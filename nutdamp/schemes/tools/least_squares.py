@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from nutdamp import flight, work
+from nutdamp.dynamics import make_dynamics
 from nutdamp.limits import channel_of, commandable, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
@@ -127,11 +128,11 @@ def correct(
             (*kept, *(one.turn(part) for one, part in zip(pulses, parts, strict=True))), made.notes, made.bounds
         )
 
-    steps = 0
+    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
     def left(made: Schedule) -> Vector:
         nonlocal steps
-        flown = flight.flown(spacecraft, made)
+        flown = flight.flown(spacecraft, made, dynamics=dynamics)
         steps += flown.steps
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])

@@ -1,0 +1,105 @@
+"""How a body moves from one moment to the next: the arcs and Taylor pieces of which flights are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nutdamp import work
+from nutdamp.motion import Arc, Integrated, Path
+from nutdamp.physics import rigid
+from nutdamp.physics.rigid import Forcing
+from nutdamp.spacecraft import Spacecraft, SpinState, Vector
+
+LEG, PULSE = 0.03, 0.4
+"""Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
+
+SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
+"""Units of a step of a symmetric body, of any other, and of one with dissipation."""
+
+REMEMBERED = 1000
+"""Legs that are remembered, before all are forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """The body as one of the two models flies it, and what acts on it besides the pulses.
+
+    ``known``: the legs flown before, where they are remembered: see `remembering`.
+    """
+
+    moments: tuple[float, float, float]
+    constant: Vector
+    forcing: Forcing
+    known: dict[bytes, tuple[Path, SpinState]] | None = None
+
+    def remembering(self) -> Dynamics:
+        """The same, for the flights of trial schedules: each flies anew only from the first pulse that has changed."""
+        return replace(self, known={})
+
+    @property
+    def free(self) -> bool:
+        """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
+        return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
+
+    @property
+    def step_cost(self) -> float:
+        """Units of `work` of one step of integration."""
+        if self.forcing.growth != 0.0:
+            return SUNK_STEP
+        return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
+
+    def path(
+        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = (), *, most: int
+    ) -> tuple[Path, SpinState]:
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
+
+        Raises Infeasible where it takes more than ``most`` steps of integration.
+        """
+        if self.known is None:
+            return self._path(state, start, end, torques, most)
+        leg = np.concatenate([state.rates, state.quaternion, (start, end), *torques]).tobytes()
+        found = self.known.get(leg)
+        if found is None or found[0].steps > most:
+            if len(self.known) >= REMEMBERED:
+                self.known.clear()
+            found = self.known[leg] = self._path(state, start, end, torques, most)
+        return found
+
+    def _path(
+        self, state: SpinState, start: float, end: float, torques: Sequence[Vector], most: int
+    ) -> tuple[Path, SpinState]:
+        work.spend(LEG)
+        if end == start or (self.free and not torques):
+            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
+            return arc, state if end == start else arc.end(end)
+        torque = np.asarray(sum(torques, self.constant))
+        pieces = rigid.integrate(
+            self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing, most=most
+        )
+        work.spend(PULSE + self.step_cost * len(pieces))
+        rates_, quaternion_ = pieces[-1].final
+        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+
+    def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
+        """The state after an ``impulse`` (3,) N m s."""
+        body = state.rates + impulse / np.asarray(self.moments)
+        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+
+
+def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
+    """What is flown: the true principal moments, and what acts besides the pulses."""
+    disturbances = spacecraft.disturbances
+    fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
+    transverse = sum(disturbance.transverse for disturbance in fixed)
+    return Dynamics(
+        moments=spacecraft.inertia.moments,
+        constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
+        forcing=Forcing(
+            turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
+            growth=spacecraft.growth,
+        ),
+    )
