@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import cmath
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,13 +32,12 @@ class Windows:
         """``endless`` drops the horizon, to tell what a longer one would allow."""
         self.limits = spacecraft.limits
         self.horizon = math.inf if endless else spacecraft.horizon
-        self._dark: tuple[Vector, Vector] | None = None
 
     def blocked_until(self, start: float, on_time: float) -> float | None:
         """End of the first blackout window that the pulse would touch; None where it is free."""
         if not self.limits.blackout:
             return None
-        begins, over = self._merged()
+        begins, over = self.dark
         # The first window that is not over when the pulse starts is the only one that it can touch first.
         slack = touching(start + on_time)
         following = int(np.searchsorted(over, start + slack, side="right"))
@@ -59,22 +60,26 @@ class Windows:
             slack = np.maximum(TOUCHING, np.spacing(ends))  # `touching`
         free = (starts >= np.maximum(ready, 0.0) - slack) & (ends <= self.horizon + slack)
         if self.limits.blackout:
-            begins, over = self._merged()
-            following = np.searchsorted(over, starts + slack, side="right")  # as in `blocked_until`
-            free &= ends <= np.append(begins, np.inf)[following] + slack
+            free &= ~self.blocked(starts, ends, slack)
         return np.asarray(free)
 
-    def _merged(self) -> tuple[Vector, Vector]:
-        """Begins and ends of the blackout windows in order, those that overlap as one."""
-        if self._dark is None:
-            merged: list[list[float]] = []
-            for begins, ends in sorted(self.limits.blackout):
-                if merged and begins < merged[-1][1]:
-                    merged[-1][1] = max(merged[-1][1], ends)
-                else:
-                    merged.append([begins, ends])
-            self._dark = np.array([one for one, _ in merged]), np.array([other for _, other in merged])
-        return self._dark
+    @cached_property
+    def dark(self) -> tuple[Vector, Vector]:
+        """Begins and ends of the blackout windows, s, in order, those that overlap as one."""
+        merged: list[list[float]] = []
+        for begins, ends in sorted(self.limits.blackout):
+            if merged and begins < merged[-1][1]:
+                merged[-1][1] = max(merged[-1][1], ends)
+            else:
+                merged.append([begins, ends])
+        return np.array([one for one, _ in merged]), np.array([other for _, other in merged])
+
+    def blocked(self, starts: Vector, ends: Vector, slack: Vector | float = 0.0) -> NDArray[np.bool_]:
+        """Whether what lasts from ``starts`` to ``ends`` (n,) s is in a blackout window for more than ``slack`` s."""
+        begins, over = self.dark
+        # The first window that is not over at the start is the only one that can be met first.
+        following = np.searchsorted(over, starts + slack, side="right")
+        return np.asarray(ends > np.append(begins, np.inf)[following] + slack)
 
     def earliest_start(self, on_time: float, ready: float) -> float | None:
         """First allowed start, s, on a tick; None where the horizon comes first."""
@@ -137,10 +142,10 @@ def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[t
 def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:
     """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two is halved."""
     limits, ready, bounds = spacecraft.limits, spacecraft.limits.earliest, []
+    begins, over = (part.tolist() for part in Windows(spacecraft).dark)
     for pulse in pulses:
-        latest = min([spacecraft.horizon, *(begin for begin, _ in limits.blackout if begin >= pulse.end - TOUCHING)])
-        begun = max([ready, *(end for _, end in limits.blackout if end <= pulse.start + TOUCHING)])
-        bounds.append([begun, latest])
+        before, after = bisect_right(over, pulse.start + TOUCHING), bisect_left(begins, pulse.end - TOUCHING)
+        bounds.append([max([ready, *over[:before][-1:]]), min([spacecraft.horizon, *begins[after:][:1]])])
         ready = pulse.end + limits.gap
     for index in range(len(bounds) - 1):
         off, on = pulses[index].end, pulses[index + 1].start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 
 import numpy as np
@@ -157,3 +158,31 @@ def test_two_pulses_share_the_time_between_them_but_for_the_gap() -> None:
     assert rooms(body, pulses) == [(3.0, pytest.approx(15.0)), (pytest.approx(16.0), 30.0)]
     alone = spinner(limits=Limits(horizon=100.0, earliest=0.5))
     assert rooms(alone, pulses[:1]) == [(0.5, 100.0)]
+
+
+def test_the_room_of_a_pulse_is_found_among_many_windows_as_by_looking_at_each() -> None:
+    rng = np.random.default_rng(5)
+    begins = np.sort(rng.uniform(0.0, 100.0, 60))
+    dark = tuple((float(one), float(one + width)) for one, width in zip(begins, rng.uniform(0.0, 1.5, 60), strict=True))
+    body = spinner(limits=Limits(horizon=95.0, earliest=1.0, blackout=tuple(rng.permutation(dark).tolist())))
+    thruster, windows, found = channel("T", 8.0, 0.0, 0.0), Windows(body), 0
+    for t in rng.uniform(2.0, 94.0, 200):
+        pulse = channel_pulse(thruster, float(t), 0.05)
+        if windows.allows(pulse.start, pulse.on_time, 1.0):
+            found += 1
+            begin = max([1.0, *(end for _, end in dark if end <= pulse.start)])
+            end = min([95.0, *(one for one, _ in dark if one >= pulse.end)])
+            assert rooms(body, (pulse,)) == [(begin, end)]
+    assert found > 30
+
+
+def test_slots_are_blocked_as_by_looking_at_each_window() -> None:
+    rng = np.random.default_rng(6)
+    begins = rng.uniform(0.0, 100.0, 40)
+    dark = tuple((float(one), float(one + width)) for one, width in zip(begins, rng.uniform(0.0, 1.0, 40), strict=True))
+    body = spinner(limits=Limits(horizon=110.0, blackout=dark))
+    edges = np.linspace(0.0, 110.0, 400)
+    each = [any(low < end and high > begin for begin, end in dark) for low, high in itertools.pairwise(edges)]
+    assert Windows(body).blocked(edges[:-1], edges[1:]).tolist() == each
+    assert 50 < sum(each) < 350
+    assert not Windows(spinner()).blocked(edges[:-1], edges[1:]).any()

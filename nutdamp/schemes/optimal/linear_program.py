@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import work
+from nutdamp.limits import Windows
 from nutdamp.schemes.optimal import lp_solver
 from nutdamp.schemes.optimal.columns import Columns, alone
 from nutdamp.schemes.optimal.reach import supplies
@@ -124,10 +125,7 @@ class Program:
         edges = np.linspace(limits.earliest, self.end, count + 1)
         self.width = float(edges[1] - edges[0])
         self.centres = 0.5 * (edges[1:] + edges[:-1])
-        blocked = np.zeros(count, dtype=bool)
-        for begins, ends in limits.blackout:
-            blocked |= (edges[:-1] < ends) & (edges[1:] > begins)
-        self.forbidden = np.tile(blocked, (len(self.channels), 1))
+        self.forbidden = np.tile(Windows(body).blocked(edges[:-1], edges[1:]), (len(self.channels), 1))
         self._pool: Columns | None = None
         self._torques = np.array([channel.torque for channel in self.channels])
         self.aim(self.influence)
