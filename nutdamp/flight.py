@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +21,7 @@ from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import PIECE, Track, even_times, in_file_axes, make_track, widest
-from nutdamp.views import Tabled, figure, write_csv
+from nutdamp.views import Tabled, figure
 
 if TYPE_CHECKING:
     from nutdamp.views import Figure
@@ -164,10 +163,6 @@ class Flight(Tabled):
         Raises BadRequest for other names, MissingExtra without matplotlib.
         """
         return figure(self, name)
-
-    def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the rows as ``simulate --csv`` does; raises CannotWrite."""
-        write_csv(self, path)
 
     def sampled(self, samples: int, until: float) -> Track:
         """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from os import PathLike
 from typing import Any
 
 from nutdamp import arguments, compliance, flight, schemes, views, work
@@ -87,10 +86,6 @@ class Plan(views.Tabled):
 
     def __len__(self) -> int:
         return len(self.pulses)
-
-    def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the pulses as ``plan --csv`` does; raises CannotWrite, and Infeasible where there is no schedule."""
-        views.write_csv(self, path)
 
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` says of it."""
@@ -285,7 +280,7 @@ def unrounded(plan_: Plan) -> Schedule | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(views.Shown):
+class Comparison(views.Tabled):
     """Several plans for one spacecraft, and which of them is recommended on what ground.
 
     ``comparison["two-pulse"]`` is one of them, iterating gives all.

@@ -16,6 +16,7 @@ import numpy as np
 
 from nutdamp import planning
 from nutdamp.compliance import Part, aim, missed
+from nutdamp.decision import Cases, Decision, cases_of
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
 from nutdamp.dispersion.binomial import binomial_interval
@@ -38,16 +39,27 @@ AS_GOOD = 1.05
 class Candidate:
     """A plan and how it fares in dispersed cases.
 
-    ``variant`` says how it differs from what its scheme plans; ``nutation`` and ``off`` rad (how far H ends from
-    where it shall) are not exceeded in the share of cases required; ``met`` is the share that complies, None where
-    nothing is required.
+    ``variant`` says how it differs from what its scheme plans.
     """
 
     plan: Plan
     variant: str
-    nutation: float
-    off: float
-    met: float | None
+    cases: Cases
+
+    @property
+    def nutation(self) -> float:
+        """Nutation, rad, not exceeded in the share of cases required."""
+        return self.cases.levels[Part.NUTATION]
+
+    @property
+    def off(self) -> float:
+        """How far H ends from where it shall, rad, not exceeded in the share of cases required."""
+        return self.cases.levels[aim(self.plan.spacecraft)]
+
+    @property
+    def met(self) -> float | None:
+        """The share that complies; None where nothing is required."""
+        return self.cases.complying
 
     @property
     def left(self) -> float:
@@ -111,10 +123,18 @@ class RobustComparison:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether enough cases comply with the robust plan; None where nothing is required."""
-        if self.chosen is None or self.chosen.met is None:
+        """Whether the robust plan meets it, in enough cases and with nominal values; None where nothing is required."""
+        return None if self.decision is None else self.decision.met
+
+    @property
+    def decision(self) -> Decision | None:
+        """The decision on the robust plan; the shares are those of the plans compared, not of their variants."""
+        if self.chosen is None:
             return None
-        return self.chosen.met >= self.probability
+        flown = {_kind(one.plan): one.met for one in self.candidates}
+        shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
+        known = {scheme: share for scheme, share in shares.items() if share is not None}
+        return Decision(self.chosen.plan, self.chosen.cases, known)
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
@@ -161,7 +181,7 @@ def compare(
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                found[kind] = _dispersed(own, variant, probability, samples, impulses=impulses, force=force)
+                found[kind] = _dispersed(own, variant, samples, impulses=impulses, force=force)
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
     equals = _equals(list(found.values()), samples)
     chosen, ground = None, None
@@ -213,18 +233,12 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, planning.attempt(body, scheme, options))]
 
 
-def _dispersed(plan: Plan, variant: str, probability: float, samples: int, *, impulses: bool, force: bool) -> Candidate:
+def _dispersed(plan: Plan, variant: str, samples: int, *, impulses: bool, force: bool) -> Candidate:
     """How a plan fares in dispersed cases."""
     study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
     if impulses and not force:
         check_impulses(study)
-    results = run(Results(study, samples), threads=threads_here())
-    ends = []
-    for output in (Part.NUTATION.value, aim(plan.spacecraft).value):
-        distribution = results.distribution(output)
-        assert distribution is not None
-        ends.append(float(distribution.quantiles(np.array([probability]))[0]))
-    return Candidate(plan, variant, ends[0], ends[1], results.met_fraction)
+    return Candidate(plan, variant, cases_of(run(Results(study, samples), threads=threads_here())))
 
 
 def _equals(candidates: Sequence[Candidate], samples: int) -> list[Candidate]:

@@ -93,6 +93,13 @@ class Shown:
 class Tabled(Shown):
     """A result that has rows."""
 
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
+
+        Raises CannotWrite, and Infeasible for a plan without a schedule.
+        """
+        write_csv(self, path)
+
     def to_numpy(self) -> Table:
         """The rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
         return table(self)

@@ -77,7 +77,7 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
     )
     assert "ndarray" in done.stdout
     assert "numpy.float64" in done.stdout or "floating" in done.stdout
-    assert 'typed.py:4: error: Argument 1 to "to_csv" of "Flight" has incompatible type "int"' in done.stdout
+    assert 'typed.py:4: error: Argument 1 to "to_csv" of "Tabled" has incompatible type "int"' in done.stdout
     assert "Found 1 error" in done.stdout
 
 

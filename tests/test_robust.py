@@ -12,6 +12,8 @@ from builders import cross, judged, spinner
 from checker import violations
 
 from nutdamp import planning, robust
+from nutdamp.compliance import Part
+from nutdamp.decision import Cases
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.single import flown_outputs
 from nutdamp.dispersion.study import Results, run
@@ -205,7 +207,8 @@ def of_given(
 
     def fares(plan: planning.Plan, variant: str, *_: object, **__: object) -> robust.Candidate:
         left, met = given[plan.pulses.total_impulse]
-        return robust.Candidate(plan, variant, left, 0.0, met)
+        levels = {Part.NUTATION: left, Part.SHIFT: 0.0}
+        return robust.Candidate(plan, variant, Cases(1_000, 1, met, 0.997, levels))
 
     monkeypatch.setattr(robust, "_dispersed", fares)
     trials: list[robust.Attempt] = [partial(list, [("as planned", replace(plan, spacecraft=body))]) for plan in plans]

@@ -107,7 +107,7 @@ def plot_options(command: Command) -> Command:
     """``--plot FILE`` and which picture it is to be."""
     for option in (
         click.option("--figure", type=Named(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."),
-        click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs the extra plot)."),
+        click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot)."),
     ):
         command = option(command)
     return command

@@ -33,6 +33,7 @@ from nutdamp.schemes import PLANNED, Options
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from nutdamp.decision import Decision
     from nutdamp.planning import Comparison, Plan
     from nutdamp.robust import RobustComparison
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 @click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")
 @impulse_options
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
+@click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
 @plot_options
 @quiet_option
@@ -57,6 +59,7 @@ def command(
     impulses: bool,
     force: bool,
     csv: str | None,
+    table: str | None,
     json: str | None,
     plot: str | None,
     figure: str,
@@ -72,16 +75,17 @@ def command(
     for option, path in (("--csv", csv), ("--plot", plot)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
-    silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, csv=csv, table=table, json=json, plot=plot)
     expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
-    expect_places(csv, json, plot)
+    expect_places(csv, table, json, plot)
 
     if robust:
         require_dispersions(body)
 
     from nutdamp.cli.progress import working
+    from nutdamp.decision import decide
     from nutdamp.planning import compare, usual
 
     names = names or usual(body)
@@ -89,28 +93,24 @@ def command(
     with working("planning", quiet=quiet):
         compared = compare(body, names, options)
     dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
-    if dispersed is None:
-        chosen = compared.recommended
-        met = None if chosen is None else chosen.meets_requirement
-    else:
-        chosen = None if dispersed.chosen is None else dispersed.chosen.plan
-        met = dispersed.meets_requirement
+    decided = decide(compared) if dispersed is None else dispersed.decision
+    chosen = None if decided is None else decided.plan
     for path in (csv, plot):
         if path is not None and chosen is None:
             say(f"{path} was not written: no plan is feasible")
 
     def data() -> dict[str, Any]:
-        from nutdamp.files.plan_json import comparison_json
-        from nutdamp.presentation import verdicts
+        from nutdamp.library.views import comparison_data
 
-        made = comparison_json(compared, verdicts.spoken(compared))
+        made = comparison_data(compared, decided)
         if dispersed is None:
             return made
         from nutdamp.files.robust_json import robust_json
+        from nutdamp.presentation import verdicts
 
         return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
 
-    outputs: list[Output] = [(json, data)]
+    outputs: list[Output] = [(json, data), (table, partial(_schemes, compared, decided))]
     if chosen is not None:
         outputs += [(csv, partial(_pulses, chosen)), (plot, partial(_picture, chosen, figure, plot))]
     if silent:
@@ -123,7 +123,7 @@ def command(
         sys.exit(INTERNAL)
     if chosen is None:
         sys.exit(INFEASIBLE)
-    if met is False:
+    if decided is not None and decided.met is False:
         sys.exit(REQUIREMENT_MISSED)
 
 
@@ -141,6 +141,12 @@ def _pulses(chosen: Plan) -> str:
     from nutdamp.files.pulses_csv import pulses_csv
 
     return pulses_csv(chosen.flight)
+
+
+def _schemes(compared: Comparison, decided: Decision | None) -> str:
+    from nutdamp.files.schemes_csv import schemes_csv
+
+    return schemes_csv(compared, decided)
 
 
 def _picture(chosen: Plan, figure: str, path: str | None) -> bytes:

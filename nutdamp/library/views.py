@@ -6,10 +6,11 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import arguments, views
+from nutdamp.decision import Decision, decide
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.flight import Flight
 from nutdamp.planning import Comparison, Plan
-from nutdamp.presentation import verdicts
+from nutdamp.presentation import decisions, verdicts
 from nutdamp.presentation.text import degrees
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.spacecraft import Spacecraft
@@ -44,9 +45,17 @@ def _(plan: Plan) -> dict[str, Any]:
 @views.data.register
 def _(compared: Comparison) -> dict[str, Any]:
     from nutdamp.files.output import finite
+
+    return finite(comparison_data(compared, decide(compared)))
+
+
+def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+    """What ``plan --json`` gives: the plans, the decision on one of them, and the words of both."""
+    from nutdamp.files.decision_json import decision_json
     from nutdamp.files.plan_json import comparison_json
 
-    return finite(comparison_json(compared, verdicts.spoken(compared)))
+    made = comparison_json(compared, verdicts.spoken(compared))
+    return {**made, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 
 @views.table.register
@@ -54,6 +63,13 @@ def _(plan: Plan) -> views.Table:
     from nutdamp.files.pulses_csv import pulses_array
 
     return pulses_array(plan.flight)
+
+
+@views.table.register
+def _(compared: Comparison) -> views.Table:
+    from nutdamp.files.schemes_csv import schemes_array
+
+    return schemes_array(compared, decide(compared))
 
 
 @views.table.register
@@ -69,6 +85,14 @@ def _(plan: Plan, path: str | PathLike[str]) -> None:
     from nutdamp.files.pulses_csv import pulses_csv
 
     write_whole(arguments.path("path", path), pulses_csv(feasible(plan).flight))
+
+
+@views.write_csv.register
+def _(compared: Comparison, path: str | PathLike[str]) -> None:
+    from nutdamp.files.output import write_whole
+    from nutdamp.files.schemes_csv import schemes_csv
+
+    write_whole(arguments.path("path", path), schemes_csv(compared, decide(compared)))
 
 
 @views.write_csv.register

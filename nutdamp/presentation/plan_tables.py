@@ -12,10 +12,12 @@ from rich.text import Text
 
 from nutdamp import compliance
 from nutdamp.compliance import Bound, Part
+from nutdamp.decision import decide
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, end_table, spin_text
+from nutdamp.presentation.decisions import decision_screen
+from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, spin_text
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, steering
 from nutdamp.remarks import said
@@ -24,23 +26,17 @@ from nutdamp.spacecraft import Spacecraft
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:
-    """Everything that ``plan`` shows."""
-    parts: list[RenderableType] = [header(compared.spacecraft), Text()]
+    """Everything that ``plan`` shows, the decision on top."""
+    decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
+    found: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
+    found += _reasons(compared)
     needless = verdicts.needless(compared)
-    if needless is not None:
-        parts += [Text.assemble(("No pulse needed: ", "bold"), f"{needless}."), Text()]
-    parts.append(_comparison(compared))
-    parts.extend(_reasons(compared))
-    chosen, reason = compared.recommended, verdicts.reason(compared)
-    if chosen is None:
-        parts += [Text(), Text(f"No recommendation: {reason}.", style="bold")]
-        return Group(*parts)
-    parts += [Text(), Text.assemble("Recommended: ", (chosen.scheme, "bold"), f" – {reason}.")]
-    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in verdicts.warnings(compared)]
-    parts += [Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)]
-    if len(chosen.pulses):
-        parts += [Text(), pulse_table(chosen), Text(), end_table(chosen.flight)]
-    return Group(*parts)
+    parts = [name] if needless is None else [name, Text.assemble(("No pulse needed: ", "bold"), f"{needless}.")]
+    if decided is None:
+        parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
+        return Group(*parts, *found)
+    found += [Text(), pulse_table(decided.plan)] if len(decided.plan.pulses) else []
+    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *found)
 
 
 def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:

@@ -8,9 +8,9 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.decisions import figures, requirement
 from nutdamp.presentation.layout import columns
-from nutdamp.presentation.plan_tables import header, pulse_table
+from nutdamp.presentation.plan_tables import derived_table, pulse_table
 from nutdamp.presentation.text import MISSING, degrees
 from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison
@@ -21,23 +21,26 @@ MOST_ROWS = 12
 
 def robust_screen(found: RobustComparison) -> RenderableType:
     """Everything that ``plan --robust`` shows."""
-    parts: list[RenderableType] = [header(found.comparison.spacecraft), Text()]
+    body, decided, reason = found.comparison.spacecraft, found.decision, verdicts.robust_reason(found)
     infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
-    chosen, reason = found.chosen, verdicts.robust_reason(found)
-    if chosen is None:
-        return Group(*parts, *reasons, Text(f"No recommendation: {reason}.", style="bold"))
+    if decided is None or found.chosen is None:
+        none = Text(f"No recommendation: {reason}.", style="bold")
+        return Group(Text(body.name, style="bold"), none, *reasons, Text(), derived_table(body))
     how = "flown through real widths" if found.flown else "by the impulse sum (17)"
-    parts.append(Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"))
-    parts += [Text(), _candidates(found), *reasons, Text()]
-    parts.append(Text.assemble("Robust plan: ", (f"{chosen.plan.scheme}, {chosen.variant}", "bold"), f" – {reason}."))
-    if chosen.met is not None:
-        requested = verdicts.required(found.comparison.spacecraft)
-        verdict = verdicts.cases_verdict(chosen.met, found.probability)
-        parts.append(Text.assemble(("Requirement ", "bold"), f"({requested}) {verdict}."))
-    parts.append(Text(verdicts.robust_cost(found)))
-    if len(chosen.plan.pulses):
-        parts += [Text(), pulse_table(chosen.plan), Text(), end_table(chosen.plan.flight)]
+    named = f"{decided.plan.scheme}, {found.chosen.variant}"
+    parts: list[RenderableType] = [
+        Text(body.name, style="bold"),
+        Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
+        *requirement(decided),
+        Text(verdicts.robust_cost(found)),
+        *figures(decided),
+        *(Text(), derived_table(body), Text()),
+        Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"),
+        *(Text(), _candidates(found), *reasons),
+    ]
+    if len(decided.plan.pulses):
+        parts += [Text(), pulse_table(decided.plan)]
     return Group(*parts)
 
 
@@ -47,11 +50,11 @@ def _why(plan: Plan) -> str:
 
 def _candidates(found: RobustComparison) -> RenderableType:
     level = verdicts.exact_percent(found.probability)
-    requirement = bool(compliance.required(found.comparison.spacecraft))
+    counted = bool(compliance.required(found.comparison.spacecraft))
     propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
     cost = "propellant\ng" if propellant else "impulse\nN m s"
     heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg")
-    table = columns(*heads, *["cases that\ncomply"] * requirement, text=("variant\n",))
+    table = columns(*heads, *["cases that\ncomply"] * counted, text=("variant\n",))
     named = list(found.candidates[:MOST_ROWS])
     named += [one for one in (found.chosen, found.usual) if one is not None and one not in named]
     for one in named:
@@ -63,7 +66,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
             *(degrees(angle).removesuffix(" deg") for angle in (one.nominal, one.left)),
-            *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * requirement,
+            *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * counted,
         )
     what = verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)

@@ -24,7 +24,7 @@ from nutdamp.words import listed
 if TYPE_CHECKING:  # few runs look for a robust plan
     from nutdamp.robust import RobustComparison
 
-VERDICT = {True: "met", False: "not met", None: MISSING}
+VERDICT = {True: "met", False: "NOT met", None: MISSING}
 """What `Plan.meets_requirement` says of the requirement."""
 
 
@@ -315,8 +315,8 @@ def required(spacecraft: Spacecraft) -> str:
 
 def cases_verdict(share: float, probability: float) -> str:
     """Whether enough cases comply: "met: 99.9 % of cases comply (99.7 % required)"."""
-    verdict = "met" if share >= probability else "NOT met"
-    return f"{verdict}: {percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
+    shown, least = percent(share, probability), exact_percent(probability)
+    return f"{VERDICT[share >= probability]}: {shown} of cases comply ({least} required)"
 
 
 def percent(share: float, *others: float) -> str:

@@ -62,7 +62,7 @@ def test_the_requirement_with_its_probability(run: Run, sat: Path, degrees: floa
     sat.write_text(BODY + UNTRUSTED + requirement, encoding="utf-8")
     done = run("plan", "sat.yaml", "--scheme", "four-pulse", "--robust")
     assert done.returncode == status, done.stdout
-    verdict = r"\) met: 100.0 % of cases" if status == 0 else r"\) NOT met: [\d.]+ % of cases"
+    verdict = "Requirement: " + ("met: 100.0 % of cases" if status == 0 else r"NOT met: [\d.]+ % of cases")
     assert re.search(verdict + r" comply \(95 % required\)", " ".join(done.stdout.split()))
 
 

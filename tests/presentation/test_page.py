@@ -151,7 +151,7 @@ def test_the_comparison_says_what_the_json_says(example: str) -> None:
         }.items():
             shown = float(row[heads.index(head)].attributes["data-value"])
             assert shown == pytest.approx(expected, rel=1e-3, abs=1e-9)
-        verdict = {True: "met", False: "not met"}[plan["meets_requirement"]]
+        verdict = {True: "met", False: "NOT met"}[plan["meets_requirement"]]
         assert row[heads.index("requirement")].text == verdict
     marks = [row.attributes.get("class") for row in parsed(example).all("tr")]
     assert marks.count("mark") == 1

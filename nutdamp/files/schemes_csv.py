@@ -1,0 +1,73 @@
+"""The comparison of schemes as CSV: one row a scheme, what it costs, leaves, and how the spacecraft ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.decision import Decision
+from nutdamp.files.output import csv_text, number
+from nutdamp.files.plan_json import plan_json
+from nutdamp.planning import Comparison, Plan
+
+WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
+"""Columns of text."""
+
+RESIDUAL = ("nutation_deg", "body_cone_deg", "space_cone_deg", "momentum_shift_deg", "axis_error_deg")
+
+
+def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.void]:
+    """One row a scheme; what is left is that of the flight through real widths. What is not known is NaN or empty.
+
+    ``decided``: which scheme is recommended, and in ``met_fraction`` the share of dispersed cases that comply.
+    """
+    scheme, shares = (None, {}) if decided is None else (decided.plan.scheme, decided.shares)
+    rows = [_row(plan, plan.scheme == scheme, shares.get(plan.scheme)) for plan in compared.plans]
+    names = list(rows[0]) if rows else list(WORDS)
+    longest = {name: max(1, *(len(row[name]) for row in rows)) if rows else 1 for name in WORDS}
+    kinds = [(name, f"U{longest[name]}" if name in WORDS else "i8" if name == "pulses" else "f8") for name in names]
+    values = [tuple(math.nan if row[name] is None else row[name] for name in names) for row in rows]
+    return np.array(values, dtype=kinds)
+
+
+def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
+    data, nothing = plan_json(plan), dict.fromkeys(RESIDUAL)
+    final, left, speed = data["final"], data["flown"] if plan.feasible else nothing, plan.delta_v
+    around, off = ("tilt_deg", "azimuth_deg") if plan.spacecraft.attitude is None else _CELESTIAL
+    angles = {
+        f"{what}_{name}": None if final is None else final[what][name]
+        for what in ("axis", "momentum")
+        for name in (around, off)
+    }
+    return {
+        "scheme": plan.scheme,
+        "feasible": _word(plan.feasible),
+        "recommended": _word(recommended),
+        "meets_requirement": _word(plan.meets_requirement),
+        "met_fraction": share,
+        "pulses": len(plan.pulses),
+        **{key: data[key] for key in ("end_s", "total_impulse_Nms", "least_impulse_Nms", "propellant_kg")},
+        **{key: left[key] for key in RESIDUAL},
+        **angles,
+        "spin_rad_s": None if final is None else final["spin_rad_s"],
+        "spin_change_rad_s": data["spin_change_rad_s"],
+        "delta_v_m_s": None if speed is None else math.hypot(*speed),
+        "why": data["why"] or "",
+    }
+
+
+_CELESTIAL = ("right_ascension_deg", "declination_deg")
+
+
+def _word(truth: bool | None) -> str:
+    return {True: "true", False: "false", None: ""}[truth]
+
+
+def schemes_csv(compared: Comparison, decided: Decision | None) -> str:
+    """The rows of `schemes_array` as CSV; what is not known is empty."""
+    table = schemes_array(compared, decided)
+    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
+    return csv_text(table.dtype.names or WORDS, texts)

@@ -1,0 +1,136 @@
+"""The words of a decision: one place for what screens, pages and files say is met, by what margin, and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.compliance import Bound, Part
+from nutdamp.decision import Decision, Line
+from nutdamp.planning import Comparison
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.layout import columns
+from nutdamp.presentation.text import MISSING, degrees, mass, moment, most, quantity
+from nutdamp.recommendation import Standing
+from nutdamp.words import listed
+
+COUNT = "cases that comply"
+"""What the row of the decision and the column of the comparison are called that count dispersed cases."""
+
+
+def verdict(decision: Decision) -> str:
+    """Whether the requirement is met, in words that leave no doubt for what."""
+    plan, cases = decision.plan, decision.cases
+    nominal = plan.meets_requirement
+    if nominal is None:
+        done = plan.standing is Standing.COMPLIES
+        what = "damps the nutation" if plan.spacecraft.goal.axis is None else "reaches the target"
+        return f"nothing is required; with nominal values the plan {what if done else 'does NOT ' + _bare(what)}"
+    if cases is not None and cases.complying is not None:
+        counted = verdicts.cases_verdict(cases.complying, cases.probability)
+        return counted if nominal else f"NOT met with nominal values; {counted}"
+    said = f"{'met' if nominal else 'NOT met'} with nominal values"
+    return f"{said}; dispersed cases were not flown" if decision.undispersed else said
+
+
+def _bare(verb: str) -> str:
+    """The infinitive of "damps the nutation" or "reaches the target"."""
+    first, _, rest = verb.partition(" ")
+    return f"{first.removesuffix('es' if first == 'reaches' else 's')} {rest}"
+
+
+def better(decision: Decision) -> str:
+    """Which other schemes comply in more cases; empty where none does."""
+    if not decision.better or decision.cases is None:
+        return ""
+    own, probability = decision.cases.complying or 0.0, decision.cases.probability
+    shares = listed([f"{name} ({verdicts.percent(share, probability)})" for name, share in decision.better])
+    return f"more cases comply with {shares} than with {decision.plan.scheme} ({verdicts.percent(own, probability)})."
+
+
+def decision_table(decision: Decision) -> Table:
+    """One row a part of the requirement, and one for the share of cases that comply."""
+    cases = decision.cases
+    heads = ["requirement", "limit", "nominal"]
+    if cases is not None:
+        heads.append(f"{verdicts.exact_percent(cases.probability)} of cases")
+    table = columns(*heads, "margin", "verdict", text=("verdict",))
+    for line in decision.lines:
+        dispersed = [] if cases is None else [_size(line.bound, line.dispersed)]
+        cells = (_limit(line.bound), _size(line.bound, line.nominal), *dispersed, _size(line.bound, line.margin))
+        table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
+    if cases is not None and cases.complying is not None:
+        least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
+        margin = f"{100.0 * (cases.complying - cases.probability):.3g} %"
+        said = coloured(verdicts.VERDICT[cases.met], cases.met)
+        table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
+    return table
+
+
+def coloured(text: str, met: bool | None) -> Text:
+    """A verdict in the colour of it."""
+    return Text(text, "" if met is None else "green" if met else "bold red")
+
+
+def _limit(bound: Bound) -> str:
+    limit = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else most(bound.most)
+    return f"≤ {limit}"
+
+
+def _size(bound: Bound, value: float | None) -> str:
+    return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
+
+
+def _met(line: Line) -> str:
+    """What is said of a part: met or not; for one that is not required, whether that counts as damped or reached."""
+    if line.bound.required:
+        return verdicts.VERDICT[line.met]
+    done = "reached" if line.bound.part is Part.DISTANCE else "damped"
+    return MISSING if line.met is None else f"{done} (not required)" if line.met else f"NOT {done} (not required)"
+
+
+def cost(decision: Decision) -> Iterator[tuple[str, str]]:
+    """What the plan takes, and when it ends: names and values."""
+    pulses = decision.plan.pulses
+    count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
+    if pulses.propellant is None:
+        yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')} in {count}"
+    else:
+        yield "propellant", f"{mass(pulses.propellant)} in {count}"
+    yield "end", f"{moment(pulses.end)}, of the last pulse" if len(pulses) else "no pulse is needed"
+
+
+def end_facts(decision: Decision) -> Table:
+    """Where the spin axis and H end, the spin, what it costs and when it ends."""
+    table = end_table(decision.plan.flight)
+    for name, value in cost(decision):
+        table.add_row(name, value)
+    return table
+
+
+def decision_screen(compared: Comparison, decision: Decision, reason: str) -> list[RenderableType]:
+    """The decision as the top of a screen: which plan and why, the verdict, its margins, and how it ends."""
+    plan = decision.plan
+    return [
+        Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
+        *requirement(decision),
+        *[Text.assemble(("Warning: ", "bold red"), warning) for warning in verdicts.warnings(compared)],
+        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
+        *figures(decision),
+    ]
+
+
+def requirement(decision: Decision) -> Iterator[Text]:
+    """The verdict as a line of a screen, and which schemes comply more often."""
+    yield Text.assemble("Requirement: ", coloured(verdict(decision), decision.met), ".")
+    if better(decision):
+        yield Text.assemble(("Note: ", "bold"), better(decision))
+
+
+def figures(decision: Decision) -> list[RenderableType]:
+    """The numbers of a decision on a screen: margins, then how it ends."""
+    return [Text(), decision_table(decision), Text(), end_facts(decision)]

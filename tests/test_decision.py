@@ -1,0 +1,174 @@
+"""The decision: margins and verdicts follow from the numbers of plan and cases, and read the same everywhere."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from process import Run
+
+import nutdamp
+from nutdamp.compliance import Part
+from nutdamp.decision import Cases, Decision, cases_of, decide
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.study import Results
+from nutdamp.dispersion.study import run as fly
+from nutdamp.planning import Comparison, compare
+from nutdamp.presentation import decisions
+from nutdamp.schemes import CLASSIC
+from nutdamp.spacecraft import Goal, Requirement
+
+
+@cache
+def example() -> Comparison:
+    return compare(nutdamp.example(), CLASSIC)
+
+
+def counted(share: float, nutation: float, shift: float) -> Cases:
+    """Cases of which ``share`` comply, with what 99.7 % do not exceed, in degrees."""
+    levels = {Part.NUTATION: math.radians(nutation), Part.SHIFT: math.radians(shift)}
+    return Cases(1000, 7, share, 0.997, levels)
+
+
+def test_a_margin_is_what_may_be_left_minus_what_is() -> None:
+    plan = example()["four-pulse"]
+    assert plan.flown is not None
+    nominal = {line.bound.part: line for line in Decision(plan).lines}
+    assert nominal[Part.SHIFT].margin == math.radians(0.2) - plan.flown.momentum_shift
+    assert nominal[Part.SHIFT].dispersed is None
+    dispersed = {line.bound.part: line for line in Decision(plan, counted(0.7, 0.9, 0.15)).lines}
+    assert math.degrees(dispersed[Part.NUTATION].margin) == pytest.approx(0.5 - 0.9)
+    assert math.degrees(dispersed[Part.SHIFT].margin) == pytest.approx(0.2 - 0.15)
+    assert (dispersed[Part.NUTATION].met, dispersed[Part.SHIFT].met) == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("share", "nutation", "met", "said"),
+    [
+        (0.998, 0.4, True, "met: 99.8 % of cases comply (99.7 % required)"),
+        (0.996, 0.6, False, "NOT met: 99.6 % of cases comply (99.7 % required)"),
+        (0.996, 0.4, False, "NOT met: 99.6 % of cases comply (99.7 % required)"),  # each part alone would do
+    ],
+)
+def test_the_share_of_cases_decides(share: float, nutation: float, met: bool, said: str) -> None:
+    decided = Decision(example()["two-pulse"], counted(share, nutation, 0.1))
+    assert decided.met is met
+    assert decisions.verdict(decided) == said
+    if met:
+        assert all(line.met for line in decided.lines)
+
+
+def test_one_part_says_what_the_count_says_though_the_percentile_lies_between_two_cases() -> None:
+    body = replace(nutdamp.example(), requirement=Requirement(nutation=math.radians(0.5)))
+    for share, level in ((0.9969, 0.4999), (0.9971, 0.5001)):
+        decided = Decision(replace(example()["two-pulse"], spacecraft=body), counted(share, level, 0.0))
+        assert [line.met for line in decided.lines if line.bound.required] == [decided.met]
+        assert decided.met is (share > 0.997)
+
+
+def test_a_plan_that_misses_nominally_is_not_met_whatever_the_cases() -> None:
+    decided = Decision(example()["one-pulse"], counted(0.999, 0.1, 0.1))
+    assert decided.met is False
+    assert decisions.verdict(decided).startswith("NOT met with nominal values; met: 99.9 %")
+
+
+def test_without_cases_it_says_that_none_were_flown() -> None:
+    plan = example()["two-pulse"]
+    assert decisions.verdict(Decision(plan)) == "met with nominal values; dispersed cases were not flown"
+    sure = replace(plan, spacecraft=replace(plan.spacecraft, dispersions=None))
+    assert decisions.verdict(Decision(sure)) == "met with nominal values"
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [(None, "the plan damps the nutation"), (10.0, "the plan reaches the target")],
+)
+def test_where_nothing_is_required_the_verdict_does_not_say_met(target: float | None, said: str) -> None:
+    body = replace(nutdamp.example(), requirement=None, dispersions=None)
+    body = body if target is None else replace(body, goal=Goal(axis=body.direction_in_n(math.radians(target), 0.0)))
+    decided = decide(compare(body, ["two-pulse" if target is None else "optimal"]))
+    assert decided is not None
+    assert decided.met is None
+    assert decisions.verdict(decided) == f"nothing is required; with nominal values {said}"
+    assert {line.bound.required for line in decided.lines} == {False}
+
+
+def test_the_levels_are_those_of_the_cases() -> None:
+    plan = example()["two-pulse"]
+    results = fly(Results(study_of(plan.spacecraft, plan.pulses), 500))
+    found = cases_of(results)
+    assert results.values is not None
+    for row, part in ((0, Part.NUTATION), (1, Part.SHIFT)):
+        assert found.levels[part] == np.quantile(results.values[row], 0.997)
+    kept = (results.values[0] <= math.radians(0.5)) & (results.values[1] <= math.radians(0.2))
+    assert found.complying == kept.mean()
+
+
+def test_schemes_that_comply_more_often_are_named() -> None:
+    shares = {"one-pulse": 0.1, "two-pulse": 0.856, "four-pulse": 0.714}
+    decided = Decision(example()["four-pulse"], counted(0.714, 0.9, 0.1), shares)
+    said = "more cases comply with two-pulse (85.6 %) than with four-pulse (71.4 %)."
+    assert decisions.better(decided) == said
+    assert decisions.better(Decision(example()["two-pulse"], counted(0.856, 0.9, 0.1), shares)) == ""
+
+
+def test_nothing_feasible_leaves_nothing_to_decide() -> None:
+    assert decide(nutdamp.compare(nutdamp.example().with_(limits={"horizon": "1 ms"}), ["two-pulse"])) is None
+
+
+def test_the_screen_has_the_decision_on_top(run: Run) -> None:
+    lines = run("plan", "-q", columns=80).stdout.splitlines()
+    assert lines[0] == "Sounder-1"
+    assert lines[3] == "Requirement: met with nominal values; dispersed cases were not flown."
+    assert max(map(len, lines)) <= 80
+    assert any(line.startswith("shift of H   ≤ 0.2 deg") and line.endswith("met") for line in lines[:12])
+
+
+def test_json_says_what_the_screen_says(run: Run) -> None:
+    found = json.loads(run("plan", "-q", "--scheme", "four-pulse", "--json", "-").stdout)["decision"]
+    assert (found["scheme"], found["met"], found["cases"], found["better"]) == ("four-pulse", True, None, [])
+    assert found["verdict"] == "met with nominal values; dispersed cases were not flown"
+    shift = found["requirement"][1]
+    assert shift["margin_deg"] == pytest.approx(shift["limit_deg"] - shift["nominal_deg"])
+    assert found["final"]["spin_rad_s"] == pytest.approx(math.pi)
+
+
+def test_the_table_of_schemes_is_that_of_the_json(run: Run, tmp_path: Path) -> None:
+    done = run("plan", "-q", "--table", "schemes.csv", "--json", "plan.json")
+    assert done.returncode == 0
+    plans = json.loads((tmp_path / "plan.json").read_text("utf-8"))["plans"]
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "schemes.csv").read_text("utf-8"))))
+    for row, plan in zip(rows, plans, strict=True):
+        assert row["scheme"] == plan["scheme"]
+        assert row["recommended"] == str(plan["scheme"] == "optimal").lower()
+        assert row["meets_requirement"] == str(plan["meets_requirement"]).lower()
+        assert int(row["pulses"]) == len(plan["pulses"])
+        assert float(row["propellant_kg"]) == plan["propellant_kg"]
+        assert float(row["momentum_shift_deg"]) == plan["flown"]["momentum_shift_deg"]
+        assert float(row["axis_tilt_deg"]) == plan["final"]["axis"]["tilt_deg"]
+        assert row["met_fraction"] == ""
+
+
+def test_the_table_of_schemes_has_the_cases_that_comply_and_what_is_infeasible(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(run("init", "-").stdout.replace("max_on_time: 2 s", "max_on_time: 21 ms"))
+    done = run("plan", "-q", "--robust", "--table", "-", "a.yaml", "--set", "limits.horizon=9s")
+    assert done.returncode == 4
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert all(row["why"] and not row["end_s"] for row in rows if row["feasible"] == "false")
+    shares = [float(row["met_fraction"]) for row in rows if row["feasible"] == "true"]
+    assert shares
+    assert all(0.0 <= share <= 1.0 for share in shares)
+
+
+def test_the_comparison_has_rows_in_python() -> None:
+    rows = example().to_numpy()
+    assert rows["scheme"].tolist() == list(CLASSIC)
+    assert rows["end_s"].tolist() == [plan.end for plan in example()]
+    assert rows["recommended"].tolist().count("true") == 1
