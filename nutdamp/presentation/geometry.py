@@ -35,14 +35,18 @@ def drawn(flight: Flight, track: Track) -> Track:
     Where that would be more than `MOST_ROWS`, a shorter stretch from t = 0.
     """
     until = float(track.t[-1])
-    body = flight.spacecraft
-    momentum = np.linalg.norm(body.omega0 * np.asarray(flight.moments))
-    quickest = min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum))
-    step = quickest / ROWS_A_TURN
+    step = quickest(flight) / ROWS_A_TURN
     if until / step <= len(track.t):
         return track
     reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
     return flight.sampled(min(math.ceil(reach / step) + 1, MOST_ROWS), reach)
+
+
+def quickest(flight: Flight) -> float:
+    """The shortest period of the nutation, seen in the body or in space, s."""
+    body = flight.spacecraft
+    momentum = np.linalg.norm(body.omega0 * np.asarray(flight.moments))
+    return float(min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum)))
 
 
 class Stretch(NamedTuple):

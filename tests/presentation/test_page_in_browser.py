@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.study import Results, run
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.planning import compare
 from nutdamp.presentation.page import pdf
 from nutdamp.presentation.page.content import Repeat, report_page
@@ -23,6 +24,9 @@ pytestmark = pytest.mark.browser
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 QUICK = ("ace", "kreisel-course", "lunar-prospector")
 """The most columns, the fewest, and a train of pulses; the others are slow only by their number."""
+
+DISPERSED = "dispersed"
+"""The built-in example, its dispersions flown."""
 
 A4 = 186 / 25.4 * 96
 """Width in px between the margins of the page style."""
@@ -38,25 +42,8 @@ SPILLED = """[...document.querySelectorAll(".figures dd")]
   .filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent)"""
 """Numbers that stand out of their box."""
 
-Open = Callable[..., Any]
-"""``open(name, width=1400, scheme="light")``: a page of a configuration in a new tab."""
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """A running browser."""
-    why = "NOT CHECKED in a browser: "
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
-    )
-    executable = pdf.browser()
-    if executable is None:
-        pytest.skip(f"{why}no Chromium, Chrome or Edge is installed")
-    root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=executable, args=root)
-        yield browser
-        browser.close()
+Browse = Callable[..., Any]
+"""``tab(name, width=1400, scheme="light")``: a page of a configuration in a new tab."""
 
 
 @pytest.fixture(scope="module")
@@ -67,33 +54,26 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def page(name: str) -> Path:
         target = folder / f"{name}.html"
         if not target.exists():
-            source = next(path for path in CONFIGS if path.stem == name)
-            compared = compare(load_spacecraft(source), CLASSIC)
-            repeat = Repeat(f"nutdamp report {name}.yaml", source.name, source.read_text(encoding="utf-8"))
-            target.write_text(page_html(report_page(compared, repeat, pictured=True)), encoding="utf-8")
+            source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == name), None)
+            source = source or example_text()
+            compared = compare(read_spacecraft(source, f"{name}.yaml"), CLASSIC)
+            repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
+            results = None
+            if name == DISPERSED:
+                assert compared.recommended is not None
+                results = Results(study_of(compared.spacecraft, compared.recommended.pulses, flown=True), 500)
+                run(results, threads=1)
+            made = report_page(compared, repeat, pictured=True, dispersed=results)
+            target.write_text(page_html(made), encoding="utf-8")
         return target
 
     return page
 
 
 @pytest.fixture
-def tab(chromium: Any, pages: Callable[[str], Path]) -> Open:
-    """Opens pages; whatever the browser complains of or fetches from elsewhere fails the test."""
-
-    @contextmanager
-    def opened(name: str, width: int = 1400, scheme: str = "light") -> Iterator[Any]:
-        said: list[str] = []
-        context = chromium.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        page = context.new_page()
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in ("file:", "data:") else 0)
-        page.goto(pages(name).as_uri())
-        yield page
-        context.close()
-        assert said == []
-
-    return opened
+def tab(browse: Browse, pages: Callable[[str], Path]) -> Browse:
+    """Opens the page of a configuration by its name."""
+    return lambda name, *width_and_scheme: browse(pages(name), *width_and_scheme)
 
 
 def everywhere() -> list[Any]:
@@ -104,7 +84,7 @@ def everywhere() -> list[Any]:
 
 
 @pytest.mark.parametrize("name", everywhere())
-def test_it_fits_phones_screens_and_paper(tab: Open, name: str) -> None:
+def test_it_fits_phones_screens_and_paper(tab: Browse, name: str) -> None:
     for width in (400, 1400):
         for scheme in ("light", "dark"):
             with tab(name, width, scheme) as page:
@@ -118,7 +98,7 @@ def test_it_fits_phones_screens_and_paper(tab: Open, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_it_prints_to_a_few_sheets_of_a4(tab: Open, name: str) -> None:
+def test_it_prints_to_a_few_sheets_of_a4(tab: Browse, name: str) -> None:
     with tab(name) as page:
         printed = page.pdf(prefer_css_page_size=True)
     sheets = re.findall(rb"/Type\s*/Page\b", printed)
@@ -154,7 +134,7 @@ def sorting(page: Any) -> list[str | None]:
     return order
 
 
-def test_a_click_sorts_and_another_turns_it(tab: Open) -> None:
+def test_a_click_sorts_and_another_turns_it(tab: Browse) -> None:
     with tab("ace") as page:
         planned = column(page, "scheme")
         button = page.locator("#schemes thead button", has_text="shift of H")
@@ -176,7 +156,7 @@ def test_a_click_sorts_and_another_turns_it(tab: Open) -> None:
         assert marked == recommended.scheme
 
 
-def test_numbers_sort_by_value_and_words_stay_last(tab: Open) -> None:
+def test_numbers_sort_by_value_and_words_stay_last(tab: Browse) -> None:
     with tab("kreisel-course") as page:  # four-pulse is infeasible there; angles are "< 1e-9" or degrees
         button = page.locator("#schemes thead button", has_text="shift of H")
         for expected in (["two-pulse", "one-pulse", "four-pulse"], ["one-pulse", "two-pulse", "four-pulse"]):
@@ -185,7 +165,7 @@ def test_numbers_sort_by_value_and_words_stay_last(tab: Open) -> None:
 
 
 @pytest.mark.parametrize("key", ["Enter", "Space"])
-def test_the_keyboard_sorts(tab: Open, key: str) -> None:
+def test_the_keyboard_sorts(tab: Browse, key: str) -> None:
     with tab("ace") as page:
         page.locator("#schemes .wide").focus()
         page.keyboard.press("Tab")
@@ -200,7 +180,7 @@ def test_the_keyboard_sorts(tab: Open, key: str) -> None:
         assert sorting(page)[2] == "ascending"
 
 
-def test_wide_tables_scroll_in_their_box(tab: Open) -> None:
+def test_wide_tables_scroll_in_their_box(tab: Browse) -> None:
     with tab("ace", 400) as page:
         box = page.locator("#schemes .wide")
         assert box.evaluate("(box) => box.scrollWidth > box.clientWidth")
@@ -240,13 +220,36 @@ CONTRAST = """(selector) => {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_and_lines_are_read_on_either_ground(tab: Open, scheme: str) -> None:
+def test_text_and_lines_are_read_on_either_ground(tab: Browse, scheme: str) -> None:
     """Contrast by WCAG 2: 4.5 for text, 3 for the lines of pictures."""
-    with tab("ace", scheme=scheme) as page:
+    with tab("ace", 1400, scheme) as page:
         dark = page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
         assert dark == (scheme == "dark")
-        texts = page.evaluate(CONTRAST, "h1, h2, p, li, a, dt, dd, th, td, caption, figcaption, pre, .unit")
+        texts = page.evaluate(
+            CONTRAST,
+            "h1, h2, h3, p, li, a, dt, dd, th, td, caption, figcaption, pre, .unit, .moving text, .moving span, "
+            "button, select, label, output",
+        )
         assert min(texts)[0] >= 4.5, min(texts)
         lines = page.evaluate(CONTRAST, '.picture path[style*="stroke-width: 1.3"]')
         assert lines
         assert min(lines)[0] >= 3.0, min(lines)
+
+
+@pytest.mark.parametrize("name", [*QUICK, DISPERSED])
+def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright",
+        reason="NOT CHECKED for accessibility: axe is not installed: pip install 'nutdamp[browser]'",
+    ).Axe()
+    for width, scheme in ((1400, "light"), (1400, "dark"), (400, "light")):
+        with tab(name, width, scheme) as page:
+            found = axe.run(page).response["violations"]
+            assert [(one["id"], node["html"][:200]) for one in found for node in one["nodes"]] == []
+            page.evaluate("document.querySelector('.moving input').removeAttribute('aria-label')")
+            assert [one["id"] for one in axe.run(page).response["violations"]] == ["label"]  # it does look
+
+
+@pytest.mark.parametrize("name", [*everywhere(), DISPERSED])
+def test_a_page_is_small_enough_to_send(pages: Callable[[str], Path], name: str) -> None:
+    assert pages(name).stat().st_size <= 700_000

@@ -25,6 +25,7 @@ from nutdamp.presentation.page.document import (
     facts_of,
     sheet_of,
 )
+from nutdamp.presentation.page.moving import moving_of
 from nutdamp.presentation.page.pictures import dispersion_picture_of, pictures_of
 from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.presentation.text import degrees, mass, moment, quantity
@@ -68,7 +69,7 @@ def report_page(
     if chosen is not None:
         sections.append(_schedule(chosen))
         if pictured:
-            sections.append(Section("pictures", "Pictures", pictures_of(chosen)))
+            sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
         sections.append(_budget(chosen))
         if dispersed is not None:
             sections.append(_dispersion(chosen, dispersed, note, pictured=pictured))

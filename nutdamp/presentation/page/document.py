@@ -10,6 +10,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.presentation.page.moving import Moving
+
 
 class Column(NamedTuple):
     """One column of a table; ``number``: flush right, and sorted by value."""
@@ -73,7 +75,7 @@ class Listing:
     language: str = ""
 
 
-Block = Sheet | Facts | Prose | Remarks | Picture | Listing
+Block = Sheet | Facts | Prose | Remarks | Picture | Moving | Listing
 
 
 class Section(NamedTuple):

@@ -11,6 +11,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from nutdamp.presentation.page.document import Block, Page
+from nutdamp.presentation.page.moving import Moving
 from nutdamp.presentation.page.templates import templates
 from nutdamp.presentation.text import MISSING
 
@@ -21,7 +22,11 @@ if TYPE_CHECKING:
 
 def page_html(page: Page) -> str:
     """The whole file. Whatever a spacecraft file says is escaped; the policy in its head allows no other script."""
-    style, script = (_part(name) for name in ("page.css", "sort.js"))
+    moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
+    style, script = (
+        "\n".join(map(_part, (name, *[view] * moves)))
+        for name, view in (("page.css", "view.css"), ("sort.js", "view.js"))
+    )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
 

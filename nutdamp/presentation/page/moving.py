@@ -1,0 +1,372 @@
+"""The view of the motion that the script of a page moves: its rows as whole numbers, and the scales around them.
+
+The script only reads rows and draws them: each number that it shows is one row of the track, rounded here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
+from nutdamp.planning import Plan
+from nutdamp.presentation import geometry
+from nutdamp.presentation.braille import ticks
+from nutdamp.presentation.end_tables import angle_names, angle_texts
+from nutdamp.presentation.plan_tables import channel_text
+from nutdamp.presentation.text import MISSING
+from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.track import Track
+
+ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
+"""Even rows in the quickest nutation turn, where there are not less or more than so many altogether."""
+
+COARSE = 12
+"""Rows in a turn below which a line from row to row is no picture of the path, and dots are drawn."""
+
+EDGES = (350, 150, 1960, 1760)
+"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
+
+STRIP = (2000, 1000)
+"""Width and height of the angles over time in units of their SVG."""
+
+SPHERE = 10_000
+"""Length of a unit vector of the globe as whole numbers: 0.006 deg."""
+
+ANGLE_DIGITS = 4
+"""Decimals of degrees; more where the largest nutation has not so many figures."""
+
+PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
+"""Prefixes of units with their factors, and the largest number of a scale that needs another one."""
+
+FAR = 4.0
+"""How far a target may lie from H(0) to be in the panel of the axis track, as a multiple of the track."""
+
+NONE = -(10**8)
+"""Stands in a row for an angle that does not exist."""
+
+QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
+"""Seconds that playing takes at the quickest, at first, and at the slowest."""
+
+Mark = tuple[float, str]
+"""A place on a scale, and the number there."""
+
+
+class Scale(NamedTuple):
+    """A scale with its name and marks."""
+
+    name: str
+    marks: tuple[Mark, ...]
+
+
+class Panel(NamedTuple):
+    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within."""
+
+    part: str
+    title: str
+    described: str
+    x: Scale
+    y: Scale
+    zero: tuple[float, float]
+
+
+class Bar(NamedTuple):
+    """A firing in the row of its channel, in units of the SVG."""
+
+    row: int
+    start: float
+    width: float
+
+
+class Strip(NamedTuple):
+    """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG."""
+
+    times: Scale
+    angles: Scale
+    zero: float
+    required: float | None
+    channels: tuple[str, ...]
+    bars: tuple[Bar, ...]
+
+
+class Named(NamedTuple):
+    """A direction on the globe, (3,) inertial, with the circle of ``radius`` rad around it; ``kind`` styles it."""
+
+    name: str
+    axis: Vector
+    radius: float = 0.0
+    kind: str = "target"
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """What stands still in the view, and what moves as the JSON ``data``."""
+
+    panels: tuple[Panel, ...]
+    strip: Strip
+    speeds: tuple[tuple[float, str], ...]
+    speed: float
+    angles: tuple[str, str]
+    named: tuple[Named, ...]
+    dated: bool
+    caption: str
+    data: str
+
+
+def moving_of(plan: Plan) -> Moving:
+    """The view of a plan flown through the real pulse widths."""
+    body, pulses = plan.spacecraft, plan.pulses
+    # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
+    until = math.ceil(1e3 * (pulses.end + body.inertial_period)) / 1e3
+    return moving(flight.flown(body, pulses, until), until, plan.scheme, named_directions(body))
+
+
+def named_directions(body: Spacecraft) -> tuple[Named, ...]:
+    """What the globe shows besides the track."""
+    found = []
+    goal, required = body.goal, body.requirement
+    if goal.axis is not None:
+        found.append(Named("target", goal.axis, (required.momentum_shift or 0.0) if required else 0.0))
+    if goal.sun is not None:
+        found.append(Named("Sun", goal.sun, kind="sun"))
+    return tuple(found)
+
+
+def samples_for(flown: Flight, until: float) -> int:
+    """Even rows to ``until`` s: steep tracks need more."""
+    return min(max(math.ceil(ROWS_A_TURN * until / geometry.quickest(flown)), LEAST_ROWS), MOST_ROWS) + 1
+
+
+def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()) -> Moving:
+    """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
+    body, samples = flown.spacecraft, samples_for(flown, until)
+    track = flown.sampled(samples, until)
+    panels, columns, target = _panels(flown, track, named)
+    strip, span = _strip(flown, track, until)
+    firing, texts = _firing(flown, track)
+    cone = _angle_digits(track)
+    clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
+    columns |= {
+        "t": _whole(track.t, clock),
+        "theta": _whole(np.degrees(track.nutation), cone),
+        "mu": _whole(np.degrees(track.body_cone), cone),
+        "lambda": _whole(np.degrees(track.space_cone), cone),
+        **_named_columns("axis", _unit(track.axis)),
+        **_named_columns("H", _unit(track.momentum)),
+        **_named_columns("angle", _pointing(body, track.axis)),
+        "firing": firing,
+    }
+    utc = _dates(body, track, clock)
+    data: dict[str, Any] = {
+        "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
+        "until": until,
+        "span": span,
+        "columns": {name: _steps(values) for name, values in columns.items()},
+        "none": NONE,
+        "firings": texts,
+        "utc": utc,
+        "target": target,
+        "named": [one._asdict() | {"axis": [round(part, 6) for part in one.axis.tolist()]} for one in named],
+        "look": _look(track, named),
+        "dots": until / geometry.quickest(flown) * COARSE > samples,
+    }
+    speeds, speed = _speeds(until)
+    return Moving(
+        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
+        "Each position is one row of the flight through the real pulse widths: "
+        f"nutdamp simulate SPACECRAFT --scheme {scheme} --flown --until {until:.12g} --samples {samples} --csv FILE "
+        "writes them all.",
+        json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
+    )  # fmt: skip
+
+
+def _panels(
+    flown: Flight, track: Track, named: Sequence[Named]
+) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None]:
+    """Pole curve and axis track, the columns of their paths, and the place of the target in the latter."""
+    sky, momentum = geometry.sky_paths(flown, track)
+    target = _target(flown, track, named, np.vstack([sky, momentum]))
+    pole = geometry.pole_path(track)
+    pole_room = geometry.room(pole, 0.1, centre=True)
+    sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    body = flown.spacecraft
+    sense = ", spin about −3" if body.spin < 0.0 else ""
+    axes = "" if body.inertia.aligned else ", principal axes"
+    panels = (
+        _panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
+        _panel("sky", "Axis track: spin axis in space", sky_room, geometry.sky_names(flown)),
+    )
+    columns = {
+        **_named_columns("pole", _placed(pole, *pole_room)),
+        **_named_columns("sky", _placed(sky, *sky_room)),
+        **_named_columns("momentum", _placed(momentum, *sky_room)),
+    }
+    return panels, columns, [column[0] for column in _placed(target, *sky_room)] if len(target) else None
+
+
+def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
+    """Columns by a common name and their number, from 1."""
+    return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
+
+
+def _target(flown: Flight, track: Track, named: Sequence[Named], paths: Vector) -> Vector:
+    """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
+    found = geometry.sky_target(flown, track)
+    reach = FAR * float(np.hypot(*paths.T).max())
+    return found if named and len(found) and float(np.hypot(*found[0])) <= reach else np.empty((0, 2))
+
+
+def _placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
+    """Two columns: the places of ``points`` (n, 2) in a panel."""
+    left, top, right, bottom = EDGES
+    part = (points - middle + half) / (2.0 * half)
+    across = left + part[:, 0] * (right - left), bottom - part[:, 1] * (bottom - top)
+    return [np.rint(column).astype(int).tolist() for column in across]
+
+
+def _panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, str]) -> Panel:
+    middle, half = room
+    prefix, factor = _prefix(half)
+    names = names[0].replace(", deg", f", {prefix}deg"), names[1].replace(", deg", f", {prefix}deg")
+    marks = []
+    for which in (0, 1):
+        low, high = float(middle[which]) - half, float(middle[which]) + half
+        values = np.array(ticks(low, high, 5))
+        both = np.column_stack([values, values])
+        places = _placed(both, middle[[which, which]], half)[which]
+        marks.append(tuple(zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)))
+    zero = _placed(np.zeros((1, 2)), middle, half)
+    described = f"{title}; {names[0]} to the right, {names[1]} upwards"
+    x, y = (Scale(name, mark) for name, mark in zip(names, marks, strict=True))
+    return Panel(part, title, described, x, y, (zero[0][0], zero[1][0]))
+
+
+def _prefix(largest: float) -> tuple[str, float]:
+    """The prefix of a unit that keeps numbers up to ``largest`` short, and the factor by which they grow."""
+    return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")
+
+
+def _strip(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
+    """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
+    body = flown.spacecraft
+    angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
+    low, high = float(angles.min()), float(angles.max())
+    margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
+    low, high = low - margin, high + margin
+    width, height = STRIP
+
+    def rise(angle: float) -> float:
+        return round(height * (high - angle) / (high - low), 1)
+
+    required = None if body.requirement is None else body.requirement.nutation
+    used = dict.fromkeys(pulse.channel for pulse in flown.schedule)
+    order = {channel.name: place for place, channel in enumerate(body.channels)}
+    channels = tuple(sorted(used, key=lambda name: order.get(name, -1)))
+    bars = [
+        Bar(channels.index(pulse.channel), round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
+        for pulse, (begins, ends) in zip(flown.schedule, flown.spans, strict=True)
+    ]
+    prefix, factor = _prefix(high - low)
+    level = None if required is None else math.degrees(required)
+    scale = tuple((rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low, high, 5))
+    strip = Strip(
+        times=Scale("time, s", tuple((100.0 * time / until, _number(time)) for time in ticks(0.0, until, 6))),
+        angles=Scale(f"{prefix}deg", scale),
+        zero=rise(0.0),
+        required=rise(level) if level is not None and low < level < high else None,
+        channels=channels,
+        bars=tuple(bars),
+    )
+    return strip, [low, high]
+
+
+def _angle_digits(track: Track) -> int:
+    """Decimals of degrees that show four figures of the largest nutation."""
+    largest = math.degrees(float(track.nutation.max()))
+    return ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+
+
+def _whole(values: Vector, digits: int) -> list[int]:
+    """Numbers rounded to so many decimals, as whole numbers of the last one."""
+    return [round(round(value, digits) * 10**digits) for value in values.tolist()]
+
+
+def _steps(values: Sequence[int]) -> list[int]:
+    """The first number and how each differs from the one before: short where little changes."""
+    return [now - before for before, now in zip([0, *values], values, strict=False)]
+
+
+def _unit(vectors: Vector) -> list[list[int]]:
+    """Three columns of directions as parts of `SPHERE`."""
+    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return [column.tolist() for column in np.rint(SPHERE * unit.T).astype(int)]
+
+
+def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
+    """Two columns: the angles of directions (n, 3), as every table shows them, in units of their last decimal."""
+    texts = [angle_texts(body, axis) for axis in axes]
+    found = [
+        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in row]
+        for row in texts
+    ]
+    return [list(column) for column in zip(*found, strict=True)]
+
+
+def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
+    """UTC of each row: what all have in common, and the rest of each; None without an epoch."""
+    dates = [date for time in track.t.tolist() if (date := body.utc(time, digits)) is not None]
+    if len(dates) < len(track.t):
+        return None
+    # They are in order: what the first and the last have in common, all have.
+    pairs = enumerate(zip(dates[0], dates[-1], strict=False))
+    common = next((place for place, (one, other) in pairs if one != other), len(dates[0]))
+    return {"head": dates[0][:common], "tails": [date[common:] for date in dates]}
+
+
+def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
+    """For each row which of the texts says what fires; the first says that nothing does."""
+    texts, column = ["none"], []
+    pulses = list(zip(flown.schedule, flown.spans, strict=True))
+    for time in track.t.tolist():
+        on = [
+            f"{number}: {channel_text(pulse, flown.spacecraft)}"
+            for number, (pulse, (begins, ends)) in enumerate(pulses, start=1)
+            if begins <= time <= ends
+        ]
+        text = " and ".join(on) or texts[0]
+        if text not in texts:
+            texts.append(text)
+        column.append(texts.index(text))
+    return column, texts
+
+
+def _look(track: Track, named: Sequence[Named]) -> list[float]:
+    """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
+    middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
+    for one in named[:1]:
+        if float(middle @ one.axis) > -0.9:
+            middle = middle + one.axis
+    longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
+    turned = math.degrees(longitude or 0.0) - 20.0
+    shown = math.degrees(latitude)
+    return [round(turned, 1), round(shown - 25.0 if shown > 0.0 else shown + 25.0, 1)]
+
+
+def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
+    """Seconds of motion in a second of playing, as number and words; and the one to begin with."""
+    decades = range(math.floor(math.log10(until / SLOW)) - 1, math.ceil(math.log10(until / QUICK)) + 1)
+    every = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    found = sorted({1.0, *(round(one, 12) for one in every if QUICK <= until / one <= SLOW)})
+    first = min(found, key=lambda one: abs(math.log(until / one / UNHURRIED)))
+    return tuple((one, "real time" if one == 1.0 else f"× {one:g}") for one in found), first

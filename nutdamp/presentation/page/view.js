@@ -1,0 +1,311 @@
+"use strict";
+// Moves one cursor over the pictures of a motion. It shows rows of the track as they are and computes no motion.
+for (const view of document.querySelectorAll(".moving")) {
+  const data = JSON.parse(view.querySelector("script").textContent);
+  const part = (name) => view.querySelector(`[data-part="${name}"]`);
+  const rows = {};
+  for (const [name, steps] of Object.entries(data.columns)) {
+    let sum = 0;
+    rows[name] = steps.map((step) => (sum += step));
+  }
+  const last = rows.t.length - 1;
+  const fires = (row) => rows.firing[row] > 0;
+  const slider = part("slider");
+  const speed = part("speed");
+  let current = 0;
+
+  // ---- drawing
+  const make = (parent, tag, attributes, text) => {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    if (text !== undefined) made.textContent = text;
+    parent.append(made);
+    return made;
+  };
+  // The rows that are shown, as a line; as dots where the rows are too far apart for one.
+  const line = (xs, ys, shown = () => true, dots = false) => {
+    const parts = [];
+    let drawing = false;
+    for (let row = 0; row < xs.length; row += 1) {
+      const now = shown(row);
+      if (now) parts.push(dots ? `M${xs[row]} ${ys[row]}h0` : `${drawing ? "L" : "M"}${xs[row]} ${ys[row]}`);
+      drawing = now;
+    }
+    return parts.join("");
+  };
+  const CROSS = "M-55 0H55M0 -55V55";
+  const DIAMOND = "M0 -55L45 0L0 55L-45 0Z";
+  const place = (mark, x, y) => mark.setAttribute("transform", `translate(${x} ${y})`);
+
+  const pole = part("pole-curves");
+  make(pole, "path", { class: "axis", d: line(rows.pole1, rows.pole2, undefined, data.dots) });
+  make(pole, "path", { class: "fires", d: line(rows.pole1, rows.pole2, fires) });
+  const atPole = make(pole, "circle", { class: "cursor", r: 42 });
+
+  const sky = part("sky-curves");
+  make(sky, "path", { class: "axis", d: line(rows.sky1, rows.sky2, undefined, data.dots) });
+  make(sky, "path", { class: "fires", d: line(rows.sky1, rows.sky2, fires) });
+  make(sky, "path", { class: "momentum", d: line(rows.momentum1, rows.momentum2) });
+  if (data.target) place(make(sky, "path", { class: data.named[0].kind, d: DIAMOND }), ...data.target);
+  const momentumAtSky = make(sky, "path", { class: "cursor", d: CROSS });
+  const atSky = make(sky, "circle", { class: "cursor", r: 42 });
+
+  const WIDE = 2000, HIGH = 1000;
+  const [low, high] = data.span;
+  const tAll = rows.t.map((t) => (WIDE * t) / 10 ** data.digits.t / data.until);
+  for (const name of ["lambda", "mu", "theta"]) {
+    const rises = rows[name].map((v) => ((high - v / 10 ** data.digits.cone) / (high - low)) * HIGH);
+    const d = line(tAll.map((x) => x.toFixed(1)), rises.map((y) => y.toFixed(1)));
+    make(part("angles"), "path", { class: name, d });
+  }
+
+  // ---- the globe: orthographic, seen from longitude and latitude of `look`, north up
+  const globe = part("globe");
+  const RADIUS = 900, MIDDLE = 1000, SPHERE = Math.hypot(rows.axis1[0], rows.axis2[0], rows.axis3[0]);
+  const degree = Math.PI / 180;
+  let look = [...data.look];
+  let see = () => [0, 0, 0];
+  const aim = () => {
+    const [lon, lat] = look.map((angle) => angle * degree);
+    const right = [-Math.sin(lon), Math.cos(lon), 0];
+    const near = [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)];
+    const up = [-Math.sin(lat) * Math.cos(lon), -Math.sin(lat) * Math.sin(lon), Math.cos(lat)];
+    const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
+    see = (v) => [MIDDLE + RADIUS * dot(v, right), MIDDLE - RADIUS * dot(v, up), dot(v, near)];
+  };
+  const onSphere = (lon, lat) => [
+    Math.cos(lat * degree) * Math.cos(lon * degree),
+    Math.cos(lat * degree) * Math.sin(lon * degree),
+    Math.sin(lat * degree),
+  ];
+  const count = (number, step, from = 0) => Array.from({ length: number }, (_, index) => from + step * index);
+  // The circle of half-angle `radius` rad around a direction.
+  const around = (axis, radius) => {
+    const aside = Math.abs(axis[2]) < 0.9 ? [-axis[1], axis[0], 0] : [0, -axis[2], axis[1]];
+    const size = Math.hypot(...aside);
+    const one = aside.map((x) => x / size);
+    const two = [
+      axis[1] * one[2] - axis[2] * one[1], axis[2] * one[0] - axis[0] * one[2], axis[0] * one[1] - axis[1] * one[0],
+    ];
+    const [c, s] = [Math.cos(radius), Math.sin(radius)];
+    return count(121, 3).map((turn) => {
+      const [cosine, sine] = [Math.cos(turn * degree), Math.sin(turn * degree)];
+      return axis.map((x, index) => c * x + s * (cosine * one[index] + sine * two[index]));
+    });
+  };
+  const vectors = (name) => rows[`${name}1`].map((x, row) => [
+    x / SPHERE, rows[`${name}2`][row] / SPHERE, rows[`${name}3`][row] / SPHERE,
+  ]);
+  const axes = vectors("axis"), momenta = vectors("H");
+  // What lies on the sphere: points, how they look, which rows of them; a line behind it is drawn faint.
+  const lines = [];
+  const lay = (points, look, options = {}) => {
+    const back = options.back === false ? null : make(globe, "path", { class: `${look} behind` });
+    lines.push({ points, back, front: make(globe, "path", { class: look }), ...options });
+  };
+  make(globe, "circle", { cx: MIDDLE, cy: MIDDLE, r: RADIUS });
+  const grid = make(globe, "g", { class: "grid" });
+  const graticule = make(grid, "path", {});
+  const meridians = [
+    ...count(12, 30).map((lon) => count(33, 5, -80).map((lat) => onSphere(lon, lat))),
+    ...count(5, 30, -60).map((lat) => count(73, 5).map((lon) => onSphere(lon, lat))),
+  ];
+  lay(axes, "axis", { dots: data.dots });
+  lay(axes, "fires", { shown: fires, back: false });
+  lay(momenta, "momentum");
+  for (const one of data.named) if (one.radius > 0) lay(around(one.axis, one.radius), one.kind);
+  const signs = data.named.map((one) => ({
+    name: one.name,
+    axis: one.axis,
+    mark: make(globe, "path", { class: one.kind, d: DIAMOND }),
+    text: make(globe, "text", {}),
+  }));
+  const places = [[0, 90, "+z"], [0, -90, "−z"], ...count(4, 90).map((lon) => [lon, 0, `${lon}°`])];
+  const numbers = places.map(([lon, lat, name]) => ({
+    axis: onSphere(lon, lat), text: make(globe, "text", { class: "middle faint" }, name),
+  }));
+  const momentumAtGlobe = make(globe, "path", { class: "cursor", d: CROSS });
+  const atGlobe = make(globe, "circle", { class: "cursor", r: 30 });
+  let seen = [];
+  // Marks behind the globe are faint.
+  const put = (mark, vector) => {
+    const [x, y, depth] = see(vector);
+    place(mark, x.toFixed(1), y.toFixed(1));
+    mark.setAttribute("opacity", depth < 0 ? 0.4 : 1);
+    return depth >= 0;
+  };
+  const drawn = (points, shown, dots) => {
+    const flat = points.map(see);
+    const side = (sign) => line(
+      flat.map((one) => one[0].toFixed(1)), flat.map((one) => one[1].toFixed(1)),
+      (row) => sign * flat[row][2] >= 0 && (!shown || shown(row)), dots,
+    );
+    return { flat, front: side(1), back: () => side(-1) };
+  };
+  const drawGlobe = () => {
+    aim();
+    graticule.setAttribute("d", meridians.map((points) => drawn(points).front).join(""));
+    for (const one of lines) {
+      const made = drawn(one.points, one.shown, one.dots);
+      one.front.setAttribute("d", made.front);
+      if (one.back) one.back.setAttribute("d", made.back());
+      if (one.points === axes) seen = made.flat;
+    }
+    for (const one of signs) {
+      const [x, y] = see(one.axis);
+      const left = x > MIDDLE;
+      one.text.textContent = put(one.mark, one.axis) ? one.name : `${one.name}, behind`;
+      one.text.setAttribute("class", left ? "end" : "");
+      place(one.text, x + (left ? -75 : 75), y + 28);
+    }
+    for (const one of numbers) one.text.setAttribute("visibility", put(one.text, one.axis) ? "visible" : "hidden");
+    put(momentumAtGlobe, momenta[current]);
+    put(atGlobe, axes[current]);
+  };
+
+  // ---- one moment
+  const number = (value, digits) => (value === data.none ? "–" : (value / 10 ** digits).toFixed(digits));
+  const show = (row) => {
+    current = Math.min(Math.max(row, 0), last);
+    const t = `${number(rows.t[current], data.digits.t)} s`;
+    const angle = (name) => `${number(rows[name][current], data.digits.cone)}°`;
+    const firing = data.firings[rows.firing[current]];
+    part("t").textContent = t;
+    for (const name of ["theta", "mu", "lambda"]) part(name).textContent = angle(name);
+    for (const name of ["angle1", "angle2"]) {
+      const value = rows[name][current];
+      part(name).textContent = number(value, data.digits.angle) + (value === data.none ? "" : "°");
+    }
+    part("firing").textContent = firing;
+    if (data.utc) part("utc").textContent = data.utc.head + data.utc.tails[current];
+    part("brief").textContent = `t = ${t}, θ = ${angle("theta")}`;
+    slider.value = current;
+    slider.setAttribute("aria-valuetext", `${t}, nutation ${angle("theta")}${fires(current) ? `, firing ${firing}` : ""}`);
+    place(atPole, rows.pole1[current], rows.pole2[current]);
+    place(atSky, rows.sky1[current], rows.sky2[current]);
+    place(momentumAtSky, rows.momentum1[current], rows.momentum2[current]);
+    put(momentumAtGlobe, momenta[current]);
+    put(atGlobe, axes[current]);
+    for (const svg of [pole, sky, globe]) svg.classList.toggle("on", fires(current));
+    part("time").style.left = `${(tAll[current] / WIDE) * 100}%`;
+  };
+  // The last row not after a time, given in the units of the column.
+  const rowAt = (t) => {
+    let [first, beyond] = [0, last + 1];
+    while (beyond - first > 1) {
+      const middle = (first + beyond) >> 1;
+      if (rows.t[middle] <= t) first = middle;
+      else beyond = middle;
+    }
+    return first;
+  };
+
+  // ---- playing
+  let playing = false, clock = 0, before = 0;
+  const button = part("play");
+  const play = (on) => {
+    if (on === playing) return;
+    playing = on;
+    button.textContent = on ? "Pause" : "Play";
+    if (!on) return;
+    if (current === last) show(0);
+    clock = rows.t[current];
+    before = performance.now();
+    requestAnimationFrame(step);
+  };
+  const step = (now) => {
+    if (!playing) return;
+    const passed = Math.min(Math.max(now - before, 0), 100) / 1000; // a page in the background does not run on
+    before = now;
+    clock += passed * Number(speed.value) * 10 ** data.digits.t;
+    let next = Math.max(rowAt(clock), current);
+    if (!fires(current)) {
+      // However short a pulse is, one frame shows that it fires.
+      for (let row = current + 1; row < next; row += 1) if (fires(row)) next = row;
+    }
+    show(next);
+    if (clock >= rows.t[last]) {
+      show(last);
+      play(false);
+    } else requestAnimationFrame(step);
+  };
+  const stop = (row) => {
+    play(false);
+    show(row);
+  };
+  button.addEventListener("click", () => play(!playing));
+  slider.max = last;
+  slider.addEventListener("input", () => stop(Number(slider.value)));
+  const begins = rows.firing.flatMap((text, row) => (text > 0 && text !== rows.firing[row - 1] ? [row] : []));
+  part("back")?.addEventListener("click", () => stop(begins.filter((row) => row < current).pop() ?? 0));
+  part("on")?.addEventListener("click", () => stop(begins.find((row) => row > current) ?? last));
+  view.addEventListener("keydown", (event) => {
+    if (event.key !== " " || /^(BUTTON|SELECT)$/.test(event.target.tagName)) return;
+    event.preventDefault();
+    play(!playing);
+  });
+
+  // ---- pointing
+  const within = (svg, event) =>
+    new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  const REACH = 120, SAME = 15;
+  // The nearest row within reach; of rows that lie as near, the one next in time to the cursor.
+  const nearest = (svg, event, spot) => {
+    const { x, y } = within(svg, event);
+    const far = rows.t.map((_, row) => {
+      const [px, py, depth] = spot(row);
+      return depth < 0 ? Infinity : Math.hypot(px - x, py - y);
+    });
+    const least = Math.min(...far);
+    if (least > REACH) return null;
+    let found = null;
+    far.forEach((one, row) => {
+      if (one <= least + SAME && (found === null || Math.abs(row - current) < Math.abs(found - current))) found = row;
+    });
+    return found;
+  };
+  // Hovering moves the cursor unless the view plays; a click pauses it.
+  const follow = (target, find) => {
+    const moved = (event) => {
+      if (event.type === "pointermove" && playing) return;
+      const row = find(event);
+      if (row !== null) stop(row);
+    };
+    target.addEventListener("pointermove", moved);
+    target.addEventListener("pointerdown", moved);
+  };
+  follow(part("pole"), (event) => nearest(part("pole"), event, (row) => [rows.pole1[row], rows.pole2[row], 0]));
+  follow(part("sky"), (event) => nearest(part("sky"), event, (row) => [rows.sky1[row], rows.sky2[row], 0]));
+  follow(part("strip"), (event) => {
+    const box = part("strip").getBoundingClientRect();
+    return rowAt(((event.clientX - box.left) / box.width) * rows.t[last]);
+  });
+  let held = null;
+  const turn = (lon, lat) => {
+    look = [look[0] + lon, Math.min(Math.max(look[1] + lat, -90), 90)];
+    drawGlobe();
+  };
+  follow(globe, (event) => (held || event.type === "pointerdown" ? null : nearest(globe, event, (row) => seen[row])));
+  globe.addEventListener("pointerdown", (event) => {
+    held = within(globe, event);
+    globe.setPointerCapture(event.pointerId);
+  });
+  globe.addEventListener("pointermove", (event) => {
+    if (!held) return;
+    const now = within(globe, event);
+    turn((held.x - now.x) / RADIUS / degree, (now.y - held.y) / RADIUS / degree);
+    held = now;
+  });
+  for (const name of ["pointerup", "pointercancel"]) globe.addEventListener(name, () => (held = null));
+  globe.addEventListener("keydown", (event) => {
+    const turns = { ArrowLeft: [-5, 0], ArrowRight: [5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] };
+    if (event.key === "Home") look = [...data.look];
+    else if (!turns[event.key]) return;
+    event.preventDefault();
+    turn(...(turns[event.key] ?? [0, 0]));
+  });
+
+  drawGlobe();
+  show(0);
+  view.hidden = false;
+}
