@@ -635,6 +635,17 @@ def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> No
     assert "plans with them, but then too no scheme compared meets the requirement." in text
 
 
+def test_planning_with_disturbances_is_tried_only_where_it_was_not_done() -> None:
+    body = spinner(channels=cross(8.0))
+    assert compare(body, schemes.CLASSIC).with_disturbances is None  # there are none
+    disturbed = replace(body, disturbances=(Disturbance(0.02 + 0j, rate=-body.spin),))
+    assert compare(disturbed, schemes.CLASSIC).with_disturbances is not None
+    aware = schemes.Options(with_disturbances=True)
+    assert compare(disturbed, schemes.CLASSIC, aware).with_disturbances is None
+    nothing_fits = replace(disturbed, limits=Limits(horizon=1e-6))
+    assert compare(nothing_fits, schemes.CLASSIC).with_disturbances is None  # and no recommended plan to compare with
+
+
 # --- a scheme with a bug ---------------------------------------------------------------------------------------------
 
 

@@ -12,7 +12,7 @@ from builders import channel, fan, spinner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nutdamp.limits import Windows, commandable, for_pairs, longest_on_time, rooms
+from nutdamp.limits import Windows, commandable, for_pairs, free_windows, longest_on_time, rooms
 from nutdamp.schedule import TOUCHING, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Limits, Steerable
 
@@ -186,3 +186,18 @@ def test_slots_are_blocked_as_by_looking_at_each_window() -> None:
     assert Windows(body).blocked(edges[:-1], edges[1:]).tolist() == each
     assert 50 < sum(each) < 350
     assert not Windows(spinner()).blocked(edges[:-1], edges[1:]).any()
+
+
+def test_of_three_pulses_each_shares_with_its_neighbours() -> None:
+    """One second each, from 10, 20 and 40 s on: 9 s and 19 s between them are halved."""
+    body = spinner(limits=Limits(horizon=100.0))
+    thruster = channel("T", 8.0, 0.0, 0.0)
+    pulses = [channel_pulse(thruster, begin + 0.5, 1.0) for begin in (10.0, 20.0, 40.0)]
+    expected = [(0.0, 15.5), (15.5, 30.5), (30.5, 100.0)]
+    assert rooms(body, pulses) == [pytest.approx(one) for one in expected]
+
+
+def test_windows_behind_the_horizon_leave_no_empty_window_at_its_end() -> None:
+    body = spinner(limits=Limits(horizon=100.0, blackout=((10.0, 100.0), (105.0, 110.0))))
+    assert free_windows(body) == [(0.0, 10.0)]
+    assert free_windows(body, 107.0) == [(0.0, 10.0), (100.0, 105.0)]
