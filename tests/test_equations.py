@@ -12,8 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nutdamp import flight
-from nutdamp.guide import EQUATIONS
-from nutdamp.guide.equation import Equation
+from nutdamp.guide.equation import EQUATIONS, Equation
 from nutdamp.physics import attitude, cones, damping, forced, inertia, rates, stability
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes import SchemeOptions

@@ -1,21 +1,23 @@
-"""The guide that ``nutdamp explain`` shows: topics by name. Texts only, so that it loads fast."""
+"""The guide that ``nutdamp explain`` shows: topics by name. Texts alone, from the Markdown files here."""
 
 from __future__ import annotations
 
 import re
 
 from nutdamp.errors import BadRequest, nearest
-from nutdamp.guide.equation import Equation
-from nutdamp.guide.kreisel import KREISEL, OWN, SOURCES
-from nutdamp.guide.magnus import MAGNUS
-from nutdamp.guide.motion import DISSIPATION, FIGURES, NUTATION
-from nutdamp.guide.schemes import SCHEMES
+from nutdamp.guide.texts import topics
 from nutdamp.guide.topic import Topic
 from nutdamp.guide.units import units_topic
 
-__all__ = ["EQUATIONS", "FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "equation", "found", "meant"]
+__all__ = ["FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "found", "meant"]
 
-EQUATIONS: tuple[Equation, ...] = (*MAGNUS, *KREISEL, *OWN)
+SCHEMES, MOTION = topics("schemes.md"), topics("motion.md")
+
+SOURCES = (
+    'M(n): K. Magnus, "Untersuchungen über zeitabhängig selbsterregte, symmetrische Kreisel", 1970',
+    'K(n): lecture text "Kreisel-Bewegungen"',
+    '24.4: lecture text "Kreiseltheorie", section 24.4',
+)
 
 FILE = "file"
 """Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.files.file_guide`)."""
@@ -28,7 +30,7 @@ SUMMARIES: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Motion",
         (
-            *((topic.name, topic.summary) for topic in (NUTATION, DISSIPATION, FIGURES)),
+            *((topic.name, topic.summary) for topic in MOTION),
             (OVERVIEW, "the numbered equations of the sources, and where they stand in the code"),
             ("17", "one of them: M(1) to M(27) as 1 to 27, K(5) to K(15) as K5 to K15, 24.4"),
         ),
@@ -49,33 +51,35 @@ _NUMBER = re.compile(r"(?P<source>m|k|§)?\s*\(?\s*(?P<number>[0-9]+(\.[0-9]+)?)
 _FIGURE = re.compile(r"(abb|fig)[a-z]*\.?-?[0-9]*")
 
 
-def found(asked: str) -> Topic:
-    """The topic that is asked for by its name or by the number of an equation, but for `FILE` and `OVERVIEW`.
+def found(requested: str) -> Topic:
+    """The topic by its name or by the number of an equation, but for `FILE` and `OVERVIEW`.
 
     Raises BadRequest, which names what is near, where there is none.
     """
-    name = re.sub(r"[\s_]+", "-", asked.strip().casefold())
-    topics = {topic.name: topic for topic in (*SCHEMES, NUTATION, DISSIPATION, FIGURES)}
-    if name in topics:
-        return topics[name]
+    name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
+    known = {topic.name: topic for topic in (*SCHEMES, *MOTION)}
+    if name in known:
+        return known[name]
     if name == "units":
         return units_topic()
     if name == "energy-sink":
-        return DISSIPATION
+        return known["dissipation"]
     if _FIGURE.fullmatch(name):
-        return FIGURES
-    if match := _NUMBER.fullmatch(asked.strip().casefold()):
-        return equation(match["source"] or "", match["number"]).topic
-    raise BadRequest(f"there is no topic {asked!r}; {meant(name, NAMES)}")
+        return known["figures"]
+    if match := _NUMBER.fullmatch(requested.strip().casefold()):
+        return _equation(match["source"] or "", match["number"])
+    raise BadRequest(f"there is no topic {requested!r}; {meant(name, NAMES)}")
 
 
-def equation(source: str, number: str) -> Equation:
-    """The equation of that ``source`` (m, k or §, empty: Magnus) and ``number``; raises BadRequest."""
+def _equation(source: str, number: str) -> Topic:
+    """The topic of the equation of that ``source`` (m, k or §, empty: Magnus) and ``number``; raises BadRequest."""
+    from nutdamp.guide.equation import EQUATIONS
+
     section = "." in number
     name = number if section else f"{source.upper() if source == 'k' else 'M'}({number})"
     for one in EQUATIONS:
         if one.number == name:
-            return one
+            return one.topic
     raise BadRequest(f"there is no equation {name}; there are M(1) to M(27), K(5) to K(15) and 24.4")
 
 

@@ -9,7 +9,7 @@ from rich.constrain import Constrain
 from rich.padding import Padding
 from rich.text import Text
 
-from nutdamp.guide import EQUATIONS, SOURCES, SUMMARIES
+from nutdamp.guide import SOURCES, SUMMARIES
 from nutdamp.guide.topic import Block, Commands, Formula, Rows, Topic
 from nutdamp.presentation.layout import facts
 
@@ -47,7 +47,9 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, where it stands in the code, what differs from the print."""
-    rows = [(one.number, "\n".join(filter(None, [f"{one.subject}: {one.place}", one.changed]))) for one in EQUATIONS]
+    from nutdamp.guide.equation import EQUATIONS
+
+    rows = [(one.number, "\n".join([f"{one.subject}: {one.place}", *one.remarks])) for one in EQUATIONS]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 
