@@ -23,6 +23,9 @@ FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
 DIGITS = 9
 """Digits of a second that are written: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond."""
 
+_J2000 = Fraction(883_655_957_816, 1000)
+"""Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""
+
 _TIME = re.compile(
     r"(?P<year>[0-9]{4})-(?:(?P<month>[0-9]{2})-(?P<day>[0-9]{2})|(?P<day_of_year>[0-9]{3}))"
     r"T(?P<hour>[0-9]{2}):(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}(?:\.[0-9]+)?))?"
@@ -68,6 +71,11 @@ class Epoch:
     def since(self, earlier: Epoch) -> float:
         """SI seconds from another moment to this one."""
         return float(self.elapsed - earlier.elapsed)
+
+    @property
+    def days_of_j2000(self) -> float:
+        """Days since J2000.0, which is 2000-01-01T12:00:00 TT."""
+        return float(self.elapsed - _J2000) / 86400.0
 
     @property
     def text(self) -> str:

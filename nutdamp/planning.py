@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from nutdamp import arguments, compliance, flight, schemes, views, work
+from nutdamp import arguments, aspect, compliance, flight, schemes, views, work
+from nutdamp.aspect import Aspect
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible, NutdampError
 from nutdamp.flight import Flight, Residual
@@ -31,9 +32,9 @@ BUG = "internal error, please report"
 class Plan(views.Tabled):
     """A scheme's schedule for a spacecraft, and how it was judged.
 
-    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the
-    nutation (rad) that this would leave where that is ``worse`` than without pulses. `nutdamp.remarks` has the
-    words of all three.
+    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
+    that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
+    that is ``worse`` than without pulses. `nutdamp.remarks` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
     ``cut``: its search ended at its budget of `work`.
     """
@@ -45,6 +46,7 @@ class Plan(views.Tabled):
     options: schemes.SchemeOptions = field(default_factory=schemes.SchemeOptions)
     failure: Exception | None = None
     breach: Breach | None = None
+    astray: Aspect | None = None
     worse: float | None = None
     from_file: bool = False
     cut: bool = False
@@ -182,6 +184,11 @@ class Plan(views.Tabled):
         mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)))
         return flight.flown(mean, self.pulses).residual.nutation
 
+    @cached_property
+    def aspects(self) -> tuple[Aspect, ...]:
+        """How near the spin axis comes to each direction that is watched, flown; see `aspect.aspects`."""
+        return aspect.aspects(self.flight)
+
     @property
     def hindrance(self) -> Hindrance:
         """What keeps the plan from leaving less nutation."""
@@ -209,7 +216,21 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
             made = judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, chosen), chosen), chosen)
         except Infeasible as reason:
             made = Plan(spacecraft, scheme, None, str(reason))
+        if made.astray is not None and schemes.SCHEMES[scheme].points:
+            made = _routed(made, chosen)
     return replace(made, cut=True) if spent.exhausted else made
+
+
+def _routed(astray: Plan, options: schemes.SchemeOptions) -> Plan:
+    """A plan of the same scheme by another way, on which the spin axis keeps its cones; else the one that does not."""
+    from nutdamp import routing  # few files have cones
+
+    body = astray.spacecraft
+    for made in routing.schedules(known(body, options), astray.scheme, options):
+        plan_ = judged(body, astray.scheme, made, options)
+        if plan_.feasible:
+            return plan_
+    return astray
 
 
 def _spun(spacecraft: Spacecraft) -> bool:
@@ -252,6 +273,10 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes
     breach = next(breaches(spacecraft, made), None)
     if breach is not None:
         return Plan(spacecraft, scheme, None, breach=breach)
+    if spacecraft.goal.axis is not None and scheme in schemes.PLANNED:
+        astray = aspect.broken(spacecraft, flown.flight)
+        if astray is not None:
+            return Plan(spacecraft, scheme, None, astray=astray)
     if scheme in schemes.PLANNED and left is not None and not _helps(flown, left):
         return Plan(spacecraft, scheme, None, worse=left.nutation)
     return flown

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from nutdamp.aspect import Aspect
 from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.limits import Breach, Limit, breaches
 from nutdamp.planning import Plan
@@ -29,7 +30,12 @@ def remarks(plan: Plan) -> tuple[str, ...]:
         notes = (*notes, f"{CUT}: this is the best schedule found so far")
     if plan.flown is None or not len(plan.pulses):
         return notes
-    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan))
+    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan), *_cones(plan))
+
+
+def _cones(plan: Plan) -> Iterator[str]:
+    """Cones that a plan without a target does not keep: it is not its task to."""
+    yield from (f"warning: {_strays(one)}" for one in plan.aspects if not one.kept)
 
 
 def infeasibility(plan: Plan) -> str:
@@ -41,9 +47,22 @@ def infeasibility(plan: Plan) -> str:
 def _infeasibility(plan: Plan) -> str:
     if plan.breach is not None:
         return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
+    if plan.astray is not None:
+        return f"{_strays(plan.astray)}; no way round it was found within the limits"
     if plan.worse is not None:
         return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
     return plan.refusal or ""
+
+
+def _strays(found: Aspect) -> str:
+    """How the spin axis breaks a cone."""
+    keep = found.keep
+    angle, at, bound = (
+        (found.least, found.least_at, f"min = {math.degrees(keep.least):.6g}°")
+        if found.too_near
+        else (found.largest, found.largest_at, f"max = {math.degrees(keep.most):.6g}°")
+    )
+    return f"the spin axis comes to {math.degrees(angle):.4g}° from {keep.name} at {at:.4g} s ({bound})"
 
 
 def said(plan: Plan) -> tuple[str, ...]:

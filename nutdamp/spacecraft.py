@@ -19,6 +19,10 @@ from nutdamp import arguments, views
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
+from nutdamp.demands import Goal as Goal
+from nutdamp.demands import Keep as Keep
+from nutdamp.demands import Limits as Limits
+from nutdamp.demands import Requirement as Requirement
 from nutdamp.epoch import DIGITS, Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
@@ -105,47 +109,6 @@ class Inertia:
 
 
 @dataclass(frozen=True, slots=True)
-class Requirement:
-    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
-
-    ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
-    """
-
-    nutation: float | None = None
-    momentum_shift: float | None = None
-    probability: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Goal:
-    """Where the motion is to end, besides without nutation.
-
-    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
-    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
-    the inertial direction by which a train of pulses keeps its phase; None is along the great circle to ``axis``.
-    """
-
-    axis: Vector | None = None
-    spin: float | None = None
-    sun: Vector | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
-
-    ``horizon`` None stands for `Spacecraft.horizon`'s default.
-    """
-
-    horizon: float | None = None
-    earliest: float = 0.0
-    gap: float = 0.0
-    tick: float | None = None
-    max_pulses: int | None = None
-    blackout: tuple[tuple[float, float], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Disturbance:
     """A torque that nobody commands, in principal body axes.
 
@@ -198,7 +161,8 @@ class Spacecraft(views.Shown):
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
     which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off;
-    ``object_id`` names it in messages; ``source`` is what it was read from, None once a field is replaced.
+    ``object_id`` names it in messages; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep``
+    are cones for the spin axis; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -215,6 +179,8 @@ class Spacecraft(views.Shown):
     goal: Goal = field(default_factory=Goal)
     dispersions: Dispersions | None = None
     object_id: str | None = None
+    sun: Vector | None = None
+    keep: tuple[Keep, ...] = ()
     source: Source | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
@@ -243,6 +209,13 @@ class Spacecraft(views.Shown):
     def to_dict(self) -> dict[str, Any]:
         """What the JSON files say of it."""
         return views.data(self)
+
+    @property
+    def watched(self) -> tuple[Keep, ...]:
+        """The cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
+        if self.sun is None or any(np.array_equal(one.direction, self.sun) for one in self.keep):
+            return self.keep
+        return (*self.keep, Keep("Sun", self.sun))
 
     @property
     def growth(self) -> float:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 LEAP_SECONDS = """
@@ -42,6 +43,14 @@ def start() -> None:
     crawler = jpype.JClass("org.orekit.data.DirectoryCrawler")(jpype.JClass("java.io.File")(str(folder)))
     manager = jpype.JClass("org.orekit.data.DataContext").getDefault().getDataProvidersManager()
     manager.addProvider(crawler)
+
+
+def start_or_skip() -> None:
+    """`start`, or skip the test, and say what was not checked."""
+    try:
+        start()
+    except (ImportError, OSError, ValueError) as reason:  # ValueError: no Java
+        pytest.skip(f"NOT CHECKED against Orekit: pip install 'nutdamp[interop]' ({reason})")
 
 
 def tai_utc() -> str:

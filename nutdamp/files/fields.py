@@ -86,6 +86,27 @@ class AxialShorthand:
         return {"anyOf": [handler(schema), *single["anyOf"]]}
 
 
+class OrWord:
+    """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
+
+    def __init__(self, word: str) -> None:
+        self.word = word
+
+    def check(self, value: object, direction: core_schema.ValidatorFunctionWrapHandler) -> object:
+        """The angles or the word; raises ValueError, which says what would be right."""
+        if value == self.word:
+            return value
+        if not isinstance(value, list):
+            raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
+        return direction(value)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"const": self.word}]}
+
+
 class Section(BaseModel):
     """A mapping of the file: no key that is not named here."""
 

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, ConfigDict, Field, Strict
 from pydantic_core import core_schema
 
 from nutdamp.files.dispersion_models import DispersionsSection
-from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, Quantity, Section
+from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, OrWord, Quantity, Section
 from nutdamp.units import shown
 
 
@@ -54,6 +54,8 @@ Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
 DisturbingTorques = Annotated[Torques, AxialShorthand()]
 Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
 Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Field(min_length=4, max_length=4)]
+InTheSky = Annotated[list[Angle], Field(min_length=2, max_length=2)]
+Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
 Window = Annotated[list[Time], Field(min_length=2, max_length=2)]
 Name = Annotated[str, Field(min_length=1)]
 Epoch = Annotated[str, AfterValidator(_epoch), Field(json_schema_extra={"pattern": f"^{_EPOCH}$"})]
@@ -269,6 +271,24 @@ class DisturbanceSection(Section):
     )
 
 
+class KeepSection(Section):
+    """A cone about a direction in space which the spin axis must not enter, or must not leave, nutation included."""
+
+    name: Name = Field(description="Name of the cone, for reports.", examples=["Earth"])
+    direction: Annotated[InTheSky, OrWord("sun")] = Field(
+        description="Right ascension and declination in the attitude's frame, rad; or sun.",
+        examples=["sun", ["120 deg", "10 deg"]],
+    )
+    min: Apart | None = Field(
+        default=None, description="Least angle to the spin axis, rad; default 0.", examples=["4 deg"]
+    )
+    max: Apart | None = Field(
+        default=None,
+        description="Largest angle between it and the spin axis, rad; default 180 deg.",
+        examples=["20 deg"],
+    )
+
+
 class DissipationSection(Section):
     """Energy dissipation within the body, by flexible parts or liquids."""
 
@@ -344,6 +364,16 @@ class SpacecraftFile(Section):
         default=None,
         description="Where the spin axis and the spin are to end.",
         examples=[{"tilt": "10 deg", "azimuth": "45 deg"}],
+    )
+    sun: Annotated[InTheSky, OrWord("epoch")] | None = Field(
+        default=None,
+        description="Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
+        examples=["epoch", ["120 deg", "10 deg"]],
+    )
+    keep: list[KeepSection] = Field(
+        default=[],
+        description="Cones that the spin axis keeps on its way to a target.",
+        examples=[[{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}]],
     )
     dispersions: DispersionsSection | None = Field(
         default=None,

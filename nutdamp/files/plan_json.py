@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from nutdamp import __version__
+from nutdamp.aspect import Aspect
 from nutdamp.compliance import Part
 from nutdamp.flight import Flight, Residual
 from nutdamp.planning import Comparison, Plan
@@ -72,6 +73,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "flown": residual_json(plan.flown),
         "final": None if schedule is None else final_json(plan.flight),
         "target": target_json(body),
+        **aspects_json(plan.aspects if plan.feasible else ()),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": list(remarks(plan)),
     }
@@ -120,6 +122,24 @@ def target_json(body: Spacecraft) -> dict[str, Any] | None:
     if axis is None and spin is None:
         return None
     return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
+
+
+def aspects_json(found: tuple[Aspect, ...]) -> dict[str, Any]:
+    """How near the spin axis comes to each direction that is watched; nothing for a file that names none."""
+    entries = [
+        {
+            "name": one.keep.name,
+            "least_deg": math.degrees(one.least),
+            "least_s": one.least_at,
+            "largest_deg": math.degrees(one.largest),
+            "largest_s": one.largest_at,
+            "min_deg": math.degrees(one.keep.least),
+            "max_deg": math.degrees(one.keep.most),
+            "kept": one.kept,
+        }
+        for one in found
+    ]
+    return {"aspects": entries} if entries else {}
 
 
 def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:

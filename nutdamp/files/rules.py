@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nutdamp.errors import nearest
 from nutdamp.files.facts import MOMENT, Facts, Finding
 from nutdamp.files.fields import SMALLEST
+from nutdamp.files.sky_rules import sky_findings
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted
 from nutdamp.physics import stability
 from nutdamp.physics.inertia import principal_axes
@@ -43,6 +44,7 @@ def findings(root: Node) -> Iterator[Finding]:
         _dissipation,
         _limits,
         _goal,
+        sky_findings,
     ):
         yield from rule(facts)
 
@@ -64,7 +66,7 @@ def _norm(vector: Vector) -> float:
 
 
 def _names(facts: Facts) -> Iterator[Finding]:
-    lists = ("thrusters", "disturbances")
+    lists = ("thrusters", "disturbances", "keep")
     entries: list[KeyPath] = [(key, index, "name") for key in lists for index, _ in facts.children(key)]
     named = [(path, facts.text(*path), False) for path in (("name",), *entries)]
     named += [(("channels", key), str(key), True) for key, _ in facts.children("channels")]

@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 from nutdamp import __version__, outcome
-from nutdamp.files.plan_json import final_json, pulses_json, residual_json, spacecraft_json, target_json
+from nutdamp.aspect import aspects
+from nutdamp.files.plan_json import aspects_json, final_json, pulses_json, residual_json, spacecraft_json, target_json
 from nutdamp.flight import Flight
 from nutdamp.physics.attitude import full_turn
 from nutdamp.track import Extremes
@@ -32,6 +33,7 @@ def simulation_json(
         "final_by_impulses": final_json(impulses),
         "differ": [one.part.value for one in outcome.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
+        **aspects_json(aspects(flight, found.until)),
         "until_s": found.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,

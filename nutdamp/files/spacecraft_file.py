@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault
 from nutdamp.files.dispersion_models import dispersions
 from nutdamp.files.faults import read_contents
@@ -18,6 +19,7 @@ from nutdamp.files.models import (
     DisturbanceSection,
     GoalSection,
     InertiaSection,
+    KeepSection,
     LimitsSection,
     RequirementSection,
     SpacecraftFile,
@@ -28,7 +30,7 @@ from nutdamp.files.models import (
 from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
 from nutdamp.files.settings import Setting
 from nutdamp.files.yaml_tree import read_text
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, sun
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import (
     Attitude,
@@ -36,6 +38,7 @@ from nutdamp.spacecraft import (
     Disturbance,
     Goal,
     Inertia,
+    Keep,
     Limits,
     Requirement,
     Spacecraft,
@@ -86,7 +89,13 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
     )
-    return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
+    sunward = _sun(contents)
+    return replace(
+        spacecraft,
+        goal=_goal(contents.goal, spacecraft),
+        sun=sunward,
+        keep=tuple(_keep(entry, sunward) for entry in contents.keep),
+    )
 
 
 def _inertia(section: InertiaSection) -> Inertia:
@@ -182,6 +191,23 @@ def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
     if section.right_ascension is not None and section.declination is not None:
         return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
     return Goal(spin=section.spin)
+
+
+def _sun(contents: SpacecraftFile) -> Vector | None:
+    """The direction of the Sun: as given, or at t = 0."""
+    given: list[float] | str | None = contents.sun
+    if not isinstance(given, str):
+        return None if given is None else attitude.on_sphere(*given)
+    assert contents.attitude is not None
+    assert contents.attitude.epoch is not None
+    return sun.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
+
+
+def _keep(section: KeepSection, sunward: Vector | None) -> Keep:
+    given: list[float] | str = section.direction
+    direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
+    assert direction is not None
+    return Keep(section.name, direction, section.min or 0.0, math.pi if section.max is None else section.max)
 
 
 def _limits(section: LimitsSection | None) -> Limits:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from rich.table import Table
 
+from nutdamp.aspect import Aspect, aspects
 from nutdamp.flight import Flight
 from nutdamp.presentation.layout import facts
 from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
@@ -50,8 +52,21 @@ def end_table(flown: Flight) -> Table:
     if lasting:
         end = moment(flown.schedule.end)
         table.add_row("", f"as the last pulse ends, at {end}; changed further by {' and '.join(lasting)}")
+    add_aspects(table, aspects(flown))
     if body.attitude is None:
         table.add_row("", FRAME_N)
     elif body.attitude.frame is not None:
         table.add_row("frame", body.attitude.frame)
     return table
+
+
+def add_aspects(table: Table, found: Iterable[Aspect]) -> None:
+    """How near the spin axis comes to each direction that is watched, and what it is to keep; ✗ where it does not."""
+    for one in found:
+        keep = one.keep
+        least = f"at least {degrees(keep.least)}" if keep.least > 0.0 else ""
+        most = f"at most {degrees(keep.most)}" if keep.most < math.pi else ""
+        bounds = " and ".join(filter(None, (least, most)))
+        mark = "" if one.kept else "✗ "
+        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (one[1:3], one[3:5]))
+        table.add_row(f"axis from {keep.name}", f"{mark}{near} to {far}" + (f" ({bounds})" if bounds else ""))

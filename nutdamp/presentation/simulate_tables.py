@@ -6,8 +6,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.aspect import aspects
 from nutdamp.flight import Flight
-from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts
+from nutdamp.presentation.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import channel_text, header
 from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
@@ -86,6 +87,7 @@ def _extremes(found: Extremes, flight: Flight) -> Table:
         west, east = map(longitude, found.right_ascension)
         table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
         table.add_row("declination", _range(found.declination))
+    add_aspects(table, aspects(flight, found.until))
     table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
     return table
 

@@ -28,10 +28,7 @@ MID_ARC = 1e-5
 
 @pytest.fixture(autouse=True)
 def _installed() -> None:
-    try:
-        orekit.start()
-    except (ImportError, OSError, ValueError) as reason:  # ValueError: no Java
-        pytest.skip(f"NOT CHECKED against Orekit: pip install 'nutdamp[interop]' ({reason})")
+    orekit.start_or_skip()
 
 
 @pytest.fixture(params=[False, True], ids=["kvn", "xml"])

@@ -1,0 +1,97 @@
+"""How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp import flight
+from nutdamp.demands import Keep
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import Spacecraft, Vector
+
+ROWS = 48
+"""Rows in each nutation period; between them the moment is found by a parabola, and the angle is that of the moment."""
+
+TRIED = 4
+"""Of the turns of the axis those at which it is looked at closely."""
+
+SLACK = 1e-9
+"""rad by which a bound may be passed: rounding."""
+
+
+class Aspect(NamedTuple):
+    """The ``least`` and the ``largest`` angle, rad, from the direction of ``keep`` to the spin axis, and when (s)."""
+
+    keep: Keep
+    least: float
+    least_at: float
+    largest: float
+    largest_at: float
+
+    @property
+    def too_near(self) -> bool:
+        """Whether the axis comes nearer than it may."""
+        return self.least < self.keep.least - SLACK
+
+    @property
+    def kept(self) -> bool:
+        """Whether the axis stays as near and as far as it is to."""
+        return not self.too_near and self.largest <= self.keep.most + SLACK
+
+
+def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
+    """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
+
+    Default: one inertial nutation period after the last pulse. A flight that ends earlier is flown on by its model.
+    Raises Infeasible as `flight.flown` does.
+    """
+    body = flown.spacecraft
+    if not body.watched:
+        return ()
+    end = flown.schedule.end + body.inertial_period if until is None else until
+    if flown.legs[-1].end < end:
+        fly = flight.by_impulses if flown.model == flight.IMPULSE_SUM else flight.flown
+        flown = fly(body, flown.schedule, end)
+    period = min(body.inertial_period, body.body_period)
+    pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
+    times = np.concatenate([piece.t for piece in pieces])
+    axis = np.concatenate([piece.axis for piece in pieces])
+    found = []
+    for keep in body.watched:
+        nearness = axis @ keep.direction
+        looked = np.concatenate([_peaks(times, nearness), _peaks(times, -nearness)])
+        angles = attitude.angle_between(_axis(flown, looked), keep.direction)
+        near, far = int(np.argmin(angles)), int(np.argmax(angles))
+        found.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
+    return tuple(found)
+
+
+def _axis(flown: Flight, times: Vector) -> Vector:
+    """The spin axis (n, 3) at ``times`` (n,) s."""
+    _, quaternions = flown.motion(times)
+    return attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, flown.spacecraft.spin)]))
+
+
+def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
+    """The first of the directions to which the axis comes too near, or from which too far; None where there is none."""
+    return next((one for one in aspects(flown) if not one.kept), None) if spacecraft.keep else None
+
+
+def _peaks(times: Vector, values: Vector) -> Vector:
+    """The times at which ``values`` (n,) may be largest: of the largest row, and on parabolas through three in a row.
+
+    Of the parabolas the `TRIED` highest count. Rows at the same time, before and after a jump, are no neighbours.
+    """
+    before, after = np.diff(times)[:-1], np.diff(times)[1:]
+    slope, next_slope = np.diff(values)[:-1], np.diff(values)[1:]
+    peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (slope > 0.0) & (next_slope < 0.0))
+    before, after, slope, next_slope = (one[peaked] for one in (before, after, slope, next_slope))
+    rise, fall = slope / before, next_slope / after
+    way = 0.5 * (rise * after + fall * before) / (rise - fall)
+    heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
+    highest = np.argsort(-heights)[:TRIED]
+    return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

@@ -1,0 +1,62 @@
+"""What is demanded of a plan: what it reaches, and what it keeps on the way. SI and rad, in principal axes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
+
+    ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
+    """
+
+    nutation: float | None = None
+    momentum_shift: float | None = None
+    probability: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where the motion is to end, besides without nutation.
+
+    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
+    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
+    the inertial direction by which a train of pulses keeps its phase; None is along the great circle to ``axis``.
+    """
+
+    axis: Vector | None = None
+    spin: float | None = None
+    sun: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
+
+    ``horizon`` None stands for `Spacecraft.horizon`'s default.
+    """
+
+    horizon: float | None = None
+    earliest: float = 0.0
+    gap: float = 0.0
+    tick: float | None = None
+    max_pulses: int | None = None
+    blackout: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keep:
+    """The spin axis is to stay from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,)."""
+
+    name: str
+    direction: Vector
+    least: float = 0.0
+    most: float = math.pi

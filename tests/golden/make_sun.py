@@ -1,0 +1,24 @@
+"""Writes sun.csv: where the Sun is seen, by ERFA (pip install pyerfa), whose theory errs by some milliarcseconds.
+
+Days since J2000.0 (TT) and the geocentric direction of the Sun in the celestial reference frame, without aberration.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+FILE = Path(__file__).with_name("sun.csv")
+DAYS = np.arange(-10227.0, 36525.0, 467.53)
+"""1972 to 2100."""
+
+if __name__ == "__main__":
+    erfa = import_module("erfa")
+    lines = ["days,x,y,z"]
+    for days in DAYS.tolist():
+        earth = erfa.epv00(2451545.0, days)[0]["p"]
+        x, y, z = (-earth / np.linalg.norm(earth)).tolist()
+        lines.append(f"{days:.2f},{x:.9f},{y:.9f},{z:.9f}")
+    FILE.write_text("\n".join(lines) + "\n", encoding="utf-8")
