@@ -324,7 +324,9 @@ class SpacecraftFile(Section):
         examples=[{"spin": "30 rpm", "nutation": "5 deg"}],
     )
     attitude: AttitudeSection | None = Field(
-        default=None, description="Attitude at t = 0.", examples=[{"quaternion": [1, 0, 0, 0], "frame": "EME2000"}]
+        default=None,
+        description="Attitude at t = 0.",
+        examples=[{"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}],
     )
     object_id: Name | None = Field(
         default=None,

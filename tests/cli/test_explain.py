@@ -124,7 +124,7 @@ def test_figures_as_people_write_them(asked: str) -> None:
         ("K4", "there is no equation K(4)"),
         ("file.thruster", "did you mean 'file.thrusters'?"),
         ("file.horizon", "did you mean 'file.limits.horizon'?"),
-        ("file.x.y", "`nutdamp explain file` lists them"),
+        ("file.qqq.zzz", "`nutdamp explain file` lists them"),
         ("weather", "`nutdamp explain` lists them"),
     ],
 )
@@ -167,6 +167,7 @@ def test_examples_can_be_set() -> None:
     """As --set takes them, on a file that has what they need."""
     omega0 = "name: x\ninertia: {A: 100, C: 80}\nomega0: [0.1, 0, 3]\nthrusters: [{name: T1, torque: [0, 8, 0]},"
     base = omega0 + " {name: T2, torque: [8, 0, 0]}]\n"
+    base += "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z}\nsun: epoch\n"
     chosen = [key for key in keys() if not key.parent and key.name not in ("state", "omega0")]
     assert len(chosen) > 10
     for key in chosen:
