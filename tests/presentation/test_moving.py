@@ -77,8 +77,8 @@ def rows_of(made: Moving) -> tuple[dict[str, Any], dict[str, list[int]]]:
 
 def simulated(run: Run, text: str, made: Moving) -> list[dict[str, str]]:
     """What the command in the caption writes."""
-    (command,) = re.findall(r"nutdamp (simulate .*?) FILE", made.caption)
-    done = run(*shlex.split(command.replace("SPACECRAFT", "-")), "-", "-q", stdin=text)
+    command = " ".join(made.command).replace("SPACECRAFT", "-").removesuffix("FILE")
+    done = run(*shlex.split(command)[1:], "-", "-q", stdin=text)
     assert done.returncode in (0, 4), done.stderr
     return list(csv.DictReader(io.StringIO(done.stdout)))
 

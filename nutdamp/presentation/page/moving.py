@@ -34,6 +34,9 @@ COARSE = 12
 EDGES = (350, 150, 1960, 1760)
 """Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
 
+STEEP = 25.0
+"""Turns of the nutation from which lines are thin."""
+
 STRIP = (2000, 1000)
 """Width and height of the angles over time in units of their SVG."""
 
@@ -67,7 +70,7 @@ class Scale(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within."""
+    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
 
     part: str
     title: str
@@ -75,6 +78,7 @@ class Panel(NamedTuple):
     x: Scale
     y: Scale
     zero: tuple[float, float]
+    frame: tuple[int, int, int, int] = EDGES
 
 
 class Bar(NamedTuple):
@@ -107,7 +111,7 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """What stands still in the view, and what moves as the JSON ``data``."""
+    """What stands still in the view, and what moves as the JSON ``data``; ``command``: what writes the same rows."""
 
     panels: tuple[Panel, ...]
     strip: Strip
@@ -116,7 +120,8 @@ class Moving:
     angles: tuple[str, str]
     named: tuple[Named, ...]
     dated: bool
-    caption: str
+    steep: bool
+    command: tuple[str, ...]
     data: str
 
 
@@ -164,6 +169,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
         "firing": firing,
     }
     utc = _dates(body, track, clock)
+    turns = until / geometry.quickest(flown)
     data: dict[str, Any] = {
         "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
         "until": until,
@@ -175,14 +181,13 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
         "target": target,
         "named": [one._asdict() | {"axis": [round(part, 6) for part in one.axis.tolist()]} for one in named],
         "look": _look(track, named),
-        "dots": until / geometry.quickest(flown) * COARSE > samples,
+        "dots": turns * COARSE > samples,
     }
     speeds, speed = _speeds(until)
     return Moving(
-        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
-        "Each position is one row of the flight through the real pulse widths: "
-        f"nutdamp simulate SPACECRAFT --scheme {scheme} --flown --until {until:.12g} --samples {samples} --csv FILE "
-        "writes them all.",
+        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None, turns > STEEP,
+        ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
+         f"--samples {samples}", "--csv FILE"),
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
     )  # fmt: skip
 
@@ -279,7 +284,8 @@ def _strip(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float
     ]
     prefix, factor = _prefix(high - low)
     level = None if required is None else math.degrees(required)
-    scale = tuple((rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low, high, 5))
+    edge = 0.03 * (high - low)  # a number at the very edge would touch what is above and below
+    scale = tuple((rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low + edge, high - edge, 5))
     strip = Strip(
         times=Scale("time, s", tuple((100.0 * time / until, _number(time)) for time in ticks(0.0, until, 6))),
         angles=Scale(f"{prefix}deg", scale),

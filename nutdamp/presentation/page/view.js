@@ -22,13 +22,44 @@ for (const view of document.querySelectorAll(".moving")) {
     parent.append(made);
     return made;
   };
-  // The rows that are shown, as a line; as dots where the rows are too far apart for one.
-  const line = (xs, ys, shown = () => true, dots = false) => {
+  const always = () => true;
+  // Points that are shown, joined by straight lines.
+  const line = (xs, ys, shown = always) => {
     const parts = [];
     let drawing = false;
     for (let row = 0; row < xs.length; row += 1) {
       const now = shown(row);
-      if (now) parts.push(dots ? `M${xs[row]} ${ys[row]}h0` : `${drawing ? "L" : "M"}${xs[row]} ${ys[row]}`);
+      if (now) parts.push(`${drawing ? "L" : "M"}${xs[row]} ${ys[row]}`);
+      drawing = now;
+    }
+    return parts.join("");
+  };
+  // Where a pulse begins or ends the path may have a corner.
+  const corner = (row) => row === 0 || row === last
+    || (fires(row) && (rows.firing[row - 1] !== rows.firing[row] || rows.firing[row + 1] !== rows.firing[row]));
+  // From row to row by how much each third of a smooth curve through the rows goes: the ends of both handles.
+  const handles = (values, row) => {
+    const duration = rows.t[row + 1] - rows.t[row];
+    const whole = values[row + 1] - values[row];
+    const way = (at) => (values[at + 1] - values[at - 1]) / (rows.t[at + 1] - rows.t[at - 1]) * duration;
+    const [sharp, sharpNext] = [corner(row), corner(row + 1)];
+    const end = sharpNext ? (sharp ? whole : 2 * whole - way(row)) : way(row + 1);
+    const start = sharp ? 2 * whole - end : way(row);
+    return [(values[row] + start / 3).toFixed(1), (values[row + 1] - end / 3).toFixed(1)];
+  };
+  // The path of rows that are shown, smooth; as dots where the rows are too far apart for a line.
+  const curve = (xs, ys, shown = always) => {
+    const parts = [];
+    let drawing = false;
+    for (let row = 0; row <= last; row += 1) {
+      const now = shown(row);
+      const [x, y] = [xs[row].toFixed(1), ys[row].toFixed(1)];
+      if (now && data.dots) parts.push(`M${x} ${y}h0`);
+      else if (now && !drawing) parts.push(`M${x} ${y}`);
+      else if (now) {
+        const [across, along] = [handles(xs, row - 1), handles(ys, row - 1)];
+        parts.push(`C${across[0]} ${along[0]} ${across[1]} ${along[1]} ${x} ${y}`);
+      }
       drawing = now;
     }
     return parts.join("");
@@ -38,14 +69,14 @@ for (const view of document.querySelectorAll(".moving")) {
   const place = (mark, x, y) => mark.setAttribute("transform", `translate(${x} ${y})`);
 
   const pole = part("pole-curves");
-  make(pole, "path", { class: "axis", d: line(rows.pole1, rows.pole2, undefined, data.dots) });
-  make(pole, "path", { class: "fires", d: line(rows.pole1, rows.pole2, fires) });
+  make(pole, "path", { class: "axis", d: curve(rows.pole1, rows.pole2) });
+  make(pole, "path", { class: "fires", d: curve(rows.pole1, rows.pole2, fires) });
   const atPole = make(pole, "circle", { class: "cursor", r: 42 });
 
   const sky = part("sky-curves");
-  make(sky, "path", { class: "axis", d: line(rows.sky1, rows.sky2, undefined, data.dots) });
-  make(sky, "path", { class: "fires", d: line(rows.sky1, rows.sky2, fires) });
-  make(sky, "path", { class: "momentum", d: line(rows.momentum1, rows.momentum2) });
+  make(sky, "path", { class: "axis", d: curve(rows.sky1, rows.sky2) });
+  make(sky, "path", { class: "fires", d: curve(rows.sky1, rows.sky2, fires) });
+  make(sky, "path", { class: "momentum", d: curve(rows.momentum1, rows.momentum2) });
   if (data.target) place(make(sky, "path", { class: data.named[0].kind, d: DIAMOND }), ...data.target);
   const momentumAtSky = make(sky, "path", { class: "cursor", d: CROSS });
   const atSky = make(sky, "circle", { class: "cursor", r: 42 });
@@ -97,7 +128,7 @@ for (const view of document.querySelectorAll(".moving")) {
     x / SPHERE, rows[`${name}2`][row] / SPHERE, rows[`${name}3`][row] / SPHERE,
   ]);
   const axes = vectors("axis"), momenta = vectors("H");
-  // What lies on the sphere: points, how they look, which rows of them; a line behind it is drawn faint.
+  // What lies on the sphere: points, how they look, which rows of them and how joined; behind it lines are faint.
   const lines = [];
   const lay = (points, look, options = {}) => {
     const back = options.back === false ? null : make(globe, "path", { class: `${look} behind` });
@@ -110,9 +141,9 @@ for (const view of document.querySelectorAll(".moving")) {
     ...count(12, 30).map((lon) => count(33, 5, -80).map((lat) => onSphere(lon, lat))),
     ...count(5, 30, -60).map((lat) => count(73, 5).map((lon) => onSphere(lon, lat))),
   ];
-  lay(axes, "axis", { dots: data.dots });
-  lay(axes, "fires", { shown: fires, back: false });
-  lay(momenta, "momentum");
+  lay(axes, "axis", { draw: curve });
+  lay(axes, "fires", { draw: curve, shown: fires, back: false });
+  lay(momenta, "momentum", { draw: curve });
   for (const one of data.named) if (one.radius > 0) lay(around(one.axis, one.radius), one.kind);
   const signs = data.named.map((one) => ({
     name: one.name,
@@ -134,19 +165,18 @@ for (const view of document.querySelectorAll(".moving")) {
     mark.setAttribute("opacity", depth < 0 ? 0.4 : 1);
     return depth >= 0;
   };
-  const drawn = (points, shown, dots) => {
+  const drawn = (points, draw = line, shown = always) => {
     const flat = points.map(see);
-    const side = (sign) => line(
-      flat.map((one) => one[0].toFixed(1)), flat.map((one) => one[1].toFixed(1)),
-      (row) => sign * flat[row][2] >= 0 && (!shown || shown(row)), dots,
-    );
+    const part = (index) => flat.map((one) => Number(one[index].toFixed(1)));
+    const [xs, ys] = [part(0), part(1)];
+    const side = (sign) => draw(xs, ys, (row) => sign * flat[row][2] >= 0 && shown(row));
     return { flat, front: side(1), back: () => side(-1) };
   };
   const drawGlobe = () => {
     aim();
     graticule.setAttribute("d", meridians.map((points) => drawn(points).front).join(""));
     for (const one of lines) {
-      const made = drawn(one.points, one.shown, one.dots);
+      const made = drawn(one.points, one.draw, one.shown);
       one.front.setAttribute("d", made.front);
       if (one.back) one.back.setAttribute("d", made.back());
       if (one.points === axes) seen = made.flat;
