@@ -23,7 +23,8 @@ from nutdamp.planning import compare
 from nutdamp.presentation.page import moving
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html
-from nutdamp.presentation.page.moving import EDGES, MOST_ROWS, NONE, SPHERE, Moving, Named, moving_of
+from nutdamp.presentation.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
+from nutdamp.presentation.page.scales import EDGES
 from nutdamp.schemes import CLASSIC
 
 PAGE = Path(moving.__file__).parent
@@ -226,25 +227,52 @@ def test_without_nutation_everything_stands_still() -> None:
 
 
 def test_the_target_is_a_mark_and_a_circle() -> None:
-    made = view(TARGET)
-    data, _ = rows_of(made)
+    data, _ = rows_of(view(TARGET))
     (named,) = data["named"]
-    assert (named["name"], named["kind"], named["radius"]) == ("target", "target", pytest.approx(math.radians(4)))
+    assert (named["name"], named["kind"]) == ("target", "target")
+    assert named["circles"] == [{"radius": pytest.approx(math.radians(4)), "kind": "target"}]
     x, y, z = named["axis"]
     assert math.degrees(math.atan2(y, x)) == pytest.approx(20, abs=1e-3)
     assert math.degrees(math.asin(z)) == pytest.approx(-30, abs=1e-3)
     assert data["target"] is not None
 
 
+def test_sun_and_cones_of_the_file_are_on_the_globe(run: Run) -> None:
+    text = (
+        TARGET
+        + """sun: [100 deg, 10 deg]
+keep:
+  - {name: Sun </script>, direction: sun, min: 4 deg, max: 170 deg}
+  - {name: pole, direction: [0 deg, 90 deg], min: 2 deg}
+"""
+    )
+    made = view(text)
+    assert "</script" not in made.data
+    data, rows = rows_of(made)
+    _, sun, pole = data["named"]
+    assert (sun["name"], pole["name"]) == ("Sun </script>", "pole")
+    assert [(one["kind"], round(math.degrees(one["radius"]), 6)) for one in sun["circles"]] == [
+        ("keep-out", 4.0),
+        ("keep-in", 170.0),
+    ]
+    assert pole["axis"] == [0.0, 0.0, 1.0]
+    track = simulated(run, text, made)
+    for name, direction in (("aspect1", sun["axis"]), ("aspect2", pole["axis"])):
+        for row, shown in zip(track, rows[name], strict=True):
+            cosine = sum(float(row[f"axis_{part}"]) * along for part, along in zip("xyz", direction, strict=True))
+            assert math.cos(math.radians(shown / 1e4)) == pytest.approx(cosine, abs=4e-6)
+    only = TARGET + "sun: [100 deg, 10 deg]\n"
+    assert [one["name"] for one in json.loads(view(only).data)["named"]] == ["target", "Sun"]
+
+
 def test_further_circles_are_taken_as_data() -> None:
     chosen = compare(read_spacecraft(TARGET, "a.yaml"), CLASSIC).recommended
     assert chosen is not None
-    sun = Named("Sun </script>", np.array([0.0, 0.6, 0.8]), math.radians(20), "keep-out")
-    made = moving.moving(chosen.flight, 60.0, chosen.scheme, [*moving.named_directions(chosen.spacecraft), sun])
-    assert "</script" not in made.data
-    assert json.loads(made.data)["named"][1] == {
-        "name": "Sun </script>", "kind": "keep-out", "axis": [0.0, 0.6, 0.8], "radius": math.radians(20)
-    }  # fmt: skip
+    star = Named("star", np.array([0.0, 0.6, 0.8]), "watched", (Circle("near it", 0.2, "keep-out"),))
+    made = moving.moving(chosen.flight, 60.0, chosen.scheme, [star])
+    assert json.loads(made.data)["named"] == [
+        {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]}
+    ]
 
 
 @pytest.mark.parametrize("until", [1e-3, 2.0, 89.3, 4321.0, 1e7])

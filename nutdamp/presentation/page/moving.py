@@ -1,4 +1,4 @@
-"""The view of the motion that the script of a page moves: its rows as whole numbers, and the scales around them.
+"""The view of the motion that the script of a page moves: its rows as whole numbers.
 
 The script only reads rows and draws them: each number that it shows is one row of the track, rounded here.
 """
@@ -18,10 +18,10 @@ from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning import Plan
 from nutdamp.presentation import geometry
-from nutdamp.presentation.braille import ticks
 from nutdamp.presentation.end_tables import angle_names, angle_texts
+from nutdamp.presentation.page.scales import Panel, Strip, panel, placed, strip_of
 from nutdamp.presentation.plan_tables import channel_text
-from nutdamp.presentation.text import MISSING
+from nutdamp.presentation.text import MISSING, most
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.track import Track
 
@@ -31,23 +31,14 @@ ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 COARSE = 12
 """Rows in a turn below which a line from row to row is no picture of the path, and dots are drawn."""
 
-EDGES = (350, 150, 1960, 1760)
-"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
-
 STEEP = 25.0
 """Turns of the nutation from which lines are thin."""
-
-STRIP = (2000, 1000)
-"""Width and height of the angles over time in units of their SVG."""
 
 SPHERE = 10_000
 """Length of a unit vector of the globe as whole numbers: 0.006 deg."""
 
 ANGLE_DIGITS = 4
 """Decimals of degrees; more where the largest nutation has not so many figures."""
-
-PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
-"""Prefixes of units with their factors, and the largest number of a scale that needs another one."""
 
 FAR = 4.0
 """How far a target may lie from H(0) to be in the panel of the axis track, as a multiple of the track."""
@@ -58,55 +49,26 @@ NONE = -(10**8)
 QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
 """Seconds that playing takes at the quickest, at first, and at the slowest."""
 
-Mark = tuple[float, str]
-"""A place on a scale, and the number there."""
 
-
-class Scale(NamedTuple):
-    """A scale with its name and marks."""
+class Circle(NamedTuple):
+    """A circle of ``radius`` rad on the globe; ``kind`` styles it."""
 
     name: str
-    marks: tuple[Mark, ...]
-
-
-class Panel(NamedTuple):
-    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
-
-    part: str
-    title: str
-    described: str
-    x: Scale
-    y: Scale
-    zero: tuple[float, float]
-    frame: tuple[int, int, int, int] = EDGES
-
-
-class Bar(NamedTuple):
-    """A firing in the row of its channel, in units of the SVG."""
-
-    row: int
-    start: float
-    width: float
-
-
-class Strip(NamedTuple):
-    """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG."""
-
-    times: Scale
-    angles: Scale
-    zero: float
-    required: float | None
-    channels: tuple[str, ...]
-    bars: tuple[Bar, ...]
+    radius: float
+    kind: str
 
 
 class Named(NamedTuple):
-    """A direction on the globe, (3,) inertial, with the circle of ``radius`` rad around it; ``kind`` styles it."""
+    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
+
+    ``watched``: the angle from it to the spin axis is shown.
+    """
 
     name: str
     axis: Vector
-    radius: float = 0.0
-    kind: str = "target"
+    kind: str
+    circles: tuple[Circle, ...] = ()
+    watched: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +96,19 @@ def moving_of(plan: Plan) -> Moving:
 
 
 def named_directions(body: Spacecraft) -> tuple[Named, ...]:
-    """What the globe shows besides the track."""
+    """What the globe shows besides the track: the target, the Sun, the cones that the spin axis keeps."""
     found = []
-    goal, required = body.goal, body.requirement
-    if goal.axis is not None:
-        found.append(Named("target", goal.axis, (required.momentum_shift or 0.0) if required else 0.0))
-    if goal.sun is not None:
-        found.append(Named("Sun", goal.sun, kind="sun"))
+    if body.goal.axis is not None:
+        shift = None if body.requirement is None else body.requirement.momentum_shift
+        circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
+        found.append(Named("target", body.goal.axis, "target", circles))
+    for keep in body.watched:
+        bounds = []
+        if keep.least > 0.0:
+            bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))
+        if keep.most < math.pi:
+            bounds.append(Circle(f"axis at most {most(keep.most)} from {keep.name}", keep.most, "keep-in"))
+        found.append(Named(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
     return tuple(found)
 
 
@@ -154,7 +122,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
     body, samples = flown.spacecraft, samples_for(flown, until)
     track = flown.sampled(samples, until)
     panels, columns, target = _panels(flown, track, named)
-    strip, span = _strip(flown, track, until)
+    strip, span = strip_of(flown, track, until)
     firing, texts = _firing(flown, track)
     cone = _angle_digits(track)
     clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
@@ -168,6 +136,8 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
         **_named_columns("angle", _pointing(body, track.axis)),
         "firing": firing,
     }
+    for number, one in enumerate((one for one in named if one.watched), start=1):
+        columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, one.axis)), ANGLE_DIGITS)
     utc = _dates(body, track, clock)
     turns = until / geometry.quickest(flown)
     data: dict[str, Any] = {
@@ -179,7 +149,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
         "firings": texts,
         "utc": utc,
         "target": target,
-        "named": [one._asdict() | {"axis": [round(part, 6) for part in one.axis.tolist()]} for one in named],
+        "named": [_mark(one) for one in named],
         "look": _look(track, named),
         "dots": turns * COARSE > samples,
     }
@@ -205,15 +175,15 @@ def _panels(
     sense = ", spin about −3" if body.spin < 0.0 else ""
     axes = "" if body.inertia.aligned else ", principal axes"
     panels = (
-        _panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
-        _panel("sky", "Axis track: spin axis in space", sky_room, geometry.sky_names(flown)),
+        panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
+        panel("sky", "Axis track: spin axis in space", sky_room, geometry.sky_names(flown)),
     )
     columns = {
-        **_named_columns("pole", _placed(pole, *pole_room)),
-        **_named_columns("sky", _placed(sky, *sky_room)),
-        **_named_columns("momentum", _placed(momentum, *sky_room)),
+        **_named_columns("pole", placed(pole, *pole_room)),
+        **_named_columns("sky", placed(sky, *sky_room)),
+        **_named_columns("momentum", placed(momentum, *sky_room)),
     }
-    return panels, columns, [column[0] for column in _placed(target, *sky_room)] if len(target) else None
+    return panels, columns, [column[0] for column in placed(target, *sky_room)] if len(target) else None
 
 
 def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
@@ -221,80 +191,21 @@ def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[in
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
 
 
+def _mark(one: Named) -> dict[str, Any]:
+    """A direction as the script takes it."""
+    return {
+        "name": one.name,
+        "kind": one.kind,
+        "axis": [round(part, 6) for part in one.axis.tolist()],
+        "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in one.circles],
+    }
+
+
 def _target(flown: Flight, track: Track, named: Sequence[Named], paths: Vector) -> Vector:
     """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
     found = geometry.sky_target(flown, track)
     reach = FAR * float(np.hypot(*paths.T).max())
     return found if named and len(found) and float(np.hypot(*found[0])) <= reach else np.empty((0, 2))
-
-
-def _placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
-    """Two columns: the places of ``points`` (n, 2) in a panel."""
-    left, top, right, bottom = EDGES
-    part = (points - middle + half) / (2.0 * half)
-    across = left + part[:, 0] * (right - left), bottom - part[:, 1] * (bottom - top)
-    return [np.rint(column).astype(int).tolist() for column in across]
-
-
-def _panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, str]) -> Panel:
-    middle, half = room
-    prefix, factor = _prefix(half)
-    names = names[0].replace(", deg", f", {prefix}deg"), names[1].replace(", deg", f", {prefix}deg")
-    marks = []
-    for which in (0, 1):
-        low, high = float(middle[which]) - half, float(middle[which]) + half
-        values = np.array(ticks(low, high, 5))
-        both = np.column_stack([values, values])
-        places = _placed(both, middle[[which, which]], half)[which]
-        marks.append(tuple(zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)))
-    zero = _placed(np.zeros((1, 2)), middle, half)
-    described = f"{title}; {names[0]} to the right, {names[1]} upwards"
-    x, y = (Scale(name, mark) for name, mark in zip(names, marks, strict=True))
-    return Panel(part, title, described, x, y, (zero[0][0], zero[1][0]))
-
-
-def _prefix(largest: float) -> tuple[str, float]:
-    """The prefix of a unit that keeps numbers up to ``largest`` short, and the factor by which they grow."""
-    return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
-
-
-def _strip(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
-    """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
-    body = flown.spacecraft
-    angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
-    low, high = float(angles.min()), float(angles.max())
-    margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
-    low, high = low - margin, high + margin
-    width, height = STRIP
-
-    def rise(angle: float) -> float:
-        return round(height * (high - angle) / (high - low), 1)
-
-    required = None if body.requirement is None else body.requirement.nutation
-    used = dict.fromkeys(pulse.channel for pulse in flown.schedule)
-    order = {channel.name: place for place, channel in enumerate(body.channels)}
-    channels = tuple(sorted(used, key=lambda name: order.get(name, -1)))
-    bars = [
-        Bar(channels.index(pulse.channel), round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
-        for pulse, (begins, ends) in zip(flown.schedule, flown.spans, strict=True)
-    ]
-    prefix, factor = _prefix(high - low)
-    level = None if required is None else math.degrees(required)
-    edge = 0.03 * (high - low)  # a number at the very edge would touch what is above and below
-    scale = tuple((rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low + edge, high - edge, 5))
-    strip = Strip(
-        times=Scale("time, s", tuple((100.0 * time / until, _number(time)) for time in ticks(0.0, until, 6))),
-        angles=Scale(f"{prefix}deg", scale),
-        zero=rise(0.0),
-        required=rise(level) if level is not None and low < level < high else None,
-        channels=channels,
-        bars=tuple(bars),
-    )
-    return strip, [low, high]
 
 
 def _angle_digits(track: Track) -> int:

@@ -144,7 +144,7 @@ for (const view of document.querySelectorAll(".moving")) {
   lay(axes, "axis", { draw: curve });
   lay(axes, "fires", { draw: curve, shown: fires, back: false });
   lay(momenta, "momentum", { draw: curve });
-  for (const one of data.named) if (one.radius > 0) lay(around(one.axis, one.radius), one.kind);
+  for (const one of data.named) for (const { radius, kind } of one.circles) lay(around(one.axis, radius), kind);
   const signs = data.named.map((one) => ({
     name: one.name,
     axis: one.axis,
@@ -181,12 +181,19 @@ for (const view of document.querySelectorAll(".moving")) {
       if (one.back) one.back.setAttribute("d", made.back());
       if (one.points === axes) seen = made.flat;
     }
+    const taken = [];
     for (const one of signs) {
       const [x, y] = see(one.axis);
       const left = x > MIDDLE;
-      one.text.textContent = put(one.mark, one.axis) ? one.name : `${one.name}, behind`;
+      const name = put(one.mark, one.axis) ? one.name : `${one.name}, behind`;
+      const [wide, tall] = [name.length * 50, 80];
+      const begins = left ? x - 75 - wide : x + 75;
+      let down = y + 28;
+      while (taken.some((box) => begins < box[1] && box[0] < begins + wide && Math.abs(box[2] - down) < tall)) down += tall;
+      taken.push([begins, begins + wide, down]);
+      one.text.textContent = name;
       one.text.setAttribute("class", left ? "end" : "");
-      place(one.text, x + (left ? -75 : 75), y + 28);
+      place(one.text, x + (left ? -75 : 75), down);
     }
     for (const one of numbers) one.text.setAttribute("visibility", put(one.text, one.axis) ? "visible" : "hidden");
     put(momentumAtGlobe, momenta[current]);
@@ -202,7 +209,7 @@ for (const view of document.querySelectorAll(".moving")) {
     const firing = data.firings[rows.firing[current]];
     part("t").textContent = t;
     for (const name of ["theta", "mu", "lambda"]) part(name).textContent = angle(name);
-    for (const name of ["angle1", "angle2"]) {
+    for (const name of Object.keys(rows).filter((key) => /^(angle|aspect)/.test(key))) {
       const value = rows[name][current];
       part(name).textContent = number(value, data.digits.angle) + (value === data.none ? "" : "°");
     }
