@@ -94,7 +94,8 @@ class Flight(Tabled):
 
     ``moments`` are those flown with; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
     the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
-    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse.
+    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``
+    is what planned it, empty where that is not known.
     """
 
     spacecraft: Spacecraft
@@ -106,6 +107,7 @@ class Flight(Tabled):
     model: str = REAL_WIDTHS
     until: float | None = None
     samples: int = 1000
+    scheme: str = ""
 
     @property
     def steps(self) -> int:

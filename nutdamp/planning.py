@@ -105,7 +105,7 @@ class Plan(views.Tabled):
         end = arguments.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
         count = arguments.rows(samples)
         fly = flight.by_impulses if by_impulses else flight.flown
-        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count)
+        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
 
     @cached_property
     def residual(self) -> Residual | None:

@@ -22,7 +22,7 @@ from process import Run
 from nutdamp import planning, rounding
 from nutdamp.files.plan_json import final_json, plan_json, target_json
 from nutdamp.physics import attitude
-from nutdamp.presentation.figures import timeline_figure
+from nutdamp.presentation import figures
 from nutdamp.presentation.plan_tables import channel_text, pulse_table
 from nutdamp.presentation.text import longitude, steering, vector
 from nutdamp.schedule import Schedule, steerable_pulse
@@ -192,7 +192,7 @@ def test_a_steering_angle_is_the_same_everywhere() -> None:
     assert torquer is not None
     pulse = steerable_pulse(torquer, 1.0, math.radians(-70.123), on_time=0.5)
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = timeline_figure(planning.Plan(body, "x", Schedule((pulse,))).flight)
+    figure = figures.flight_figure("timeline", *figures.shown(planning.Plan(body, "x", Schedule((pulse,)))))
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert any("289.88°" in text for text in texts)
     assert steering([1.0, -1e-9]) == "0.00°"

@@ -28,7 +28,7 @@ from nutdamp.schemes import Options
 @flown_options("Show")
 @goal_options
 @click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
-@click.option("--until", type=Quantity("time"), help="End of the motion; default last pulse + one inertial period.")
+@click.option("--until", type=Quantity("time"), help="End of the motion; default soon after the last pulse.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
 @click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
 @click.option(
@@ -64,8 +64,9 @@ def command(
     pulses = plan_or_read(body, flown, options, remark, quiet=quiet).pulses
 
     from nutdamp import flight
+    from nutdamp.presentation.geometry import shown_until
 
-    end = pulses.end + body.inertial_period if until is None else until
+    end = shown_until(body, pulses) if until is None else until
     timed = animation.timing(body, end, fps, seconds)
     if not timed.smooth:
         remark(

@@ -103,14 +103,11 @@ def placed(wrong: Unsuitable, given: Input) -> NutdampError:
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
-def plot_options(command: Command) -> Command:
-    """``--plot FILE`` and which picture it is to be."""
-    for option in (
-        click.option("--figure", type=Named(FIGURES), default=FIGURES[0], show_default=True, help="What --plot draws."),
-        click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot)."),
-    ):
-        command = option(command)
-    return command
+def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """``--plot FILE`` and which of the pictures ``names`` it is to be, the default first."""
+    which = click.option("--figure", type=Named(names), default=names[0], show_default=True, help="What --plot draws.")
+    where = click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+    return lambda command: where(which(command))
 
 
 def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:

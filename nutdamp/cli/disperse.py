@@ -20,6 +20,7 @@ from nutdamp.cli.common import (
     flown_options,
     load,
     plan_or_read,
+    plot_options,
     quiet_option,
     remarks,
     require_dispersions,
@@ -63,7 +64,7 @@ SAVED_EVERY = 30.0
 )
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
-@click.option("--plot", type=FILE, help="Draw histograms and CDFs (.png, .svg, .pdf; needs the extra plot).")
+@plot_options(("overview", "cases", "momentum", "budget"))
 @click.option("--resume", type=FILE, help="Keep what is done in this file, and go on from it if it is there.")
 @quiet_option
 def command(
@@ -82,6 +83,7 @@ def command(
     csv: str | None,
     json: str | None,
     plot: str | None,
+    figure: str,
     resume: str | None,
     quiet: bool,
 ) -> None:
@@ -98,7 +100,7 @@ def command(
     if resume == "-":
         raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
     silent = expect_outputs(spacecraft, flown.schedule, csv=csv, json=json, plot=plot, resume=resume)
-    expect_picture(plot)
+    expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
     expect_places(csv, json, plot, resume)
@@ -127,7 +129,7 @@ def command(
         from nutdamp.presentation import figures
 
         assert plot is not None
-        return figures.rendered(figures.dispersion_figure(results, scheme=plan.scheme), plot)
+        return figures.rendered(figures.dispersion_figure(figure, results, scheme=plan.scheme), plot)
 
     def screen() -> RenderableType:
         from nutdamp.presentation.dispersion_tables import dispersion_screen

@@ -10,6 +10,7 @@ import click
 
 from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED
 from nutdamp.cli.common import (
+    FIGURES,
     Input,
     Output,
     deliver,
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
     from nutdamp.robust import RobustComparison
 
 
+SCHEMES = "schemes"
+"""The picture of all plans; the others are of one."""
+
+
 @click.command("plan", cls=PlanningCommand)
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=Named(PLANNED), help="Plan it alone; repeatable.")
@@ -48,7 +53,7 @@ if TYPE_CHECKING:
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
-@plot_options
+@plot_options((*FIGURES, SCHEMES))
 @quiet_option
 def command(
     spacecraft: Input,
@@ -72,7 +77,8 @@ def command(
     """
     names = tuple(dict.fromkeys(names))
     expect_impulses(impulses, force, robust, "--robust")
-    for option, path in (("--csv", csv), ("--plot", plot)):
+    one_plan = plot if figure != SCHEMES else None
+    for option, path in (("--csv", csv), ("--plot", one_plan)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
     silent = expect_outputs(spacecraft, csv=csv, table=table, json=json, plot=plot)
@@ -95,7 +101,7 @@ def command(
     dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
-    for path in (csv, plot):
+    for path in (csv, one_plan):
         if path is not None and chosen is None:
             say(f"{path} was not written: no plan is feasible")
 
@@ -112,7 +118,9 @@ def command(
 
     outputs: list[Output] = [(json, data), (table, partial(_schemes, compared, decided))]
     if chosen is not None:
-        outputs += [(csv, partial(_pulses, chosen)), (plot, partial(_picture, chosen, figure, plot))]
+        outputs += [(csv, partial(_pulses, chosen)), (one_plan, partial(_picture, chosen, figure, one_plan))]
+    if figure == SCHEMES:
+        outputs.append((plot, partial(_schemes_picture, compared, decided, plot)))
     if silent:
         from nutdamp.presentation import verdicts
 
@@ -154,6 +162,13 @@ def _picture(chosen: Plan, figure: str, path: str | None) -> bytes:
 
     assert path is not None
     return figures.plan_picture(figure, chosen, path)
+
+
+def _schemes_picture(compared: Comparison, decided: Decision | None, path: str | None) -> bytes:
+    from nutdamp.presentation import figures
+
+    assert path is not None
+    return figures.rendered(figures.schemes_figure(compared, decided), path)
 
 
 def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import IO, TYPE_CHECKING, Any
 
 import click
 
 from nutdamp.cli.common import (
+    FIGURES,
     Flown,
     Input,
     deliver,
@@ -51,7 +53,7 @@ PICTURED = 100_000
 )
 @click.option("--csv", type=FILE, help="Write the track.")
 @click.option("--json", type=FILE, help="Write pulses, how both models end, and extremes.")
-@plot_options
+@plot_options(FIGURES)
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option
 def command(
@@ -86,6 +88,7 @@ def command(
 
     from nutdamp import flight
     from nutdamp.outcome import seen_at
+    from nutdamp.presentation.geometry import shown_until
     from nutdamp.track import extremes
 
     plan = plan_or_read(body, flown, options, remark, quiet=quiet)
@@ -93,9 +96,10 @@ def command(
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
     ends = tuple(seen_at(one, end) for one in flights)
-    moving, chosen = flights[real], ends[real]
+    moving, chosen = flights[real], replace(ends[real], scheme=plan.scheme)
+    pictured = shown_until(body, pulses) if until is None else until
     found = extremes(moving.pieces(samples, end))
-    track = moving.sampled(min(samples, PICTURED), end) if plot is not None or drawn else None
+    track = moving.sampled(min(samples, PICTURED), pictured) if plot is not None or drawn else None
 
     def rows() -> Callable[[IO[bytes]], None]:
         from nutdamp.files.track_csv import write_track

@@ -110,7 +110,7 @@ def _(flight: Flight, name: str) -> Figure:
 
     arguments.instance("name", name, str, "the name of a figure")
     try:
-        return figures.named(name, flight, flight.sampled(flight.samples, flight.shown_to))
+        return figures.flight_figure(name, flight, flight.sampled(flight.samples, figures.until(flight)))
     except KeyError:
         raise BadRequest(f"there is no figure {name!r}") from None
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -105,39 +106,57 @@ def _requirement(results: Results) -> list[RenderableType]:
     return [text]
 
 
+class BudgetRow(NamedTuple):
+    """A line of the tolerance budget: one input, or those that are left together.
+
+    ``size``: one sigma or the bias as text; ``effects``: what it alone does to the two `_budgeted` outputs, rad;
+    ``inputs``: rows of the drawn inputs; ``bias``: nothing of it varies.
+    """
+
+    name: str
+    size: str
+    effects: tuple[float, float]
+    inputs: list[int]
+    bias: bool
+
+
+def budget_rows(study: Study) -> list[BudgetRow]:
+    """The inputs that count most, the largest first, and the others together; none where nothing varies."""
+    inputs, first = study.model.inputs.drawn, study.first_order
+    if not any(entry.sigma for entry in inputs):
+        return []
+    outputs = [output for output, _ in _budgeted(study)]
+    effects = np.array([first.effects(output) for output in outputs])
+    scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
+    order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
+    named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
+    groups = [(inputs[row].name, size_text(inputs[row]), [row]) for row in named]
+    if named != order:
+        groups.append((f"{len(order) - len(named)} others", "", order[len(named) :]))
+    rows = []
+    for name, size, members in groups:
+        nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
+        rows.append(BudgetRow(name, size, (nutation, aim), members, not any(inputs[row].sigma for row in members)))
+    return rows
+
+
 def _budget(results: Results) -> list[RenderableType]:
     """Shares of the variance by input, by first order and by the cases, and which tolerance dominates."""
-    study = results.study
-    inputs = study.model.inputs.drawn
-    if not any(entry.sigma for entry in inputs):
+    study, rows = results.study, budget_rows(results.study)
+    if not rows:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
-    first, sampled = study.first_order, results.shares
-    budgeted = _budgeted(study)
+    inputs, first, sampled, budgeted = study.model.inputs.drawn, study.first_order, results.shares, _budgeted(study)
     shares = {output: first.shares(output) for output, _ in budgeted}
-    effects = tuple(np.degrees(first.effects(output)) for output, _ in budgeted)
-    weight = np.max([first.effects(output) / max(first.sigma(output), TINY) for output, _ in budgeted], axis=0)
-    order = np.argsort(-weight, kind="stable")
     aim = "H shift" if study.model.spacecraft.goal.axis is None else "axis err"
     heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
     table = columns("input\n", "one sigma\nor bias", *heads)
-
-    def cells(rows: Sequence[int]) -> list[str]:
-        texts = []
-        for (output, _), effect in zip(budgeted, effects, strict=True):
-            spread = math.sqrt(float((effect[list(rows)] ** 2).sum()))
-            seen = math.fsum(sampled.get(inputs[row].name, {}).get(output, 0.0) for row in rows)
-            varies = any(inputs[row].sigma for row in rows)
-            both = (_share(float(shares[output][list(rows)].sum())), _share(seen)) if varies else ("bias", "")
-            texts += [f"{spread:.3g}", *both]
-        return texts
-
-    listed = [int(row) for row in order]
-    named = listed if len(listed) <= MOST_ROWS + 1 else listed[:MOST_ROWS]
-    for row in named:
-        table.add_row(Text(inputs[row].name, style="dim"), size_text(inputs[row]), *cells([row]))
-    rest = listed[len(named) :]
-    if rest:
-        table.add_row(Text(f"{len(rest)} others", style="dim"), "", *cells(rest))
+    for row in rows:
+        cells = []
+        for (output, _), effect in zip(budgeted, row.effects, strict=True):
+            seen = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
+            both = ("bias", "") if row.bias else (_share(float(shares[output][row.inputs].sum())), _share(seen))
+            cells += [f"{math.degrees(effect):.3g}", *both]
+        table.add_row(Text(row.name, style="dim"), row.size, *cells)
     remainder = [
         1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
         for output, _ in budgeted

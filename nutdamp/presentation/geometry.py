@@ -10,7 +10,8 @@ import numpy as np
 
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude, triaxial
-from nutdamp.spacecraft import Vector
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.track import Track
 
 ROWS_A_TURN = 60
@@ -25,8 +26,23 @@ RIM = 121
 LEAST = 1e-9
 """Degrees or deg/s below which a motion is drawn as a point."""
 
+INSET_FROM, INSET_BELOW = 1e-4, 0.15
+"""Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
+
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not distinguished from its axis."""
+
+
+def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
+    """End of the time axis of pictures and films, s: what comes after the last pulse is seen, and fills no sheet.
+
+    One inertial nutation period after the last pulse, but no more than a quarter of the time until then, or of a period
+    as seen in the body where that is more. Without pulses, the inertial period.
+    """
+    end = schedule.end
+    if not len(schedule):
+        return spacecraft.inertial_period
+    return end + min(spacecraft.inertial_period, 0.25 * max(end, spacecraft.body_period))
 
 
 def drawn(flight: Flight, track: Track) -> Track:
@@ -85,11 +101,19 @@ def sky_plane(flight: Flight, momentum: Vector) -> Vector:
     return np.array([first, np.cross(up, first), up])
 
 
-def sky_names(flight: Flight) -> tuple[str, str]:
-    """What the two angles of `on_sky` are called."""
+class Sky(NamedTuple):
+    """What the two angles of `on_sky` are called, and how the view lies."""
+
+    x: str
+    y: str
+    view: str
+
+
+def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
+    """The names for a view of which ``centre`` is the middle."""
     if flight.spacecraft.attitude is None:
-        return "towards x of N, deg", "towards y of N, deg"
-    return "east of H(0), deg", "north of H(0), deg"
+        return Sky("towards x of N, deg", "towards y of N, deg", "H towards you, x of N to the right")
+    return Sky(f"east of {centre}, deg", f"north of {centre}, deg", "H towards you, east to the right")
 
 
 def on_sky(plane: Vector, directions: Vector) -> Vector:
@@ -120,12 +144,39 @@ def sky_target(flight: Flight, track: Track) -> Vector:
     return on_sky(sky_plane(flight, track.momentum[0]), axis[None])
 
 
+def momentum_inset(flight: Flight, track: Track) -> Vector | None:
+    """(n, 2): the path of H and the target as angles in degrees, where the axis track is too wide for it; else None."""
+    path, momentum = sky_paths(flight, track)
+    small = np.vstack([momentum, sky_target(flight, track)])
+    share = float(np.ptp(small, axis=0).max()) / max(float(np.ptp(np.vstack([path, small]), axis=0).max()), LEAST)
+    return small if len(flight.schedule) and INSET_FROM < share < INSET_BELOW else None
+
+
 def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
     """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = np.zeros(2) if centre else 0.5 * (low + high)
     half = (1.0 + margin) * float(np.abs(points - middle).max())
     return middle, half if half > LEAST else 1.0
+
+
+def hull(points: Vector) -> Vector:
+    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(map(tuple, points.tolist())))
+    if len(ordered) < 3:
+        return np.array(ordered).reshape(-1, 2)
+    sides = []
+    for run in (ordered, ordered[::-1]):
+        side: list[tuple[float, ...]] = []
+        for x, y in run:
+            while len(side) > 1:
+                (x0, y0), (x1, y1) = side[-2:]
+                if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
+                    break
+                side.pop()
+            side.append((x, y))
+        sides += side[:-1]
+    return np.array(sides)
 
 
 class Cones(NamedTuple):

@@ -72,8 +72,8 @@ class Drawing:
         for point in target:
             panel.mark(point, "*", MOMENTUM, at=True)
         self._path(panel, points)
-        x, y = geometry.sky_names(self.flight)
-        return framed(panel, "Axis track", x, y)
+        sky = geometry.sky_names(self.flight)
+        return framed(panel, "Axis track, H towards you", sky.x, sky.y)
 
     def _path(self, panel: Panel, points: Vector) -> None:
         span = np.linspace(-panel.half, panel.half, panel.columns)

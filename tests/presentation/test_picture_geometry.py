@@ -130,7 +130,8 @@ def test_in_a_celestial_frame_east_is_right_and_north_is_up() -> None:
     plane = geometry.sky_plane(made, np.array([240.0, 0.0, 0.0]))
     seen = geometry.on_sky(plane, np.array([[1.0, math.tan(0.1), 0.0], [1.0, 0.0, math.tan(0.2)]]))
     assert seen == pytest.approx(np.degrees([[0.1, 0.0], [0.0, 0.2]]))
-    assert geometry.sky_names(made) == ("east of H(0), deg", "north of H(0), deg")
+    view = "H towards you, east to the right"
+    assert tuple(geometry.sky_names(made)) == ("east of H(0), deg", "north of H(0), deg", view)
 
 
 @pytest.mark.parametrize("momentum", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.2)])

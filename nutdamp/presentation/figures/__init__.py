@@ -6,20 +6,18 @@ track of ``flight``; where its rows are too few for a smooth curve, a finer one 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nutdamp import flight as flights
+from nutdamp.presentation import geometry
 from nutdamp.presentation.figures.dispersion import dispersion_figure
 from nutdamp.presentation.figures.export import ending, rendered, svg
-from nutdamp.presentation.figures.history import history_figure, timeline_figure
-from nutdamp.presentation.figures.motion import motion_figure
-from nutdamp.presentation.figures.overview import overview_figure
-from nutdamp.presentation.figures.sphere import sphere_figure
+from nutdamp.presentation.figures.overview import flight_figure
+from nutdamp.presentation.figures.schemes import schemes_figure
 from nutdamp.presentation.figures.trade import trade_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from nutdamp.flight import Flight
     from nutdamp.planning import Plan
     from nutdamp.track import Track
@@ -27,39 +25,40 @@ if TYPE_CHECKING:
 __all__ = [
     "dispersion_figure",
     "ending",
-    "history_figure",
-    "motion_figure",
-    "named",
-    "overview_figure",
+    "flight_figure",
     "picture",
     "plan_picture",
     "rendered",
-    "sphere_figure",
+    "schemes_figure",
+    "shown",
     "svg",
-    "timeline_figure",
     "trade_figure",
+    "until",
 ]
 
 ROWS = 1000
-"""Rows of the track of a plan."""
-
-
-def named(name: str, flight: Flight, track: Track) -> Figure:
-    """The figure ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``; raises KeyError for others."""
-    if name == "timeline":
-        return timeline_figure(flight)
-    draw = {"overview": overview_figure, "motion": motion_figure, "sphere": sphere_figure, "history": history_figure}
-    return draw[name](flight, track)
+"""Rows of the track of a plan; the figures draw a finer one where they need it."""
 
 
 def picture(name: str, flight: Flight, track: Track, path: str) -> bytes:
-    """A figure by its name, as the content of the file ``path``; raises as `rendered`."""
+    """A `flight_figure` by its name, as the content of the file ``path``; raises as `rendered`."""
     ending(path)
-    return rendered(named(name, flight, track), path)
+    return rendered(flight_figure(name, flight, track), path)
+
+
+def shown(plan: Plan) -> tuple[Flight, Track]:
+    """A plan flown through its real widths as far as its pictures reach."""
+    until = geometry.shown_until(plan.spacecraft, plan.pulses)
+    flown = replace(flights.flown(plan.spacecraft, plan.pulses, until), scheme=plan.scheme)
+    return flown, flown.sampled(ROWS, until)
+
+
+def until(flight: Flight) -> float:
+    """End of the time axis of a flight, s: that of the flight where it was named, else `geometry.shown_until`."""
+    usual = flight.schedule.end + flight.spacecraft.inertial_period
+    return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)
 
 
 def plan_picture(name: str, plan: Plan, path: str) -> bytes:
-    """A figure of a plan, flown through its real widths to one inertial period after the last pulse."""
-    end = plan.pulses.end + plan.spacecraft.inertial_period
-    flown = flights.flown(plan.spacecraft, plan.pulses, end)
-    return picture(name, flown, flown.sampled(ROWS, end), path)
+    """A figure of a plan, flown through its real widths, as the content of the file ``path``."""
+    return picture(name, *shown(plan), path)

@@ -228,8 +228,8 @@ class Scene:
         self.space.set_title("Cones" + (f" (angles × {much:g})" if much != 1.0 else ""))
         shown = geometry.on_sky(self.plane, np.vstack([rims, self.path.axis]))
         style.square(self.sky, shown, margin=0.06)
-        x, y = geometry.sky_names(flight)
-        self.sky.set(xlabel=x, ylabel=y, title="Seen along H(0)")
+        sky = geometry.sky_names(flight)
+        self.sky.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H(0)\n{sky.view}")
         history.cone_history(self.strip, flight, self.path)
         self.strip.set(xlabel="time, s", ylabel="deg")
         sphere.name_directions(self.sky)
@@ -272,7 +272,7 @@ class Scene:
     def caption(self, now: float) -> str:
         """What stands above the frame: name, time, and what fires or just did."""
         firing = [
-            f"   firing {number}: {pulse.channel}"
+            f"   {'firing' if now <= pulse.end else 'fired'} {number}: {pulse.channel}"
             for number, pulse in enumerate(self.flight.schedule, start=1)
             if pulse.start <= now <= pulse.end + HELD * self.timed.pace
         ]

@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp.errors import BadRequest
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import INK
+from nutdamp.presentation.figures.style import INK, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
+
+FONT = "'DejaVu Sans'"
+FONTS = f"{FONT}, 'Bitstream Vera Sans', Verdana, sans-serif"
+"""Of text in SVG: that of the layout, and what stands for it, alike in width, where that is not installed."""
 
 # No dates in the file, so that the same flight gives the same picture.
 _METADATA: dict[str, dict[str, Any]] = {
@@ -43,7 +47,8 @@ def rendered(figure: Figure, path: str) -> bytes:
     kind = ending(path)
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, metadata=_METADATA[kind])
-    return stream.getvalue()
+    content = stream.getvalue()
+    return content.replace(FONT.encode(), FONTS.encode()) if kind == "svg" else content
 
 
 @style.styled
@@ -60,8 +65,10 @@ def svg(figure: Figure) -> str:
     # What matplotlib says of all elements would hold for the whole page, and its metadata are no part of the picture.
     text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
+    text = re.sub(r'(?<=\sd=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), text)  # 0.01 points will do
+    text = text.replace(FONT, FONTS)
     ours = '<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt" '
-    text = text.replace("<svg ", ours, 1).replace(INK, "currentColor")
+    text = text.replace("<svg ", ours, 1).replace(INK, "currentColor").replace(PAPER, "var(--paper, #fff)")
     # Roles of labels end up as ids, several times over: only ids that something refers to stay.
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
     text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)

@@ -10,9 +10,8 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.motion import title
-from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE, THIN
-from nutdamp.presentation.text import steering
+from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.text import degrees, steering
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.track import Track
 
@@ -21,51 +20,51 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+TIME = "time, s"
+"""What time axes are called."""
+
+DECADES = 4.0
+"""Of the nutation shown on a log axis at most, unless the requirement lies lower."""
+
 EDGE = 0.012
 """Room before t = 0, as a part of the time shown: what happens at once must be seen."""
 
+BAR = 0.46
+"""Height of a bar; the distance between two rows is 1."""
 
-@style.styled
-def history_figure(flight: Flight, track: Track) -> Figure:
-    """Rates in the body and cone angles over time, firings as bars behind them."""
-    whole, track = track, geometry.drawn(flight, track)
-    figure = style.sheet(7.4, 5.0)
-    rates, spin, cones = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1.3, 3])
+
+def history(flight: Flight, track: Track) -> Figure:
+    """Rates in the body and cone angles over time, firings as bars behind them; the nutation on a log axis too."""
+    figure = style.sheet(7.4, 5.6)
+    grid = figure.add_gridspec(3, 2, height_ratios=[3, 1.3, 3.4])
+    rates = figure.add_subplot(grid[0, :])
+    spin = figure.add_subplot(grid[1, :], sharex=rates)
+    cones, decay = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
+    rates.tick_params(labelbottom=False)
     rate_history(rates, flight, track)
     spin_history(spin, flight, track)
     cone_history(cones, flight, track)
-    cones.set_xlabel(time_label(whole, track))
+    decay_history(decay, flight, track)
+    for axes in (spin, cones, decay):
+        axes.set_xlabel(TIME)
     style.legend(figure, [rates, cones])
-    figure.suptitle(title(flight))
-    style.settle(figure)
     return figure
 
 
-@style.styled
-def timeline_figure(flight: Flight) -> Figure:
+def timeline(flight: Flight, track: Track) -> Figure:
     """Which channel fires when and for how long."""
-    rows = len(_channels(flight))
-    figure = style.sheet(7.4, 1.5 + 0.36 * max(rows, 1))
+    figure = style.sheet(7.4, 1.7 + 0.36 * max(len(_channels(flight)), 1))
     axes = figure.subplots()
-    timeline(axes, flight, 1.12 * flight.schedule.end or flight.spacecraft.inertial_period)
-    axes.set_xlabel("time, s")
+    firings(axes, flight, float(track.t[-1]))
+    axes.set_xlabel(TIME)
     style.legend(figure, [axes])
-    figure.suptitle(title(flight))
-    style.settle(figure)
     return figure
-
-
-def time_label(whole: Track, drawn: Track) -> str:
-    """What the time axis is called; it says so where only the first part of a long time is drawn."""
-    end = float(whole.t[-1])
-    return "time, s" if drawn.t[-1] >= end else f"time, s (the first {float(drawn.t[-1]):.4g} of {end:.4g})"
 
 
 def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Transverse rates ω1, ω2."""
-    track = geometry.drawn(flight, track)
     rates = np.degrees(track.rates)
-    width = _line(flight, track)
+    width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
     axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")
     axes.plot(track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2")
     _finish(axes, flight, track, rates[:, :2], "ω1, ω2, deg/s")
@@ -74,7 +73,6 @@ def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 def spin_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Axial rate ω3; a constant one is drawn as such, not as its rounding."""
-    track = geometry.drawn(flight, track)
     spin = np.degrees(track.rates[:, 2])
     axes.plot(track.t, spin, color=MOTION, label="ω3")
     _finish(axes, flight, track, spin, "ω3, deg/s", least=0.02 * float(np.abs(spin).max()))
@@ -83,51 +81,71 @@ def spin_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Nutation angle θ = λ + μ, body cone μ and space cone λ."""
-    track = geometry.drawn(flight, track)
     angles = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
     axes.plot(track.t, angles[:, 0], color=INK, label="nutation θ = μ + λ")
     axes.plot(track.t, angles[:, 1], color=MOTION, linestyle=(0, (5, 1.5)), label="body cone μ")
     axes.plot(track.t, angles[:, 2], color=MOMENTUM, linestyle=(0, (5, 1.5, 1, 1.5)), label="space cone λ")
     _finish(axes, flight, track, np.append(angles.ravel(), 0.0), "angles, deg")
-    requested = flight.spacecraft.requirement
-    if requested is not None and requested.nutation is not None:
-        axes.axhline(math.degrees(requested.nutation), color=GREY, linewidth=0.9, linestyle=":", label="required θ")
+    _required(axes, flight)
     axes.axhline(0.0, color=GREY, linewidth=0.5)
 
 
-def timeline(axes: Axes, flight: Flight, until: float, *, brief: bool = False) -> None:
-    """A bar for each firing, in the row of its channel; times when nothing may fire are hatched.
+def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
+    """Nutation angle θ on a log axis; what it ends with is written above where the axis does not reach so far."""
+    angles = np.degrees(track.nutation)
+    most, required = float(angles.max()), flight.spacecraft.requirement
+    least = most * 10.0**-DECADES if most > geometry.LEAST else geometry.LEAST
+    if required is not None and required.nutation:
+        least = min(least, 0.1 * math.degrees(required.nutation))
+    seen = angles[angles > least]
+    low = 0.5 * float(seen.min()) if len(seen) == len(angles) else least
+    axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=INK)
+    _finish(axes, flight, track, angles, "nutation θ, deg (log)")
+    axes.set_yscale("log")
+    axes.set_ylim(low, 2.0 * max(most, low))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("")
+    _required(axes, flight)
+    if angles[-1] <= low:
+        note = f"ends at {degrees(float(track.nutation[-1]))}"
+        axes.set_title(note, loc="right", fontsize=style.SMALL, fontweight="normal")
+
+
+def _required(axes: Axes, flight: Flight) -> None:
+    requested = flight.spacecraft.requirement
+    if requested is not None and requested.nutation is not None:
+        axes.axhline(math.degrees(requested.nutation), color=GREY, linewidth=0.9, linestyle=":", label="required θ")
+
+
+def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) -> None:
+    """A bar for each firing, in the row of its channel; times when nothing may fire are hatched, beside the labels.
 
     ``brief`` labels bars with the number of the pulse alone.
     """
     names = _channels(flight)
     rows = {name: len(names) - 1 - index for index, name in enumerate(names)}
     axes.set_xlim(-EDGE * until, until)
-    axes.set_ylim(-0.6, max(len(names), 1) - 0.1)
-    for index, (begins, ends) in enumerate(_closed(flight, until)):
-        axes.axvspan(
-            begins, ends, facecolor="none", edgecolor=GREY, hatch="////", linewidth=0.0, alpha=0.35,
-            label="must not fire" if index == 0 else None,
-        )  # fmt: skip
-    numbered = style.thinned(len(flight.schedule))
-    for number, pulse in enumerate(flight.schedule):
+    axes.set_ylim(-0.5, max(len(names), 1) - 0.1)
+    named = "must not fire"
+    for begins, ends in _closed(flight, until):
+        for row in rows.values():
+            axes.broken_barh(
+                [(begins, ends - begins)], (row - 0.5 * BAR, BAR), facecolor="none", edgecolor=GREY, hatch="////",
+                linewidth=0.0, alpha=0.5, label=named,
+            )  # fmt: skip
+            named = ""
+    for number, pulse in enumerate(flight.schedule, start=1):
         row = rows[pulse.channel]
         if pulse.start > until:
             break
-        axes.broken_barh(
-            [(pulse.start, pulse.on_time)], (row - 0.38, 0.46), facecolor=PULSE, edgecolor=PULSE, linewidth=0.8
-        )
-        if number in numbered:
-            style.label(
-                axes,
-                str(number + 1) if brief else _firing(number, pulse, flight),
-                np.array([pulse.t, row + 0.08]),
-                INK,
-                role="above",
-            )
+        bar = (row - 0.5 * BAR, BAR)
+        axes.broken_barh([(pulse.start, pulse.on_time)], bar, facecolor=PULSE, edgecolor=PULSE, linewidth=0.8)
+        text = str(number) if brief else _firing(number, pulse, flight)
+        style.label(axes, text, np.array([pulse.t, row + 0.5 * BAR]), INK, role="bar", short=str(number))
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
-    axes.set_title("Firings" if brief else "Firings: number, on-time")
+    steered = any(pulse.channel == STEERABLE for pulse in flight.schedule)
+    axes.set_title("Firings" + (", direction of the torque from body axis +1" if steered and not brief else ""))
     if not names:
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")
 
@@ -136,7 +154,7 @@ def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
     how = f"{pulse.on_time:.3g} s" if pulse.on_time else f"{pulse.magnitude:.3g} N m s"
     if pulse.channel == STEERABLE:
         how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
-    return f"{number + 1}: {how}"
+    return f"{number}: {how}"
 
 
 def _channels(flight: Flight) -> list[str]:
@@ -153,19 +171,13 @@ def _closed(flight: Flight, until: float) -> list[tuple[float, float]]:
     return [(begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins]
 
 
-def _line(flight: Flight, track: Track) -> float:
-    """Thinner where many turns stand side by side."""
-    turns = float(track.t[-1]) / min(flight.spacecraft.body_period, float(track.t[-1]) or 1.0)
-    return style.LINE if turns < 25 else THIN if turns < 100 else 0.5
-
-
 def _numbers(axes: Axes, flight: Flight, track: Track) -> None:
     """Numbers of the pulses along the upper edge."""
     top = axes.get_ylim()[1]
     for number in style.thinned(len(flight.schedule)):
         pulse = flight.schedule.pulses[number]
         if pulse.t <= track.t[-1]:
-            style.label(axes, str(number + 1), np.array([pulse.t, top]), PULSE, role="number")
+            style.label(axes, str(number + 1), np.array([pulse.t, top]), FIRED, role="number")
 
 
 def _finish(axes: Axes, flight: Flight, track: Track, values: np.ndarray, name: str, *, least: float = 0.0) -> None:

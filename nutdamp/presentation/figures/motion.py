@@ -10,7 +10,8 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.presentation.text import degrees, moment
 from nutdamp.spacecraft import Channel, Vector
 from nutdamp.track import Track
 
@@ -25,33 +26,31 @@ LONGEST_NAME = 40
 """Characters of a name that fit above a picture."""
 
 
-@style.styled
-def motion_figure(flight: Flight, track: Track) -> Figure:
-    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
-    track = geometry.drawn(flight, track)
-    figure = style.sheet(7.4, 4.3)
-    body, space = figure.subplots(1, 2)
+def motion(flight: Flight, track: Track) -> Figure:
+    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8).
+
+    A third panel shows H alone where the track is too wide for it.
+    """
+    small = geometry.momentum_inset(flight, track)
+    figure = style.sheet(7.4 if small is None else 10.4, 4.5)
+    body, space, *inset = figure.subplots(1, 2 if small is None else 3)
     pole_curve(body, flight, track)
     axis_track(space, flight, track)
+    if small is not None:
+        momentum_inset(inset[0], space, flight, track, small)
     style.legend(figure, [body, space])
-    figure.suptitle(title(flight))
-    style.settle(figure)
     return figure
 
 
 def title(flight: Flight) -> str:
-    """What every sheet is headed with."""
-    count = len(flight.schedule)
-    start, left = (f"{angle:.3g}°" if angle > 1e-6 else "0°" for angle in _nutations(flight))
+    """What every sheet is headed with: who is flown by which scheme and model, and with what result."""
+    left, count = flight.residual, len(flight.schedule)
+    how = " ".join(filter(None, (flight.scheme, f"by {flight.model}")))
     swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
-    change = f"{start} → {left}" if count or left != start else start
-    pulses = ", no pulse" if not count else " by 1 pulse" if count == 1 else f" by {count} pulses"
-    return f"{short_name(flight)}: nutation {swings}{change}{pulses}"
-
-
-def _nutations(flight: Flight) -> tuple[float, float]:
-    """Nutation angle at t = 0 and at the end, degrees."""
-    return math.degrees(flight.spacecraft.nutation), math.degrees(flight.residual.nutation)
+    aim = "shift of H" if flight.spacecraft.goal.axis is None else "off the target"
+    pulses = "no pulse" if not count else f"{count} pulse{'s' * (count > 1)} until {moment(flight.schedule.end)}"
+    result = f"nutation {swings}{degrees(flight.spacecraft.nutation)} → {degrees(left.nutation)}"
+    return f"{short_name(flight)}: {how}, {pulses}\n{result}, {aim} {degrees(left.axis_error)}"
 
 
 def short_name(flight: Flight) -> str:
@@ -62,7 +61,6 @@ def short_name(flight: Flight) -> str:
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), pulses and channels marked."""
-    track = geometry.drawn(flight, track)
     rates = geometry.pole_path(track)
     size = float(np.hypot(*rates.T).max())
     axes.axhline(0.0, color=GREY, linewidth=0.5)
@@ -78,26 +76,48 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
 
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8)."""
-    track = geometry.drawn(flight, track)
     path, momentum = geometry.sky_paths(flight, track)
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
     _path(axes, flight, track, path)
-    axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
+    target = geometry.sky_target(flight, track)
+    if len(target):
+        axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none", label="target")
+    sky = geometry.sky_names(flight)
+    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")
+
+
+def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small: Vector) -> None:
+    """Where H goes, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
+    stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
+    for number in style.thinned(len(flight.schedule), 16):
+        style.label(axes, str(number + 1), stations[number + 1], FIRED)
+    style.label(axes, "t = 0", stations[0], INK, role="vital")
+    target = geometry.sky_target(flight, track)
+    axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none")
+    style.square(axes, small, margin=0.25)
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    space.plot([left, right, right, left, left], [low, low, high, high, low], color=INK, linewidth=THIN)
+    much = float(np.ptp(space.get_xlim())) / (right - left)
+    sky = geometry.sky_names(flight)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"The framed part (× {much:.2g}):\nH after each pulse")
+
+
+def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
+    """The path of H, (n, 2) degrees, with its places at first and after each pulse, which are returned."""
+    axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
     stations = [momentum[:1]]
     for stretch in geometry.stretches(flight, track):
         if stretch.pulse is not None:
             moved = _refined(momentum[stretch.first : stretch.last + 1])
             stations.append(moved[-1:])
-            if np.hypot(*(moved[-1] - moved[0])) > 0.08 * np.ptp(path, axis=0).max():
+            if np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
                 style.heads(axes, moved, _halfway(moved), MOMENTUM)
-    axes.plot(*np.vstack(stations).T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
-    target = geometry.sky_target(flight, track)
-    if len(target):
-        axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none", label="target")
-    x, y = geometry.sky_names(flight)
-    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
-    axes.set(xlabel=x, ylabel=y, title="Axis track: spin axis in space")
+    places = np.vstack(stations)
+    axes.plot(*places.T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
+    return places
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
@@ -116,10 +136,11 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         if np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
             style.heads(axes, fine, [len(fine) - 1], PULSE)
         if stretch.pulse in numbered:
-            style.label(axes, str(stretch.pulse + 1), fine[len(fine) // 2], PULSE)
-    axes.plot(*style.joined(coasts).T, color=MOTION, label="path")
+            style.label(axes, str(stretch.pulse + 1), fine[len(fine) // 2], FIRED)
+    thin = style.thickness(points) / style.LINE
+    axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
-        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=2.2, label="pulse")
+        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
         axes.plot(*np.array([rows[0] for rows in firings]).T, ".", color=PULSE, markersize=5)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")

@@ -1,4 +1,4 @@
-"""All pictures of a flight on one sheet."""
+"""The pictures of a flight by their names; one of them shows all on one sheet."""
 
 from __future__ import annotations
 
@@ -14,24 +14,44 @@ if TYPE_CHECKING:
 
 
 @style.styled
-def overview_figure(flight: Flight, track: Track) -> Figure:
-    """Pole curve, axis track, cones, rates and cone angles over time, firings: one sheet of A4 across."""
-    whole, track = track, geometry.drawn(flight, track)
-    figure = style.sheet(11.0, 7.8)
-    halves = figure.subfigures(2, 1, height_ratios=[1.05, 1.0], squeeze=False)[:, 0]
+def flight_figure(name: str, flight: Flight, track: Track) -> Figure:
+    """The figure ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``; raises KeyError for others."""
+    seen = geometry.drawn(flight, track)
+    figure = DRAWN[name](flight, seen)
+    until, end = float(seen.t[-1]), float(track.t[-1])
+    for axes in figure.axes:
+        if axes.get_xlabel() == history.TIME and until < end:
+            axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
+    figure.suptitle(motion.title(flight))
+    style.settle(figure)
+    return figure
+
+
+def overview(flight: Flight, track: Track) -> Figure:
+    """Pole curve, axis track, cones, rates and cone angles over time, firings: one sheet of A4 across, or longer."""
+    channels = len({pulse.channel for pulse in flight.schedule})
+    heights = [1.0, 1.0, 0.3 + 0.25 * max(channels, 2)]
+    figure = style.sheet(11.0, 5.9 + sum(heights))
+    halves = figure.subfigures(2, 1, height_ratios=[4.4, 1.5 + sum(heights)], squeeze=False)[:, 0]
     upper, lower = halves[0], halves[1]
     body, space, cones = upper.subplots(1, 3)
     motion.pole_curve(body, flight, track)
     motion.axis_track(space, flight, track)
-    sphere.sphere(cones, flight, track)
+    sphere.cones_in_space(cones, flight, track)
     style.legend(upper, [body, space, cones])
-    rows = len({pulse.channel for pulse in flight.schedule})
-    rates, angles, firings = lower.subplots(3, 1, sharex=True, height_ratios=[2, 2, 0.6 + 0.4 * min(max(rows, 1), 6)])
+    rates, angles, firings = lower.subplots(3, 1, sharex=True, height_ratios=heights)
     history.rate_history(rates, flight, track)
     history.cone_history(angles, flight, track)
-    history.timeline(firings, flight, float(track.t[-1]), brief=rows > 2 or len(flight.schedule) > 8)
-    firings.set_xlabel(history.time_label(whole, track))
+    history.firings(firings, flight, float(track.t[-1]), brief=channels > 2 or len(flight.schedule) > 8)
+    firings.set_xlabel(history.TIME)
     style.legend(lower, [rates, angles, firings])
-    figure.suptitle(motion.title(flight))
-    style.settle(figure)
     return figure
+
+
+DRAWN = {
+    "overview": overview,
+    "motion": motion.motion,
+    "sphere": sphere.sphere,
+    "history": history.history,
+    "timeline": history.timeline,
+}

@@ -11,7 +11,6 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.motion import title
 from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.geometry import Cones
 from nutdamp.spacecraft import Vector
@@ -79,30 +78,25 @@ def magnification(widest: float) -> float:
     return decade * max(step for step in STEPS if step * decade <= room * (1.0 + 1e-12))
 
 
-@style.styled
-def sphere_figure(flight: Flight, track: Track) -> Figure:
+def sphere(flight: Flight, track: Track) -> Figure:
     """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
-    track = geometry.drawn(flight, track)
-    figure = style.sheet(7.4, 4.3)
+    figure = style.sheet(7.4, 4.5)
     space, plan = figure.subplots(1, 2)
-    sphere(space, flight, track)
+    cones_in_space(space, flight, track)
     along_momentum(plan, flight, track)
     style.legend(figure, [space, plan])
-    figure.suptitle(title(flight))
-    style.settle(figure)
     return figure
 
 
-def sphere(axes: Axes, flight: Flight, track: Track) -> None:
+def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 and the path of the spin axis, seen from outside."""
-    track = geometry.drawn(flight, track)
     looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_ground(axes, looked, track)
     draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, found)
     for direction, _, name in _directions(found):
-        style.label(axes, name, looked.seen(direction)[0][0])
-    name_cones(axes)
+        style.label(axes, name, looked.seen(direction)[0][0], role="vital")
+    name_lines(axes, found, pulses=bool(len(flight.schedule)))
     frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum]))
     much = looked.magnified
     axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
@@ -123,9 +117,10 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
 
 def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
     """The path of the spin axis, with the firings in it."""
+    thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
-        colour, width = (MOTION, 1.0) if stretch.pulse is None else (PULSE, 1.8)
+        colour, width = (MOTION, thin) if stretch.pulse is None else (PULSE, 1.8 * thin)
         draw_line(axes, looked, track.axis[rows], colour, width)
 
 
@@ -140,10 +135,15 @@ def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
 
-def name_cones(axes: Axes) -> None:
-    """The two cones for the legend."""
-    for colour, alpha, name in ((MOMENTUM, SPACE, "space cone"), (MOTION, BODY, "body cone")):
-        axes.fill([], [], facecolor=colour, alpha=alpha, label=name)
+def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
+    """The two cones, the path of the spin axis and that of H for the legend."""
+    if len(found.body):
+        axes.fill([], [], facecolor=MOMENTUM, alpha=SPACE, label="space cone")
+        axes.fill([], [], facecolor=MOTION, alpha=BODY, label="body cone")
+    axes.plot([], [], color=MOTION, linewidth=1.0, label="path")
+    if pulses:
+        axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
+    axes.plot([], [], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
 
 
 def name_directions(axes: Axes) -> None:
@@ -158,26 +158,11 @@ def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
 
 
 def _cone(axes: Axes, looked: View, rim: Vector, colour: str, alpha: float) -> None:
-    """A cone from the centre to its rim: outline filled, rim drawn."""
+    """A cone from the centre to its rim: what it covers on paper filled and outlined, rim drawn."""
     points, _ = looked.seen(rim)
-    way = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    axes.fill(*_outline(points, way).T, facecolor=colour, alpha=alpha, edgecolor="none")
+    covered = geometry.hull(np.vstack([points, [[0.0, 0.0]]]))
+    axes.fill(*covered.T, facecolor=(colour, alpha), edgecolor=colour, linewidth=0.8)
     axes.plot(*points.T, color=colour, linewidth=1.0)
-    if abs(way[-1] - way[0]) < math.pi:  # the centre is outside the rim: the cone is seen from its side
-        for row in (int(np.argmin(way)), int(np.argmax(way))):
-            axes.plot([0.0, points[row, 0]], [0.0, points[row, 1]], color=colour, linewidth=0.8)
-
-
-def _outline(points: Vector, way: Vector) -> Vector:
-    """The rim, and the centre where the cone is seen from its side."""
-    if abs(way[-1] - way[0]) >= math.pi:
-        return points
-    low, high = int(np.argmin(way)), int(np.argmax(way))
-    ring = np.roll(points[:-1], -low, axis=0) if np.allclose(points[0], points[-1]) else points
-    far = (high - low) % max(len(points) - 1, 1)
-    one, other = ring[: far + 1], ring[far:]
-    outer = one if np.hypot(*one.mean(axis=0)) > np.hypot(*other.mean(axis=0)) else other
-    return np.vstack([[0.0, 0.0], outer, [0.0, 0.0]])
 
 
 def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
@@ -210,11 +195,10 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     draw_circles(axes, plane, found)
     for direction, _, name in _directions(found):
         style.label(axes, name, geometry.on_sky(plane, direction[None])[0])
-    name_cones(axes)
     shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
     style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
-    x, y = geometry.sky_names(flight)
-    axes.set(xlabel=x, ylabel=y, title="The same, seen along H")
+    sky = geometry.sky_names(flight)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"The same, seen along H\n{sky.view}")
 
 
 def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
@@ -222,7 +206,7 @@ def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
     for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
         if len(rim):
             ring = geometry.on_sky(plane, rim)
-            axes.fill(*ring.T, facecolor=colour, alpha=alpha, edgecolor="none")
+            axes.fill(*geometry.hull(ring).T, facecolor=colour, alpha=alpha, edgecolor="none")
             axes.plot(*ring.T, color=colour, linewidth=1.0)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8)

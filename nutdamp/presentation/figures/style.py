@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -26,8 +27,14 @@ if TYPE_CHECKING:
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
 """Spin axis, body cone and what moves; firings; angular momentum and space cone."""
 
+FIRED = "#B34700"
+"""Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 asks for 4.5:1)."""
+
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
-"""Text and ω; marks; grid lines."""
+"""Text and ω; marks; the circles of the sphere."""
+
+PAPER = "#fefefe"
+"""What lies under a hollow mark; in a page, its background."""
 
 LINE, THIN = 1.3, 0.7
 """Line widths, points."""
@@ -49,10 +56,11 @@ _SETTINGS: dict[str, Any] = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.unicode_minus": True,
-    "figure.titlesize": 10.5,
+    "figure.titlesize": 9.5,
     "figure.titleweight": "bold",
     "figure.facecolor": "white",
-    "grid.color": FAINT,
+    "grid.color": GREY,
+    "grid.alpha": 0.3,  # matplotlib overlooks the one in a colour
     "grid.linewidth": 0.5,
     "legend.frameon": False,
     "legend.fontsize": 8,
@@ -64,6 +72,7 @@ _SETTINGS: dict[str, Any] = {
     "ytick.color": INK,
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
+    "svg.fonttype": "none",  # text stays text: it can be found, copied and read aloud
     "svg.hashsalt": "nutdamp",  # the same flight gives the same file
 }
 
@@ -97,7 +106,9 @@ def sheet(width: float, height: float) -> Figure:
     """An empty figure, inches."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), dpi=200, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=200, layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.07)  # type: ignore[union-attr, call-arg]
+    return figure
 
 
 def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
@@ -126,11 +137,12 @@ def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -
     axes.grid()
 
 
-def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str = "label") -> None:
+def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str = "label", short: str = "") -> None:
     """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
 
-    ``label`` goes anywhere around its point and may be left out, as may ``above``, which stays above it; ``number``
-    stays where it is put, along the edge of a panel; ``vital`` is never left out.
+    ``label`` goes anywhere around its point and may be left out; ``number`` stays where it is put, along the edge of a
+    panel; ``vital`` is never left out; ``bar`` stands above the bar of a firing, and reads ``short`` where not all of
+    them have room.
     """
     note = axes.annotate(
         text,
@@ -140,11 +152,14 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str 
         color=colour,
         fontsize=SMALL,
         ha="center",
-        va="bottom" if role in ("above", "number") else "center_baseline",
+        va="bottom" if role in ("bar", "number") else "center_baseline",
         annotation_clip=False,
     )
-    note.set_label(f"_{role}")  # begins so that no legend shows it
+    note.set_label(f"_{role}{short}")  # begins so that no legend shows it
 
+
+BAR_GAP = 2.0
+"""Points between a bar and its label."""
 
 _AROUND = [
     (step * x, step * y)
@@ -154,10 +169,9 @@ _AROUND = [
 _OFFSETS = {
     "_vital": _AROUND,
     "_label": _AROUND[:16],
-    "_above": [(0.0, 2.5), (3.0, 2.5), (-3.0, 2.5)],
     "_number": [(0.0, 3.0)],
 }
-_COVERED = {"_vital": np.inf, "_label": 12.0, "_above": 2.0, "_number": np.inf}
+_COVERED = {"_vital": np.inf, "_label": 12.0, "_number": np.inf}
 """Points of curves, 4 pixels apart, that a label may cover."""
 
 
@@ -172,8 +186,39 @@ def settle(figure: Figure) -> None:
         )
         curves = _inked(axes) if notes else np.empty((0, 2))
         taken: list[Bbox] = []
+        window, points = axes.get_window_extent(), figure.dpi / 72.0
         for note in notes:
-            _settle(note, taken, curves, axes.get_window_extent(), figure.dpi / 72.0)
+            _settle(note, taken, curves, window, points)
+        bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
+        if bars:
+            _settle_bars(bars, window, points)
+
+
+def _settle_bars(notes: list[Annotation], window: Bbox, points: float) -> None:
+    """Labels of bars as they are where all have room in their rows, else as many of the short ones as have."""
+    if len(_in_rows(notes, window, points)) == len(notes):
+        return
+    for note in notes:
+        note.set_text(str(note.get_label()).removeprefix("_bar"))
+    fitting = _in_rows(notes, window, points)
+    for note in notes:
+        note.set_visible(note in fitting)
+
+
+def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annotation]:
+    """Put labels above their bars, no farther than the edges of the panel; those that meet none before in their row."""
+    ends: dict[float, float] = {}
+    fitting = set()
+    for note in notes:
+        note.set_position((0.0, BAR_GAP))
+        here = note.get_window_extent()
+        shift = max(window.x0 + points - here.x0, 0.0) - max(here.x1 - window.x1 + points, 0.0)
+        note.set_position((shift / points, BAR_GAP))
+        row = float(note.xy[1])
+        if here.x0 + shift >= ends.get(row, -np.inf) + 3.0 * points:
+            ends[row] = here.x1 + shift
+            fitting.add(note)
+    return fitting
 
 
 def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> None:
@@ -200,6 +245,17 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
         return
     note.set_position(best[0])
     taken.append(best[1])
+
+
+def thickness(path: Vector, turns: float | None = None) -> float:
+    """Width of the line of a ``path`` (n, 2), points: thinner where many turns lie side by side.
+
+    ``turns``: how many; by default as many as a circle of the size of the path would make of its length.
+    """
+    if turns is None:
+        length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+        turns = length / max(math.pi * float(np.ptp(path, axis=0).max()), 1e-300)
+    return LINE if turns < 10 else THIN if turns < 50 else 0.4
 
 
 def joined(pieces: Sequence[Vector]) -> Vector:

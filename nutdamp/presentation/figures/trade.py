@@ -4,62 +4,60 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from nutdamp.fronts import Front
+import numpy as np
+
+from nutdamp.fronts import Front, numbered
+from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.trade_tables import front_name
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LOOKS = ((MOTION, "o", "-"), (PULSE, "s", (0, (5, 1.5))), (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))), (INK, "D", ":"))
 """Colour, mark and line of the fronts in turn."""
 
+ALIKE = (0.02, 0.002)
+"""Relative differences in end and in cost of points that are drawn as one."""
+
 
 @style.styled
-def trade_figure(spacecraft: Spacecraft, found: Sequence[Front]) -> Figure:
-    """End of the last pulse against propellant (impulse where that is unknown), numbered as in the table."""
+def trade_figure(spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | None = None) -> Figure:
+    """End of the last pulse against propellant (impulse where that is unknown), numbered as in the table.
+
+    ``chosen``: a plan to be marked among them.
+    """
     from matplotlib.ticker import LogLocator
 
-    figure = style.sheet(7.4, 4.6)
+    figure = style.sheet(7.4, 4.8)
     axes = figure.subplots()
-    unit, number = "N m s", 0
-    shown: list[tuple[float, float]] = []
-    for index, front in enumerate(found):
-        colour, mark, line = LOOKS[index % len(LOOKS)]
-        if not front.points:
-            continue
-        unit = front.points[0].bounds.unit
-        ends = [point.plan.pulses.end for point in front.points]
-        costs = [scale_of(unit) * point.cost for point in front.points]
-        name = front_name(front, pointing=spacecraft.goal.axis is not None)
-        # A schedule serves for every later end, until a cheaper one does.
-        axes.step(
-            [*ends, spacecraft.horizon], [*costs, costs[-1]], where="post", color=colour, linestyle=line, label=name
-        )
-        axes.plot(ends, costs, mark, color=colour, markersize=5)
-        for shift, (end, cost) in enumerate(zip(ends, costs, strict=True), start=1):
-            if any(math.isclose(end, t, rel_tol=0.02) and math.isclose(cost, c, rel_tol=0.002) for t, c in shown):
-                continue  # a stricter front has it already, or as good as
-            shown.append((end, cost))
-            axes.annotate(
-                str(number + shift), (end, cost), xytext=(4, 4), textcoords="offset points",
-                color=colour, fontsize=style.SMALL,
-            )  # fmt: skip
-        number += len(front.points)
-    points = [point for front in found for point in front.points]
-    proved = [point.bounds.rigorous for point in points]
-    if points:
+    bounds = [point.bounds for _, _, point in numbered(found)]
+    unit = bounds[0].unit if bounds else "N m s"
+    scale = 1e3 if unit == "kg" else 1.0
+    axes.set_xscale("log")
+    _draw_fronts(axes, spacecraft, found, scale)
+    if bounds:
+        proved = [bound.rigorous for bound in bounds]
         if None not in proved:
-            least = min(scale_of(unit) * value for value in proved if value is not None)
+            least = min(scale * value for value in proved if value is not None)
             axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
-        axes.set_xscale("log")
+        if chosen is not None and len(chosen.pulses):
+            place = chosen.pulses.end, scale * chosen.pulses.cost_in(unit)
+            look: dict[str, Any] = {
+                "color": INK,
+                "markersize": 13,
+                "markerfacecolor": "none",
+                "linestyle": "",
+                "zorder": 4,
+            }
+            axes.plot(*place, "*", label=f"recommended: {chosen.scheme}", **look)
         axes.set_xlim(right=spacecraft.horizon)
         axes.margins(y=0.12)
-        axes.legend(loc="upper right")
     else:
         axes.text(0.5, 0.5, "no schedule was found", transform=axes.transAxes, ha="center", va="center")
     axes.set_xlabel("end of the last pulse, s")
@@ -68,10 +66,46 @@ def trade_figure(spacecraft: Spacecraft, found: Sequence[Front]) -> Figure:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
     axes.grid(True, which="both")
-    figure.suptitle(f"{spacecraft.name}: what time costs")
+    style.legend(figure, [axes], 3)
+    figure.suptitle(f"{spacecraft.name}: what time costs, by the scheme optimal, flown by real pulse widths")
+    style.settle(figure)
     return figure
 
 
-def scale_of(unit: str) -> float:
-    """What turns a cost into the unit of the axis."""
-    return 1e3 if unit == "kg" else 1.0
+def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], scale: float) -> None:
+    """Step lines and marks; a point that another front has too stands around that one's mark, hollow and larger."""
+    shown: list[tuple[float, float, list[int]]] = []
+    covered: list[tuple[float, float]] = []
+    for front, (colour, mark, line) in zip(found, LOOKS * math.ceil(len(found) / len(LOOKS)), strict=False):
+        if not front.points:
+            continue
+        ends = [point.plan.pulses.end for point in front.points]
+        costs = [scale * point.cost for point in front.points]
+        name = front_name(front, pointing=spacecraft.goal.axis is not None)
+        # A schedule serves for every later end, until a cheaper one does.
+        times, levels = np.repeat([*ends, spacecraft.horizon], 2)[1:], np.repeat([*costs, costs[-1]], 2)[:-1]
+        axes.plot(times, levels, color=colour, linestyle=line)
+        axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
+        alone = []
+        for index, owner, point in numbered(found):
+            if owner is front:
+                end, cost = point.plan.pulses.end, scale * point.cost
+                same = next((one for one in shown if _alike((end, cost), one[:2])), None)
+                if same is None:
+                    alone.append((end, cost))
+                    shown.append((end, cost, [index]))
+                else:
+                    covered.append((end, cost))
+                    same[2].append(index)
+                    axes.plot(end, cost, mark, color=colour, markersize=10, markerfacecolor="none", zorder=3)
+        if alone:
+            axes.plot(*np.transpose(alone), mark, color=colour, markersize=5, zorder=3.5)
+    if covered:
+        ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
+        axes.plot([], [], "s", label="the same schedule, on this front too", **ring)
+    for end, cost, numbers in shown:
+        style.label(axes, ", ".join(map(str, numbers)), np.array([end, cost]), INK, role="vital")
+
+
+def _alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return all(math.isclose(a, b, rel_tol=near) for a, b, near in zip(one, other, ALIKE, strict=True))

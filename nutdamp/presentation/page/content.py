@@ -26,7 +26,7 @@ from nutdamp.presentation.page.document import (
     sheet_of,
 )
 from nutdamp.presentation.page.moving import moving_of
-from nutdamp.presentation.page.pictures import dispersion_picture_of, pictures_of
+from nutdamp.presentation.page.pictures import dispersion_pictures_of, pictures_of
 from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet, spacecraft_facts
 from nutdamp.presentation.text import degrees, mass, moment, quantity
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
@@ -181,7 +181,7 @@ def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) 
     if note:
         blocks.append(Prose(f"Note: {note}."))
     if pictured:
-        blocks.append(dispersion_picture_of(dispersed, chosen.scheme))
+        blocks += dispersion_pictures_of(dispersed, chosen.scheme)
     return Section("dispersion", "Dispersion", tuple(blocks))
 
 

@@ -91,7 +91,7 @@ def moving_of(plan: Plan) -> Moving:
     """The view of a plan flown through the real pulse widths."""
     body, pulses = plan.spacecraft, plan.pulses
     # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
-    until = math.ceil(1e3 * (pulses.end + body.inertial_period)) / 1e3
+    until = math.ceil(1e3 * geometry.shown_until(body, pulses)) / 1e3
     return moving(flight.flown(body, pulses, until), until, plan.scheme, named_directions(body))
 
 
@@ -171,12 +171,12 @@ def _panels(
     pole = geometry.pole_path(track)
     pole_room = geometry.room(pole, 0.1, centre=True)
     sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
-    body = flown.spacecraft
+    body, names = flown.spacecraft, geometry.sky_names(flown)
     sense = ", spin about −3" if body.spin < 0.0 else ""
     axes = "" if body.inertia.aligned else ", principal axes"
     panels = (
         panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
-        panel("sky", "Axis track: spin axis in space", sky_room, geometry.sky_names(flown)),
+        panel("sky", f"Axis track: {names.view}", sky_room, (names.x, names.y)),
     )
     columns = {
         **_named_columns("pole", placed(pole, *pole_room)),

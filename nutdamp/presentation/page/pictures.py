@@ -2,56 +2,90 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nutdamp import flight
-from nutdamp.planning import Plan
+from nutdamp.decision import Decision
+from nutdamp.fronts import Front
+from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.page.document import Picture
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
 
-SAMPLES = 1000
-"""Rows of the track; the figures draw a finer one where they need it."""
-
 
 def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     """Pole curve and axis track, cones in space, rates and angles over time, firings; raises MissingExtra."""
-    body, pulses = plan.spacecraft, plan.pulses
-    until = pulses.end + body.inertial_period
-    flown = flight.flown(body, pulses, until)
-    track = flown.sampled(SAMPLES, until)
+    flown, track = figures.shown(plan)
     drawn = [
         (
-            figures.motion_figure(flown, track),
+            "motion",
             "Left: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
-            "Right: the direction of the spin axis in space, with the places of the angular momentum H.",
+            "Right: the direction of the spin axis in space, with the places of the angular momentum H; "
+            "enlarged beside it where they lie close together.",
             "Pole curve in the body and track of the spin axis in space",
         ),
         (
-            figures.sphere_figure(flown, track),
+            "sphere",
             "The cones in space: the body cone rolls on the space cone about H.",
             "Spherical view of body cone, space cone, angular momentum and spin axis",
         ),
         (
-            figures.history_figure(flown, track),
-            "Body rates and cone angles over time; bars mark the pulses.",
+            "history",
+            "Body rates and cone angles over time; bars mark the pulses. Lower right: the nutation on a log axis.",
             "Body rates and cone angles over time",
         ),
     ]
-    if len(pulses):
-        drawn.append(
-            (figures.timeline_figure(flown), "Which channel fires, when and for how long.", "Timeline of the firings")
-        )
-    return tuple(Picture(figures.svg(figure), caption, described) for figure, caption, described in drawn)
+    if len(plan.pulses):
+        drawn.append(("timeline", "Which channel fires, when and for how long.", "Timeline of the firings"))
+    return tuple(
+        Picture(figures.svg(figures.flight_figure(name, flown, track)), caption, described)
+        for name, caption, described in drawn
+    )
 
 
-def dispersion_picture_of(dispersed: Results, scheme: str) -> Picture:
-    """How the cases of a study are distributed; raises MissingExtra."""
+def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
+    """The schemes beside each other; raises MissingExtra."""
     return Picture(
-        figures.svg(figures.dispersion_figure(dispersed, scheme=scheme)),
-        "How many cases leave how much nutation, and how far H has moved, with what is required. "
-        "Right: the share of cases beyond.",
-        "Histograms and distribution functions of nutation and shift of H",
+        figures.svg(figures.schemes_figure(compared, decided)),
+        "A row for each scheme: what it costs, when it ends, what it leaves. What is less than an axis shows stands at "
+        "its left edge.",
+        "Dot plots of cost, end, nutation and shift of H by scheme",
+    )
+
+
+def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
+    """What time costs, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
+    return Picture(
+        figures.svg(figures.trade_figure(compared.spacecraft, found, compared.recommended)),
+        "What an earlier end costs: each mark is a schedule of the scheme optimal, numbered along each front.",
+        "Cost of schedules over the end of the last pulse",
+    )
+
+
+def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
+    """How the cases of a study are distributed, where H ends, which tolerance counts; raises MissingExtra."""
+    drawn = (
+        (
+            "cases",
+            "How many cases leave how much nutation, and how far H has moved, with what is required. "
+            "Right: the share of cases beyond.",
+            "Histograms and distribution functions of nutation and shift of H",
+        ),
+        (
+            "momentum",
+            "Where H ends in each case, with the ellipse that holds as many cases as must comply, and the circle in "
+            "which it is required to end.",
+            "Scatter of the final angular momentum with ellipse and target circle",
+        ),
+        (
+            "budget",
+            "One sigma of each input, or its bias (hatched), alone: what it does to the nutation, and to where H ends.",
+            "Tornado of the tolerance budget",
+        ),
+    )
+    return tuple(
+        Picture(figures.svg(figures.dispersion_figure(name, dispersed, scheme=scheme)), caption, described)
+        for name, caption, described in drawn
     )

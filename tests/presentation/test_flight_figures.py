@@ -1,0 +1,344 @@
+"""Figures of flights: how far they reach in time, their titles, labels of firings, cones, colours, odd flights."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import aimed, cross, fan, spinner
+from layout import check_layout, texts
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from matplotlib.text import Annotation
+from scipy.spatial import ConvexHull
+
+import nutdamp.library.views  # noqa: F401 - figures of flights are declared there
+from nutdamp import flight, planning
+from nutdamp.presentation import figures, geometry
+from nutdamp.presentation.figures import sphere
+from nutdamp.presentation.figures.style import GREY, INK
+from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft import Attitude, Limits, Requirement, Spacecraft, Steerable
+
+NAMES = ("overview", "motion", "sphere", "history", "timeline")
+PAGE = Path(figures.__file__).parents[1] / "page" / "page.css"
+
+TORQUER = Steerable(50.0)
+BODY = spinner(channels=cross(20.0), requirement=Requirement(0.01, 0.005))
+
+
+def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule:
+    """So many short pulses of all channels in turn, whatever they do."""
+    channels = body.channels
+    return Schedule(tuple(channel_pulse(channels[n % len(channels)], 0.5 + n * step, on_time) for n in range(count)))
+
+
+SIXTEEN = spinner(degrees=8.0, channels=fan(16, 20.0))
+STEERED = spinner(steerable=TORQUER, requirement=Requirement(0.01))
+FORBIDDEN = spinner(channels=cross(20.0), limits=Limits(earliest=1.0, blackout=((2.0, 4.5), (6.0, 7.0), (20.0, 25.0))))
+
+ODD: dict[str, tuple[Spacecraft, Schedule]] = {
+    "three moments": (spinner(moments=(120, 100, 80), degrees=25.0), Schedule()),
+    "three moments, oblate": (spinner(moments=(80, 90, 120), degrees=10.0, channels=cross(1.0)), Schedule()),
+    "no nutation": (spinner(degrees=0.0, channels=cross(20.0)), Schedule()),
+    "one pulse at once": (STEERED, Schedule((steerable_pulse(TORQUER, 0.0, 1.0, impulse=20.0),))),
+    "one pulse": (BODY, kicks(BODY, 1, 1.0, 0.3)),
+    "120 pulses": (BODY, kicks(BODY, 120, 0.4, 0.01)),
+    "16 channels": (SIXTEEN, kicks(SIXTEEN, 32, 0.45, 0.05)),
+    "far target": (aimed(STEERED, 150.0, 20.0), planning.plan(aimed(STEERED, 150.0, 20.0), "two-pulse").pulses),
+    "reversed": (spinner(120, 80, -3.0, 10.0, channels=cross(20.0)), kicks(BODY, 4, 1.1, 0.2)),
+    "oblate": (spinner(80, 120, 3.0, 10.0, channels=cross(20.0)), kicks(BODY, 4, 1.1, 0.2)),
+    "celestial": (replace(BODY, attitude=Attitude(np.array([0.7, 0.1, 0.7, 0.1]))), kicks(BODY, 5, 0.9, 0.2)),
+    "blackouts": (FORBIDDEN, planning.plan(FORBIDDEN, "four-pulse").pulses),
+    "steered at the edges": (
+        STEERED,
+        Schedule(tuple(steerable_pulse(TORQUER, t, t, on_time=0.01) for t in (0.005, 0.9, 1.8, 2.6))),
+    ),
+}
+
+
+@cache
+def drawn(name: str, case: str) -> Figure:
+    body, pulses = ODD[case]
+    plan = planning.Plan(body, "trial", pulses)
+    return figures.flight_figure(name, *figures.shown(plan))
+
+
+# --- time axes -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
+    body, pulses = ODD[case]
+    inertial = 2.0 * math.pi * body.inertia.A / float(np.linalg.norm(np.asarray(body.inertia.moments) * body.omega0))
+    end = max((pulse.start + pulse.on_time for pulse in pulses), default=0.0)
+    after = min(body.inertial_period, max(0.25 * end, 0.25 * body.body_period)) if len(pulses) else body.inertial_period
+    if body.inertia.symmetric:
+        assert body.inertial_period == pytest.approx(inertial)
+    assert geometry.shown_until(body, pulses) == pytest.approx(end + after)
+    for name in ("overview", "history", "timeline"):
+        timed = [axes for axes in drawn(name, case).axes if axes.get_xlabel().startswith("time, s")]
+        assert timed
+        assert all(axes.get_xlim()[1] == pytest.approx(end + after) for axes in timed)
+
+
+def test_a_slow_nutation_leaves_no_sheet_blank() -> None:
+    """A needle turns once in 60 s inertially: half a minute of nothing once followed its last pulse."""
+    body = spinner(239, 6.01, 4.2, 8.0, channels=cross(20.0))
+    pulses = kicks(body, 9, 4.0, 0.05)
+    assert body.inertial_period > 40.0
+    assert geometry.shown_until(body, pulses) < 1.3 * pulses.end
+
+
+def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
+    plan = planning.plan(BODY, "two-pulse")
+    usual = plan.fly().figure("timeline").axes[0].get_xlim()[1]
+    assert usual == pytest.approx(geometry.shown_until(BODY, plan.pulses))
+    assert plan.fly(30.0).figure("timeline").axes[0].get_xlim()[1] == pytest.approx(30.0)
+
+
+# --- titles ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("by_impulses", "model"), [(False, "real pulse widths"), (True, "impulse sum (17)")])
+def test_titles_name_scheme_model_and_result(by_impulses: bool, model: str) -> None:
+    plan = planning.plan(BODY, "two-pulse")
+    made = plan.fly(by_impulses=by_impulses)
+    for name in NAMES:
+        heading = made.figure(name).get_suptitle()
+        assert f"test: two-pulse by {model}, 2 pulses until {plan.end:.3f} s" in heading
+        assert re.search(r"nutation 5 deg → < 1e-9 deg, shift of H \S+", heading)
+
+
+@pytest.mark.parametrize("case", ["celestial", "three moments"])
+def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
+    right = "east" if case == "celestial" else "x of N"
+    titles = [axes.get_title() for name in ("motion", "sphere") for axes in drawn(name, case).axes]
+    assert sum(f"H towards you, {right} to the right" in title for title in titles) == 2
+
+
+def test_no_number_is_minus_zero() -> None:
+    for case in ODD:
+        for name in ("overview", "history"):
+            for text, _ in texts(drawn(name, case)):
+                assert not re.fullmatch(r"[-−]0(\.0*)?", text.get_text())
+
+
+# --- labels of firings -----------------------------------------------------------------------------------------------
+
+
+def bar_labels(axes: Axes) -> list[Annotation]:
+    return [one for one in axes.texts if isinstance(one, Annotation) and one.get_visible()]
+
+
+@pytest.mark.parametrize("name", ["overview", "timeline"])
+@pytest.mark.parametrize("case", [case for case in ODD if len(ODD[case][1])])
+def test_labels_of_firings_have_room(name: str, case: str) -> None:
+    """Inside the panel, on no other label, no bar and no hatching; every pulse has one where there is room."""
+    figure = drawn(name, case)
+    figure.draw_without_rendering()
+    axes = figure.axes[-1]
+    window, found = axes.get_window_extent(), bar_labels(axes)
+    boxes = [note.get_window_extent() for note in found]
+    for box in boxes:
+        assert window.x0 - 1.0 <= box.x0
+        assert box.x1 <= window.x1 + 1.0
+        assert window.y0 - 1.0 <= box.y0
+        assert box.y1 <= window.y1 + 1.0
+    for one, other in combinations(boxes, 2):
+        overlap = np.minimum(one.p1, other.p1) - np.maximum(one.p0, other.p0)
+        assert not (overlap > 1.0).all()
+    for bars in axes.collections:
+        area = bars.get_paths()[0].get_extents(bars.get_transform())
+        for box in boxes:
+            across = min(box.x1, area.x1) - max(box.x0, area.x0)
+            assert across < 0.5 or min(box.y1, area.y1) - max(box.y0, area.y0) < 2.0, case
+    numbers = [int(note.get_text().partition(":")[0]) for note in found]
+    every = list(range(1, len(ODD[case][1]) + 1))
+    if case != "120 pulses":
+        assert numbers == every
+    for number in set(every) - set(numbers):  # where there is no room: the label before it in its row is near
+        pulse = ODD[case][1].pulses[number - 1]
+        same = [n for n in numbers if ODD[case][1].pulses[n - 1].channel == pulse.channel and n < number]
+        gap = axes.transData.transform((pulse.t - ODD[case][1].pulses[same[-1] - 1].t, 0.0))[0]
+        assert gap - axes.transData.transform((0.0, 0.0))[0] < 30.0 * figure.dpi / 72.0
+
+
+@pytest.mark.parametrize("case", ["blackouts", "16 channels", "one pulse"])
+def test_rows_are_named_at_the_middle_of_their_bars(case: str) -> None:
+    axes = drawn("timeline", case).axes[-1]
+    middles = {
+        round(float(np.mean(bars.get_paths()[0].get_extents().intervaly)), 9)
+        for bars in axes.collections
+        if not bars.get_hatch()
+    }
+    assert middles == {round(float(tick), 9) for tick in axes.get_yticks()}
+
+
+def test_steering_angles_are_those_of_the_table_and_say_from_where() -> None:
+    axes = drawn("timeline", "steered at the edges").axes[-1]
+    assert "from body axis +1" in axes.get_title()
+    angles = [float(found[1]) for note in axes.texts if (found := re.search(r"at ([\d.]+)°", note.get_text()))]
+    pulses = ODD["steered at the edges"][1]
+    expected = [round(math.degrees(math.atan2(p.impulse[1], p.impulse[0])) % 360.0, 2) for p in pulses]
+    assert angles == expected
+
+
+# --- cones -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_hull_is_that_of_scipy() -> None:
+    random = np.random.default_rng(3)
+    for count in (3, 10, 400):
+        points = random.normal(size=(count, 2))
+        found = geometry.hull(points)
+        best = points[ConvexHull(points).vertices]
+        assert {tuple(point) for point in found} == {tuple(point) for point in best}
+    line = np.column_stack([np.linspace(0.0, 1.0, 9), np.linspace(0.0, 2.0, 9)])
+    assert np.ptp(geometry.hull(line), axis=0) == pytest.approx([1.0, 2.0])
+    assert geometry.hull(np.zeros((4, 2))).shape == (1, 2)
+
+
+@pytest.mark.parametrize("case", ["three moments", "three moments, oblate", "oblate", "reversed"])
+def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None:
+    body, _ = ODD[case]
+    made, track = figures.shown(planning.Plan(body, "trial", ODD[case][1]))
+    looked, found = sphere.view(made, track), geometry.cones(made, track.rates[0], track.quaternion[0])
+    axes = drawn("sphere", case).axes[0]
+    filled = [patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3]
+    assert len(filled) == 2
+    for patch, rim in zip(filled, (found.space, found.body), strict=True):
+        points = np.vstack([looked.seen(rim)[0], [[0.0, 0.0]]])
+        edges = np.diff(patch.get_xy(), axis=0)
+        to_points = points[:, None, :] - patch.get_xy()[None, :-1, :]
+        cross_product = edges[:, 0] * to_points[..., 1] - edges[:, 1] * to_points[..., 0]
+        assert (cross_product >= -1e-12).all()  # convex, and nothing of the cone outside
+        corners = {tuple(point) for point in points.round(12)}
+        assert {tuple(point) for point in patch.get_xy().round(12)} <= corners
+
+
+def test_the_sphere_names_its_lines() -> None:
+    (legend,) = drawn("sphere", "reversed").legends
+    named = {text.get_text() for text in legend.get_texts()}
+    assert {"space cone", "body cone", "path", "pulse", "path of H"} <= named
+
+
+# --- many turns ------------------------------------------------------------------------------------------------------
+
+
+def test_many_turns_are_drawn_thin() -> None:
+    widths = []
+    for until in (5.0, 60.0, 600.0):
+        made = flight.flown(spinner(), Schedule(), until)
+        space = figures.flight_figure("motion", made, made.sampled(1000, until)).axes[1]
+        widths.append(next(line.get_linewidth() for line in space.lines if line.get_label() == "path"))
+    assert widths[0] > widths[1] > widths[2]
+
+
+def test_where_h_moves_little_it_is_shown_enlarged() -> None:
+    figure = drawn("motion", "120 pulses")
+    body, space, inset = figure.axes
+    made, track = figures.shown(planning.Plan(*ODD["120 pulses"][:1], "trial", ODD["120 pulses"][1]))
+    _, momentum = geometry.sky_paths(made, track)
+    (left, right), (low, high) = inset.get_xlim(), inset.get_ylim()
+    assert ((momentum >= [left, low]) & (momentum <= [right, high])).all()
+    much = re.search(r"× ([\d.]+)", inset.get_title())
+    assert much is not None
+    ratio = np.ptp(space.get_xlim()) / (right - left)
+    assert float(much[1]) == pytest.approx(ratio, rel=0.06)
+    assert ratio > 5.0
+    frames = [line for line in space.lines if len(np.asarray(line.get_xdata())) == 5]
+    assert any(np.asarray(line.get_xdata()).max() == pytest.approx(right) for line in frames)
+    assert len(drawn("motion", "far target").axes) == 2
+    assert body.get_aspect() == inset.get_aspect() == 1.0
+
+
+# --- colours and files -----------------------------------------------------------------------------------------------
+
+
+def contrast(one: str, other: str) -> float:
+    """Ratio of WCAG 2.1."""
+    bright = []
+    for colour in (one, other):
+        parts = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+        bright.append(float(np.dot(parts, (0.2126, 0.7152, 0.0722))))
+    return (max(bright) + 0.05) / (min(bright) + 0.05)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_text_can_be_read_on_white_and_in_the_dark(name: str) -> None:
+    css = PAGE.read_text(encoding="utf-8")
+    papers = re.findall(r"--paper: (#\w+)", css)
+    inks = re.findall(r"--ink: (#\w+)", css)
+    assert len(papers) == len(inks) == 2
+    assert all(contrast(ink, paper) > 4.5 for ink, paper in zip(inks, papers, strict=True))
+    lighter: dict[str, str] = {}
+    for selectors, colour in re.findall(r"^\s*(\[style[^{]*)\{ fill: (#\w+) !important", css, re.MULTILINE):
+        lighter |= dict.fromkeys(re.findall(r"fill: (#\w+)", selectors), colour)
+    for text, _ in texts(drawn(name, "reversed")):
+        colour = to_hex(text.get_color())
+        assert contrast(colour, "#ffffff") >= 4.5, text.get_text()
+        if colour != INK:  # which becomes that of the page
+            assert contrast(lighter[colour], papers[1]) >= 4.5, text.get_text()
+    assert contrast(GREY, "#ffffff") > 3.0
+
+
+def test_svg_has_its_text_as_text() -> None:
+    made, track = figures.shown(planning.plan(BODY, "two-pulse"))
+    shown = figures.svg(figures.flight_figure("timeline", made, track))
+    file = figures.picture("timeline", made, track, "a.svg").decode()
+    for content in (shown, file):
+        words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
+        assert "Firings" in words
+        assert any(word.startswith("1: ") for word in words)
+        assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
+    assert not re.search(r'\sd="[^"]*\.\d{3}', shown)
+
+
+MADE = """
+import sys, hashlib
+sys.path[:0] = {path!r}
+from builders import cross, spinner
+from nutdamp import planning
+from nutdamp.presentation import figures
+made, track = figures.shown(planning.plan(spinner(channels=cross(20.0)), "four-pulse"))
+names = {names!r}
+files = [figures.picture(name, made, track, "a.svg") for name in names]
+pages = [figures.svg(figures.flight_figure(name, made, track)).encode() for name in names]
+print(hashlib.sha256(b"".join(files + pages)).hexdigest())
+"""
+
+
+def test_two_runs_give_the_same_bytes() -> None:
+    code = MADE.format(path=[str(Path(__file__).parents[1])], names=NAMES)
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert runs[0] == runs[1]
+    assert len(runs[0].strip()) == len(hashlib.sha256().hexdigest())
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_odd_flights_are_drawn_whole(case: str) -> None:
+    """All words inside the sheet, and none over another in the same panel."""
+    for name in NAMES:
+        check_layout(drawn(name, case))
