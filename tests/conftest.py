@@ -11,7 +11,13 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from planned_once import Planner
 from process import Run, apart, within
+
+from nutdamp import schemes
+
+PLANNED_ONCE = ("cli", "presentation", "files")
+"""Folders of tests of what is made of plans: these may share them."""
 
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
 settings.register_profile("project", deadline=None, derandomize=True)
@@ -72,6 +78,17 @@ def browse(chromium: Any) -> Callable[..., Any]:
         assert said == []
 
     return opened
+
+
+_planner = Planner()
+
+
+@pytest.fixture(autouse=True)
+def _planned_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In some folders, what is planned once is kept for all tests there; the mark ``plans_anew`` says which do not."""
+    folders = request.path.relative_to(Path(__file__).parent).parts
+    if folders[0] in PLANNED_ONCE and "plans_anew" not in request.keywords:
+        monkeypatch.setattr(schemes, "schedule", _planner.schedule)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,10 +1,11 @@
-"""Schedules kept for the commands of one spacecraft: each command plans the same pulses anew, to the last digit."""
+"""Schedules kept from test to test: each command of the same spacecraft plans the same pulses, to the last digit."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import math
+from importlib import import_module
 from typing import Any
 
 from nutdamp import schemes, work
@@ -17,7 +18,10 @@ NOT_PLANNED_WITH = ("source", "dispersions", "with_disturbances")
 
 
 class Planner:
-    """`schemes.schedule`, which plans a body, scheme and options once; the work counts every time."""
+    """`schemes.schedule`, which searches once for each scheme, body and options, and counts the work every time.
+
+    What a budget of work has cut, or would cut, is planned anew, and so is a scheme whose module a test has changed.
+    """
 
     def __init__(self) -> None:
         self.kept: dict[str, tuple[Schedule | NutdampError, float]] = {}
@@ -27,17 +31,19 @@ class Planner:
     def schedule(self, name: str, spacecraft: Spacecraft, options: schemes.Choice = None) -> Schedule:
         """As `schemes.schedule`."""
         self.calls += 1
-        key = json.dumps([name, type(options).__name__, options, spacecraft], default=_plain)
-        if key not in self.kept:
-            with work.budget("a schedule", math.inf) as spent:
+        code = id(import_module(schemes.SCHEMES[name].module).schedule)
+        key = json.dumps([name, code, type(options).__name__, options, spacecraft], default=_plain)
+        with work.budget("a schedule", math.inf) as spent:
+            made, units = self.kept.get(key, (None, math.inf))
+            if made is None or units >= spent.most:
                 try:
-                    made: Schedule | NutdampError = self.plain(name, spacecraft, options)
+                    made = self.plain(name, spacecraft, options)
                 except NutdampError as reason:
                     made = reason
-            self.kept[key] = made, spent.done
-        else:
-            work.spend(self.kept[key][1])
-        made = self.kept[key][0]
+                if not spent.exhausted:
+                    self.kept[key] = made, spent.done
+            else:
+                work.spend(units)
         if isinstance(made, NutdampError):
             raise made
         return made

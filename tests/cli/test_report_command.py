@@ -29,6 +29,7 @@ def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
+@pytest.mark.plans_anew
 def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
     assert run("report", "my craft.yaml", "-q", "--with-disturbances", "-o", "a.md").returncode == 0

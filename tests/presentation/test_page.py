@@ -137,6 +137,7 @@ def test_no_other_script_may_run(example: str) -> None:
     ]
 
 
+@pytest.mark.plans_anew
 def test_the_same_input_gives_the_same_page(example: str) -> None:
     assert page(example_text(), pictured=True) == example
 
