@@ -21,7 +21,7 @@ def printable(text: str) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The one of some names that a misspelt ``word`` may stand for, whatever its case."""
+    """The one of some names that a misspelt ``word`` may be meant as, whatever its case."""
     import difflib  # here, because few runs meet a misspelt word
 
     folded = {name.casefold(): name for name in known}
@@ -114,7 +114,7 @@ class CannotRead(NutdampError):
 
 
 class CannotWrite(NutdampError):
-    """A file that could not be written; what stood there before still stands."""
+    """A file that could not be written; what was there before is kept."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason

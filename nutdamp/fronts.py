@@ -66,7 +66,7 @@ def fronts(
     """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    A schedule that keeps a smaller shift stands for the larger ones too, where none beats it. ``progress`` is called
+    A schedule that keeps a smaller shift counts for the larger ones too, where none beats it. ``progress`` is called
     with how many of the count × len(shifts) searches are done.
     """
     if options.least == "impulse":

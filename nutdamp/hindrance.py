@@ -30,7 +30,7 @@ class Obstacle(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Hindrance:
-    """What stands in the way of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
+    """What hinders ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
 
     spacecraft: Spacecraft
     pulses: Schedule

@@ -333,7 +333,7 @@ class Comparison(views.Tabled):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the recommended plan does not reach, and what stands in the way."""
+        """What the recommended plan does not reach, and what hinders it."""
         return views.sentences(self)
 
     def to_dict(self) -> dict[str, Any]:

@@ -182,7 +182,7 @@ def judged(
     impulse: float = 1.0,
     propellant: float | None = None,
     end: float = 1.0,
-    asked: Requirement | None = None,
+    required: Requirement | None = None,
     goal: Goal | None = None,
     spin: float | None = None,
     pulses: int = 1,
@@ -191,7 +191,7 @@ def judged(
 
     Its pulses share impulse and propellant.
     """
-    spacecraft = replace(spinner(requirement=asked), goal=goal or Goal())
+    spacecraft = replace(spinner(requirement=required), goal=goal or Goal())
     share = None if propellant is None else propellant / max(pulses, 1)
     each = np.array([impulse / max(pulses, 1), 0.0, 0.0])
     fired = tuple(Pulse(end * (one + 1) / pulses, 0.0, "T", each, propellant=share) for one in range(pulses))

@@ -94,8 +94,8 @@ def exact_two_pulse(scale: float, **tolerances: object) -> Study:
 
     body = spinner(limits=Limits(earliest=1.0))  # a pulse at t = 0 could only be late
     plan = planning.plan(body, "two-pulse")
-    asked = replace(everything(scale, ("steerable",)), **tolerances)  # type: ignore[arg-type]
-    return Study(Model(replace(body, dispersions=asked), plan.pulses), seed=11)
+    requested = replace(everything(scale, ("steerable",)), **tolerances)  # type: ignore[arg-type]
+    return Study(Model(replace(body, dispersions=requested), plan.pulses), seed=11)
 
 
 def first_cases(study: Study, count: int) -> dict[str, np.ndarray]:

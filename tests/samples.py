@@ -1,4 +1,4 @@
-"""Which of many like cases run always; the others run where slow tests are asked for."""
+"""Which of many like cases run always; the others run where slow tests are requested."""
 
 from __future__ import annotations
 

@@ -237,7 +237,7 @@ def test_missing_basilisk(monkeypatch: pytest.MonkeyPatch) -> None:
     assert missing.value.extra == "verify"
 
 
-def test_dissipation_is_refused_before_basilisk_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dissipation_is_refused_before_basilisk_is_requested(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "Basilisk", None)
     with pytest.raises(Infeasible, match="without energy dissipation"):
         fly(replace(spinner("prolate"), dissipation=600.0), Schedule(), 1.0)

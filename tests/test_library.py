@@ -422,7 +422,7 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
 
 
 @pytest.mark.parametrize(("call", "message"), WRONG.values(), ids=WRONG)
-def test_a_wrong_argument_is_told_with_what_was_expected(
+def test_a_wrong_argument_is_reported_with_what_was_expected(
     craft: nutdamp.Spacecraft, call: Callable[[Any, Any], object], message: str
 ) -> None:
     with pytest.raises(errors.BadRequest, match=re.escape(message)):

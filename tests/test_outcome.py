@@ -84,9 +84,9 @@ def test_what_an_ideal_impulse_does_is_there_at_its_own_time() -> None:
 
 
 def test_models_may_differ_by_a_tenth_of_what_is_required() -> None:
-    asked = spinner(requirement=Requirement(nutation=0.02))
-    assert tolerated(asked) == pytest.approx({Part.NUTATION: 0.002, Part.SHIFT: ANGLE})
-    assert tolerated(asked, otherwise=math.inf)[Part.SHIFT] == math.inf
+    required = spinner(requirement=Requirement(nutation=0.02))
+    assert tolerated(required) == pytest.approx({Part.NUTATION: 0.002, Part.SHIFT: ANGLE})
+    assert tolerated(required, otherwise=math.inf)[Part.SHIFT] == math.inf
     assert tolerated(spinner()) == {Part.NUTATION: ANGLE, Part.SHIFT: ANGLE}
     spun = replace(aimed(spinner(), 3.0, 0.0), goal=Goal(axis=np.array([0.0, 0.0, 1.0]), spin=3.0))
     assert set(tolerated(spun)) == {Part.NUTATION, Part.DISTANCE, Part.SPIN}
@@ -178,7 +178,7 @@ def test_pulses_after_the_end_are_not_shown(run: Run) -> None:
 
 
 def test_a_plan_says_when_its_end_is_not_the_last_word(run: Run) -> None:
-    """Where dissipation or disturbances go on after the last pulse, the time is told for which the end holds."""
+    """Where dissipation or disturbances go on after the last pulse, the time is reported for which the end holds."""
     words = " ".join(run("plan", "--scheme", "four-pulse", "--set", "dissipation={time_constant: 50 s}").stdout.split())
     assert re.search(r"as the last pulse ends, at [0-9.]+ s; changed further by dissipation", words)
     assert "changed further" not in run("plan", "--scheme", "four-pulse").stdout

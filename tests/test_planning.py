@@ -48,19 +48,19 @@ def test_compare_keeps_the_order_given_and_recommends_one_of_them() -> None:
 )
 def test_requirement_is_met_where_every_part_is(nutation: float, shift: float, meets: bool) -> None:
     exact = math.radians(nutation) == BOTH.nutation and math.radians(shift) == BOTH.momentum_shift
-    assert judged("a", nutation, shift=shift, asked=BOTH).meets_requirement is meets
+    assert judged("a", nutation, shift=shift, required=BOTH).meets_requirement is meets
     assert exact == meets  # the bounds themselves are met
 
 
-@pytest.mark.parametrize("asked", [None, Requirement()])
-def test_without_a_requirement_none_is_met_or_missed(asked: Requirement | None) -> None:
-    assert judged("a", 0.1, asked=asked).meets_requirement is None
+@pytest.mark.parametrize("required", [None, Requirement()])
+def test_without_a_requirement_none_is_met_or_missed(required: Requirement | None) -> None:
+    assert judged("a", 0.1, required=required).meets_requirement is None
 
 
 def test_requirement_of_one_part_asks_nothing_of_the_other() -> None:
-    assert judged("a", 0.1, shift=90.0, asked=HALF_A_DEGREE).meets_requirement is True
+    assert judged("a", 0.1, shift=90.0, required=HALF_A_DEGREE).meets_requirement is True
     drift_only = Requirement(momentum_shift=math.radians(0.2))
-    assert judged("a", 80.0, shift=0.1, asked=drift_only).meets_requirement is True
+    assert judged("a", 80.0, shift=0.1, required=drift_only).meets_requirement is True
 
 
 def test_requirement_goes_by_the_flown_motion() -> None:
@@ -100,8 +100,8 @@ def test_remarks_tell_no_rounding() -> None:
     body = spinner(channels=cross(8.0))
     first, second, third = body.inertia.moments
     uneven = replace(body, inertia=replace(body.inertia, moments=(1.01 * first, second, third)))
-    (told,) = [text for text in remarks(plan(uneven, "one-pulse")) if "I1 ≠ I2" in text]
-    assert "these pulses leave less than 1e-9° of nutation" in told
+    (reported,) = [text for text in remarks(plan(uneven, "one-pulse")) if "I1 ≠ I2" in text]
+    assert "these pulses leave less than 1e-9° of nutation" in reported
 
 
 def test_a_cost_below_the_first_order_bound_says_why_that_can_be() -> None:

@@ -106,33 +106,33 @@ def test_where_nothing_reaches_the_target_the_least_of_distance_and_nutation() -
 
 def test_plans_that_meet_the_requirement_come_first() -> None:
     """Even if one that does not leaves less nutation for less propellant."""
-    drifting = judged("drifting", 0.01, shift=0.3, propellant=0.1, asked=BOTH)
-    meeting = judged("meeting", 0.4, shift=0.1, propellant=0.5, asked=BOTH)
+    drifting = judged("drifting", 0.01, shift=0.3, propellant=0.1, required=BOTH)
+    meeting = judged("meeting", 0.4, shift=0.1, propellant=0.5, required=BOTH)
     assert chosen(drifting, meeting) == "meeting"
 
 
 def test_of_those_that_meet_the_requirement_the_least_propellant() -> None:
     """The requirement says what is enough: 0.4° is, although it does not count as damped."""
-    thrifty = judged("thrifty", 0.4, propellant=0.1, asked=HALF_A_DEGREE)
-    assert chosen(thrifty, judged("clean", 0.0, propellant=0.2, asked=HALF_A_DEGREE)) == "thrifty"
+    thrifty = judged("thrifty", 0.4, propellant=0.1, required=HALF_A_DEGREE)
+    assert chosen(thrifty, judged("clean", 0.0, propellant=0.2, required=HALF_A_DEGREE)) == "thrifty"
 
 
 def test_what_a_requirement_does_not_bound_must_be_damped() -> None:
     """Firing nothing keeps H best: that is no way to damp."""
     keep = Requirement(momentum_shift=math.radians(0.2))
-    idle = judged("idle", 4.9, propellant=0.0, asked=keep)
-    damping = judged("damping", 0.01, shift=0.1, propellant=0.5, asked=keep)
+    idle = judged("idle", 4.9, propellant=0.0, required=keep)
+    damping = judged("damping", 0.01, shift=0.1, propellant=0.5, required=keep)
     assert idle.meets_requirement
     assert chosen(idle, damping) == "damping"
-    worse = judged("worse", 3.0, shift=0.1, propellant=0.5, asked=keep)
+    worse = judged("worse", 3.0, shift=0.1, propellant=0.5, required=keep)
     assert chosen(idle, worse) == "worse"
     assert recommend([idle, worse]).standing is Standing.MEETS
     assert "none of the 2 schemes compared damps the nutation" in warned(idle, worse)
 
 
 def test_if_none_meets_it_the_least_flown_nutation_whatever_the_cost() -> None:
-    one = judged("one", 0.7, propellant=0.1, asked=HALF_A_DEGREE)
-    two = judged("two", 0.6, propellant=9.0, asked=HALF_A_DEGREE)
+    one = judged("one", 0.7, propellant=0.1, required=HALF_A_DEGREE)
+    two = judged("two", 0.6, propellant=9.0, required=HALF_A_DEGREE)
     assert chosen(one, two) == "two"
     assert warned(one, two).startswith(
         "none of the 2 schemes compared meets the requirement. two leaves 0.6 deg of nutation (0.5 deg req"
@@ -141,8 +141,8 @@ def test_if_none_meets_it_the_least_flown_nutation_whatever_the_cost() -> None:
 
 def test_if_none_meets_it_and_all_damp_the_nearest_to_the_requirement() -> None:
     """Of two that leave no nutation but for rounding, rounding must not decide."""
-    far = judged("far", 1e-12, shift=3.5, propellant=0.1, asked=BOTH)
-    near = judged("near", 5e-12, shift=0.25, propellant=0.2, asked=BOTH)
+    far = judged("far", 1e-12, shift=3.5, propellant=0.1, required=BOTH)
+    near = judged("near", 5e-12, shift=0.25, propellant=0.2, required=BOTH)
     assert chosen(far, near) == "near"
     assert "near leaves 0.25 deg of shift of H (0.2 deg required)" in warned(far, near)
 
@@ -186,7 +186,7 @@ def test_shifts_count_as_equal_within_a_nanoradian_and_no_further(shift: float, 
 
 
 @pytest.mark.parametrize(
-    ("asked", "nutation", "shift", "ground"),
+    ("required", "nutation", "shift", "ground"),
     [
         (BOTH, 5e-6, 0.2501, Ground.COST),  # 0.04 % more than 0.25° of shift
         (BOTH, 5e-6, 0.251, Ground.NEAREST),
@@ -195,10 +195,10 @@ def test_shifts_count_as_equal_within_a_nanoradian_and_no_further(shift: float, 
     ],
 )
 def test_plans_are_as_near_to_the_requirement_within_a_thousandth(
-    asked: Requirement, nutation: float, shift: float, ground: Ground
+    required: Requirement, nutation: float, shift: float, ground: Ground
 ) -> None:
-    near = judged("near", 5e-6, shift=0.25, propellant=0.2, asked=asked)
-    cheap = judged("cheap", nutation, shift=shift, propellant=0.1, asked=asked)
+    near = judged("near", 5e-6, shift=0.25, propellant=0.2, required=required)
+    cheap = judged("cheap", nutation, shift=shift, propellant=0.1, required=required)
     assert recommend([near, cheap]).ground is ground
     assert chosen(near, cheap) == ("cheap" if ground is Ground.COST else "near")
 
@@ -232,9 +232,9 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
 
 
 @pytest.mark.parametrize(("spin", "meets"), [(3.0, True), (3.0029, True), (3.0031, False), (2.9969, False)])
-@pytest.mark.parametrize("asked", [None, HALF_A_DEGREE])
-def test_a_spin_is_part_of_the_requirement(asked: Requirement | None, spin: float, meets: bool) -> None:
-    one = judged("a", 0.0, asked=asked, goal=Goal(spin=3.0), spin=spin)
+@pytest.mark.parametrize("required", [None, HALF_A_DEGREE])
+def test_a_spin_is_part_of_the_requirement(required: Requirement | None, spin: float, meets: bool) -> None:
+    one = judged("a", 0.0, required=required, goal=Goal(spin=3.0), spin=spin)
     assert one.meets_requirement is meets
     assert (one.standing is Standing.COMPLIES) == meets
 
@@ -325,7 +325,7 @@ def test_reasons_say_what_decided() -> None:
     damped, other = judged("a", 0.0, propellant=0.1), judged("b", 0.0, propellant=0.2)
     assert said(damped) == "the scheme named; it damps"
     assert said(damped, INFEASIBLE) == "the only plan that damps"
-    assert said(judged("a", 0.1, asked=HALF_A_DEGREE), INFEASIBLE) == "the only plan that meets the requirement"
+    assert said(judged("a", 0.1, required=HALF_A_DEGREE), INFEASIBLE) == "the only plan that meets the requirement"
     assert said(damped, other) == "least propellant of the 2 plans that damp"
     near, nearer = judged("a", 0.0, goal=POINTING), judged("b", 0.0, impulse=2.0, goal=POINTING)
     assert said(near, nearer) == "least impulse of the 2 plans that reach the target"
@@ -338,7 +338,7 @@ def test_reasons_say_what_decided() -> None:
 
 def test_a_plan_that_complies_needs_no_warning() -> None:
     assert warned(judged("a", 0.0)) == ""
-    assert warned(judged("a", 0.4, asked=HALF_A_DEGREE)) == ""
+    assert warned(judged("a", 0.4, required=HALF_A_DEGREE)) == ""
 
 
 def test_the_warning_says_how_far_the_pulses_come() -> None:
@@ -476,7 +476,7 @@ def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
 
 
 def test_a_scheme_that_was_not_compared_is_named_where_it_may_help() -> None:
-    far = judged("far", 1e-12, shift=3.5, impulse=20.0, asked=BOTH)
+    far = judged("far", 1e-12, shift=3.5, impulse=20.0, required=BOTH)
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
     said = "--scheme optimal was not compared; it may reach more."
     assert said in warned(firing)
@@ -485,7 +485,7 @@ def test_a_scheme_that_was_not_compared_is_named_where_it_may_help() -> None:
 
 
 def test_the_parts_that_are_missed() -> None:
-    one = judged("a", 0.6, shift=0.3, asked=BOTH, goal=Goal(spin=3.0), spin=4.0)
+    one = judged("a", 0.6, shift=0.3, required=BOTH, goal=Goal(spin=3.0), spin=4.0)
     assert [bound.part for bound in one.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
     assert one.severity == pytest.approx(1.0 / 0.003)
     assert Plan(one.spacecraft, "x", None, "why").severity == math.inf
@@ -539,7 +539,7 @@ def test_a_share_is_never_rounded_to_what_it_is_not(share: float, required: floa
 
 
 @pytest.mark.parametrize(
-    ("degrees", "asked", "goal", "said"),
+    ("degrees", "required", "goal", "said"),
     [
         (0.3, HALF_A_DEGREE, None, "0.3 deg at t = 0 already meets the requirement (nutation within 0.5 deg)"),
         (0.6, HALF_A_DEGREE, None, None),
@@ -553,9 +553,9 @@ def test_a_share_is_never_rounded_to_what_it_is_not(share: float, required: floa
     ],
 )
 def test_where_no_pulse_is_needed_it_says_so(
-    degrees: float, asked: Requirement | None, goal: Goal | None, said: str | None
+    degrees: float, required: Requirement | None, goal: Goal | None, said: str | None
 ) -> None:
-    body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=asked), goal=goal or Goal())
+    body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=required), goal=goal or Goal())
     compared = compare(body, ("four-pulse",))
     text = verdicts.needless(compared)
     assert (text is None) == (said is None)
@@ -600,19 +600,19 @@ def test_the_spin_that_dissipation_changes_counts(
 def test_of_plans_that_leave_nothing_but_rounding_the_cheapest() -> None:
     """Where nothing meets a requirement below what a flight resolves, and where another part of it is missed."""
     tiny = Requirement(nutation=math.radians(1e-13))
-    noisy = judged("noisy", 2e-12, propellant=0.1, asked=tiny)
-    quiet = judged("quiet", 3e-13, propellant=0.2, asked=tiny)
+    noisy = judged("noisy", 2e-12, propellant=0.1, required=tiny)
+    quiet = judged("quiet", 3e-13, propellant=0.2, required=tiny)
     assert chosen(quiet, noisy) == "noisy"
     assert recommend([quiet, noisy]).ground is Ground.COST
     assert said(quiet, noisy).endswith("feasible plans, within 0.001 deg; of these least propellant")
     shifting = Requirement(nutation=math.radians(1e-13), momentum_shift=math.radians(0.1))
-    dear = judged("dear", 1e-13, shift=0.3, propellant=0.2, asked=shifting)
-    assert chosen(dear, judged("cheap", 0.0, shift=0.3, propellant=0.1, asked=shifting)) == "cheap"
+    dear = judged("dear", 1e-13, shift=0.3, propellant=0.2, required=shifting)
+    assert chosen(dear, judged("cheap", 0.0, shift=0.3, propellant=0.1, required=shifting)) == "cheap"
 
 
 def test_what_was_nearest_to_the_requirement_does_not_claim_least_nutation() -> None:
-    far = judged("far", 1e-12, shift=3.5, propellant=0.1, asked=BOTH)
-    near = judged("near", 5e-12, shift=0.25, propellant=0.2, asked=BOTH)
+    far = judged("far", 1e-12, shift=3.5, propellant=0.1, required=BOTH)
+    near = judged("near", 5e-12, shift=0.25, propellant=0.2, required=BOTH)
     assert said(far, near) == "comes nearest to the requirement of the 2 feasible plans"
 
 
@@ -620,8 +620,8 @@ def test_what_was_nearest_to_the_requirement_does_not_claim_least_nutation() -> 
 
 
 def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> None:
-    asked = Requirement(nutation=math.radians(0.1), momentum_shift=math.radians(0.01))
-    body = spinner(channels=cross(8.0), requirement=asked)
+    requested = Requirement(nutation=math.radians(0.1), momentum_shift=math.radians(0.01))
+    body = spinner(channels=cross(8.0), requirement=requested)
     body = replace(body, disturbances=(Disturbance(0.02 + 0j, rate=-body.spin),))
     compared = compare(body, schemes.CLASSIC)
     (text,) = verdicts.warnings(compared)

@@ -66,12 +66,12 @@ def draw(number: int) -> Spacecraft:
         tick=1e-3 * period if rng.random() < 0.15 else None,
         max_pulses=int(rng.integers(1, 9)) if rng.random() < 0.2 else None,
     )
-    asked = None
+    requested = None
     if rng.random() < 0.5:
         nutation = math.radians(degrees * 10.0 ** rng.uniform(-3.0, -0.3)) if rng.random() < 0.85 else None
         shift = math.radians(degrees * 10.0 ** rng.uniform(-2.0, 0.0)) if rng.random() < 0.5 or not nutation else None
-        asked = Requirement(nutation, shift)
-    body = replace(body, limits=limits, requirement=asked)
+        requested = Requirement(nutation, shift)
+    body = replace(body, limits=limits, requirement=requested)
     if rng.random() < 0.1:
         body = replace(
             body, steerable=Steerable(body.least_impulse / period * 10.0 ** rng.uniform(-1.0, 1.0), 220.0, 1.0)
@@ -101,10 +101,10 @@ def beaten(chosen: Plan, other: Plan, others: tuple[Plan, ...]) -> bool:
 
 def complies(body: Spacecraft, nutation: float, distance: float) -> bool:
     """The rule, written down again: the requirement, and what counts as damped where it says nothing."""
-    asked = body.requirement or Requirement()
+    requested = body.requirement or Requirement()
     least = math.radians(1e-3)
-    most = asked.nutation if asked.nutation is not None else max(0.01 * body.nutation, least)
-    far = asked.momentum_shift
+    most = requested.nutation if requested.nutation is not None else max(0.01 * body.nutation, least)
+    far = requested.momentum_shift
     if far is None:
         far = math.inf if body.goal.axis is None else max(0.01 * body.to_turn, least)
     return nutation <= most and distance <= far

@@ -122,9 +122,9 @@ def test_variants_are_other_alignments_later_starts_and_fewer_channels() -> None
 
 def test_how_far_it_is_can_be_watched() -> None:
     compared = planning.compare(dispersed(EXACT), ("four-pulse",))
-    trials, told = robust.attempts(compared), list[int]()
-    robust.compare(compared, trials, told.append, samples=SAMPLES)
-    assert told == list(range(len(trials)))
+    trials, reported = robust.attempts(compared), list[int]()
+    robust.compare(compared, trials, reported.append, samples=SAMPLES)
+    assert reported == list(range(len(trials)))
 
 
 def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
@@ -132,8 +132,8 @@ def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
     example = read_spacecraft(example_text(), "example.yaml")
     body = replace(example, dispersions=Dispersions(thrust_per_pulse=normal(0.001)))
     for shift, scheme in ((5.0, "four-pulse"), (0.1, "two-pulse")):
-        asked = Requirement(math.radians(0.5), math.radians(shift), 0.99)
-        found = planned(replace(body, requirement=asked), ("four-pulse", "two-pulse"))
+        requested = Requirement(math.radians(0.5), math.radians(shift), 0.99)
+        found = planned(replace(body, requirement=requested), ("four-pulse", "two-pulse"))
         assert found.chosen is not None
         assert found.chosen.plan.scheme == scheme
         assert found.chosen.met == 1.0

@@ -88,7 +88,7 @@ def test_precession_is_that_of_k14_and_k15() -> None:
     assert second.precession == pytest.approx(0.4 / (inertia.C * 3.0), rel=1e-12)
 
 
-def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_told() -> None:
+def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> None:
     rate = -EXAMPLE.inertia.a * EXAMPLE.spin
     body = replace(EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=rate),))
     (found,) = survey.consequences(body)

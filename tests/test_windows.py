@@ -79,7 +79,7 @@ def test_on_times_lie_on_ticks_within_the_bounds_and_are_never_nothing() -> None
     assert ticking.on_time(0.1, 0.3, 5.0) == pytest.approx(0.3, rel=1e-15)
 
 
-def test_without_ticks_on_times_are_as_wanted_within_the_bounds() -> None:
+def test_without_ticks_on_times_are_as_requested_within_the_bounds() -> None:
     free = windows()
     assert free.on_time(0.3456, 0.0, math.inf) == 0.3456
     assert free.on_time(0.3, 0.5, 2.0) == 0.5

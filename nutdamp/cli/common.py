@@ -42,7 +42,7 @@ File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
 """What `write_whole` takes."""
 
 Output = tuple[str | None, Callable[[], "File | dict[str, Any]"]]
-"""Path of a file to write, if it is asked for, and what makes its content; a dict is written as JSON."""
+"""Path of a file to write, if one is requested, and what makes its content; a dict is written as JSON."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

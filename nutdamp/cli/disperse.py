@@ -137,8 +137,8 @@ def command(
         return dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal)
 
     deliver([(json, data), (plot, picture)], *[screen] * (not silent), unsaved=unsaved)
-    if stopped_by is not None and results.done < results.asked:
-        say(f"interrupted: {results.done} of {results.asked} cases are done")
+    if stopped_by is not None and results.done < results.requested:
+        say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
     if results.meets_requirement is False:
         sys.exit(REQUIREMENT_MISSED)
@@ -161,12 +161,12 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume
 
     results = Results(study, samples) if resume is None else load_results(resume, study, samples)
     unsaved: list[CannotWrite] = []
-    with stoppable() as stopped, progress("flying", samples, quiet=quiet, done=results.done) as told:
+    with stoppable() as stopped, progress("flying", samples, quiet=quiet, done=results.done) as show_done:
         saved = time.monotonic()
 
         def watch(done: int) -> None:
             nonlocal saved
-            told(done)
+            show_done(done)
             if resume is not None and time.monotonic() - saved > SAVED_EVERY:
                 with suppress(CannotWrite):  # the last time tells
                     save_results(resume, results)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class Report(PlanningCommand):
-    """``report``, in which ``--disperse`` may stand without a number."""
+    """``report``, in which ``--disperse`` may come without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Put in `SAMPLES` where no number follows ``--disperse``: what else follows is a file or an option."""

@@ -33,7 +33,7 @@ FASTEST = 100.0
 COUNT_FROM_ONE = click.IntRange(1)
 
 WIDEST = 26
-"""Characters of an option that its help stands beside; below a longer one."""
+"""Characters of an option that its help comes beside; below a longer one."""
 
 SHARED = names_of(SchemeOptions)
 """Options of every scheme."""

@@ -74,7 +74,7 @@ def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
 def reachable(spacecraft: Spacecraft) -> Inputs:
     """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
 
-    What each pulse draws stands there once.
+    What each pulse draws is there once.
     """
     pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
     if spacecraft.torquer is not None:

@@ -149,7 +149,7 @@ class Results:
     """
 
     study: Study
-    asked: int
+    requested: int
     done: int = 0
     redrawn: int = 0
     met: int = 0
@@ -160,8 +160,8 @@ class Results:
 
     def __post_init__(self) -> None:
         if self.values is None and self.sketches is None:
-            if self.asked <= EXACT_CASES:
-                self.values = np.empty((len(OUTPUTS), self.asked))
+            if self.requested <= EXACT_CASES:
+                self.values = np.empty((len(OUTPUTS), self.requested))
             else:
                 self.sketches = [Sketch() for _ in OUTPUTS]
 
@@ -193,8 +193,8 @@ class Results:
     @property
     def probability(self) -> float:
         """Share of cases that must comply."""
-        asked = self.study.model.spacecraft.requirement
-        return PROBABILITY if asked is None or asked.probability is None else asked.probability
+        required = self.study.model.spacecraft.requirement
+        return PROBABILITY if required is None or required.probability is None else required.probability
 
     @property
     def meets_requirement(self) -> bool | None:
@@ -222,12 +222,19 @@ class Results:
             sketch.add(row)
         self.done = first + values.shape[1]
 
-    def extended(self, asked: int) -> Results:
-        """The same, with room for ``asked`` cases; raises BadRequest where that is fewer than are done."""
-        if asked < self.done:
+    def extended(self, requested: int) -> Results:
+        """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
+        if requested < self.done:
             raise BadRequest(f"{self.done} cases are done already: ask for as many, or leave out what is resumed")
         more = Results(
-            self.study, asked, self.done, self.redrawn, self.met, self.worst, sketches=self.sketches, early=self.early
+            self.study,
+            requested,
+            self.done,
+            self.redrawn,
+            self.met,
+            self.worst,
+            sketches=self.sketches,
+            early=self.early,
         )
         if self.values is not None and more.values is not None:
             more.values[:, : self.done] = self.values[:, : self.done]
@@ -248,16 +255,16 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` asks for and does not have; returns ``results``.
 
-    ``watch`` is told now and then how many are done. When ``stopped`` says so, the cases done so far, always the first
-    ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.
+    ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
+    the first ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.
     """
     if collect is not None and results.done:
         if results.values is None:
             raise BadRequest(f"cases of an earlier run are kept singly only up to {EXACT_CASES}")
         collect(0, results.values[:, : results.done])
-    while results.done < results.asked and not stopped():
+    while results.done < results.requested and not stopped():
         first = results.done
-        last = min(results.asked, first - first % ROUND + ROUND)
+        last = min(results.requested, first - first % ROUND + ROUND)
         out = np.empty((len(OUTPUTS), last - first)) if results.values is None else results.values[:, first:last]
         flights = _Round(results, first, last, out, chunk)
         done, redrawn = flights.fly(threads, watch, stopped)
@@ -346,20 +353,20 @@ class _Round:
         """
         study, early = self.results.study, self.results.early
         draws, redrawn = drawn
-        # Whole strides are flown, even where fewer cases are wanted: what flies them may let one depend on its stride.
+        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
         for low in range(begin - begin % STRIDE, end, self.chunk):
             high = min(low + self.chunk, end + -end % STRIDE)
             rows = slice(low - start, high - start)
             ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
-            wanted = slice(max(low, begin), min(high, end))
-            inner = slice(wanted.start - low, wanted.stop - low)
+            columns = slice(max(low, begin), min(high, end))
+            inner = slice(columns.start - low, columns.stop - low)
             outputs = np.empty((len(OUTPUTS), high - low))
             measure(study.model, ends, outputs)
-            place = slice(wanted.start - self.first, wanted.stop - self.first)
+            place = slice(columns.start - self.first, columns.stop - self.first)
             self.out[:, place] = outputs[:, inner]
             self.severity[place] = study.severity(outputs, ends.spin)[inner]
             if low < EARLY:
                 outcome = np.empty((ROWS, high - low))
                 vectors(study.model, ends, outcome)
-                early[:, wanted] = outcome[:, inner]
+                early[:, columns] = outcome[:, inner]
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))

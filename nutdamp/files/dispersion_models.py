@@ -82,7 +82,7 @@ class ToleranceSection(Section):
     bias: Any = Field(default=None, description="Fixed offset, signed, in its unit or in %.", examples=["-2 ms"])
 
     def tolerance(self, key: str) -> Tolerance:
-        """The checked tolerance, which stands at ``key`` of the dispersions."""
+        """The checked tolerance, which is at ``key`` of the dispersions."""
         kind = next(kind for kind in KINDS if getattr(self, kind) is not None)
         size, relative = size_of(getattr(self, kind), QUANTITIES[key])
         return Tolerance(kind, size, relative)
@@ -100,7 +100,7 @@ def _all_alike(value: object, several: core_schema.ValidatorFunctionWrapHandler)
 
 
 class Shown:
-    """Annotation of what stands at ``key``: its JSON Schema, with the units of its quantity."""
+    """Annotation of what is at ``key``: its JSON Schema, with the units of its quantity."""
 
     def __init__(self, key: str) -> None:
         self.key = key

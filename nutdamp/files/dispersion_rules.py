@@ -30,7 +30,7 @@ sign. Of an angle the nominal value is 90 deg."""
 
 
 class Entry(NamedTuple):
-    """One tolerance: where it stands, what kind of quantity it holds, the least nominal value and what that is."""
+    """One tolerance: where it is, what kind of quantity it holds, the least nominal value and what that is."""
 
     path: KeyPath
     kind: str
@@ -59,7 +59,7 @@ def _probability(facts: Facts) -> Iterator[Finding]:
 
 
 def _entries(facts: Facts) -> Iterator[Entry]:
-    """All tolerances that stand in the file."""
+    """All tolerances in the file."""
     thrusts = _thrusts(facts)
     for key, kind in QUANTITIES.items():
         path: KeyPath = ("dispersions", key)

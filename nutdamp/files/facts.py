@@ -33,7 +33,7 @@ class Facts:
         self.root = root
 
     def has(self, *path: str | int) -> bool:
-        """Whether something stands at ``path``."""
+        """Whether something is at ``path``."""
         return self.root.get(*path) is not None
 
     def text(self, *path: str | int) -> str | None:
@@ -57,6 +57,6 @@ class Facts:
         return None if None in numbers else np.array(numbers, dtype=np.float64)
 
     def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and what stands there."""
+        """Keys or positions at ``path``, and what is there."""
         node = self.root.get(*path)
         return [] if node is None else list(node.children())

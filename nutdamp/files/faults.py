@@ -54,7 +54,7 @@ def read_contents(
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
-    """The finding with its place; what is missing is reported where the key of its parent stands."""
+    """The finding with its place; what is missing is reported at the key of its parent."""
     path = finding.path
     if finding.at_key:
         place = root.key_place_of(path)
@@ -108,7 +108,7 @@ def _type_errors(error: ValidationError) -> Iterator[Finding]:
 
 
 def _description(path: KeyPath) -> str:
-    """What stands at ``path``, as the model describes it."""
+    """What is at ``path``, as the model describes it."""
     model: type[BaseModel] | None = SpacecraftFile
     text = ""
     for step in path:

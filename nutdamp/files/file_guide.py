@@ -29,7 +29,7 @@ class Key(NamedTuple):
 
     @property
     def parent(self) -> str:
-        """Path of what it stands in; empty at the root."""
+        """Path of what it is in; empty at the root."""
         return self.path.rpartition(".")[0]
 
     @property

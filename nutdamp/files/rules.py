@@ -178,7 +178,7 @@ def _motion(facts: Facts) -> Iterator[Finding]:
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
-    """The rate about principal axis 3, and where it stands; what rounding leaves of a transverse rate is zero."""
+    """The rate about principal axis 3, and where it is; what rounding leaves of a transverse rate is zero."""
     omega0, tensor = facts.vector("rate", 3, "omega0"), tensor_of(facts)
     if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
         return (), None

@@ -146,9 +146,9 @@ def _brief(text: str) -> str:
 
 
 def _put(node: Node, path: KeyPath, behind: KeyPath, value: Node, place: Place) -> Node:
-    """``node``, which stands at ``behind``, with ``value`` at ``path`` below it.
+    """``node``, which is at ``behind``, with ``value`` at ``path`` below it.
 
-    What changes is copied: through aliases a node may stand in several places of the tree.
+    What changes is copied: through aliases a node may be in several places of the tree.
     """
     if not path:
         return value

@@ -1,4 +1,4 @@
-"""YAML text -> plain values that remember where they stand, by the core schema of YAML 1.2.
+"""YAML text -> plain values that remember where they are, by the core schema of YAML 1.2.
 
 Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a bomb of aliases
 is refused before it unfolds. JSON is read by the same path. Whatever is wrong becomes `FaultyFile` with its place.
@@ -54,7 +54,7 @@ Scalar = str | int | float | bool | None
 
 @dataclass(slots=True)
 class Node:
-    """A value and where it stands; ``keys`` holds the places of a mapping's keys."""
+    """A value and where it is; ``keys`` holds the places of a mapping's keys."""
 
     value: Scalar | dict[str, Node] | list[Node]
     place: Place
@@ -73,7 +73,7 @@ class Node:
         return node
 
     def children(self) -> Iterator[tuple[str | int, Node]]:
-        """Keys or positions, and what stands there; nothing for a scalar."""
+        """Keys or positions, and what is there; nothing for a scalar."""
         if isinstance(self.value, dict):
             yield from self.value.items()
         elif isinstance(self.value, list):
@@ -88,7 +88,7 @@ class Node:
         return self.value
 
     def place_of(self, path: KeyPath) -> Place:
-        """Where the value at ``path`` stands, or the innermost of its parents that exists."""
+        """Where the value at ``path`` is, or the innermost of its parents that exists."""
         for length in range(len(path), 0, -1):
             node = self.get(*path[:length])
             if node is not None:
@@ -96,7 +96,7 @@ class Node:
         return self.place
 
     def key_place_of(self, path: KeyPath) -> Place:
-        """Where the key of ``path`` stands; of a list entry or the root, the value."""
+        """Where the key of ``path`` is; of a list entry or the root, the value."""
         parent = self.get(*path[:-1]) if path else None
         if parent is not None and isinstance(path[-1], str) and path[-1] in parent.keys:
             return parent.keys[path[-1]]

@@ -19,7 +19,7 @@ def topics(file: str) -> tuple[Topic, ...]:
 
 
 def _sections(text: str, mark: str) -> list[str]:
-    """What stands before the first line that begins with ``mark``, and behind each of them."""
+    """What comes before the first line that begins with ``mark``, and behind each of them."""
     return f"\n{text}".split(f"\n{mark}")
 
 

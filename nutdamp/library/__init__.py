@@ -7,7 +7,7 @@
     flight = plan.fly()
     flight.to_csv("track.csv")
 
-It stands beneath the command line. The types are those of the modules below; how they show and write themselves is in
+It is what the command line calls. The types are those of the modules below; how they show and write themselves is in
 `views`. Attributes are SI and radians, vectors in principal axes unless they say that they are in the axes of the
 spacecraft file; arrays with named fields carry the names and units of the CSV files.
 """

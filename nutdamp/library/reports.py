@@ -32,7 +32,7 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """What stands on top of the page."""
+        """What is on top of the page."""
         return self.page.verdict
 
     @property

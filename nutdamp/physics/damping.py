@@ -56,7 +56,7 @@ def mounting_angle(A: float, C: float, omega: float, spin: float) -> float:
 
 
 def phase_to_oppose(omega: complex, torque: complex) -> float:
-    """Angle in rad, (-π, π], by which ω has still to turn back, at a ω3 > 0, to stand against ``torque``.
+    """Angle in rad, (-π, π], by which ω has still to turn back, at a ω3 > 0, to point against ``torque``.
 
     The best moment for a body-fixed torque direction d is arg ω = arg d + π. For ±1, ±2 this is the table of
     Magnus 1970 before fig. 5 when a ω3 > 0, and its mirror image when a ω3 < 0, where the printed table would

@@ -155,7 +155,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def percentiles(results: Results) -> Array:
-    """What a study is asked for."""
+    """What a study is requested."""
     distribution = results.distribution("nutation")
     assert distribution is not None
     return np.asarray(distribution.quantiles(np.array([0.5, 0.9, 0.95, 0.99, 0.997])))

@@ -10,7 +10,7 @@ import pytest
 
 
 def completed(*words: str) -> list[str]:
-    """What bash is told to complete the last of ``words`` with: type and value of each."""
+    """What bash is reported to complete the last of ``words`` with: type and value of each."""
     done = subprocess.run(
         # click completes for the name that the process was called by
         [sys.executable, "-c", "import sys; sys.argv = ['nutdamp']; from nutdamp.cli import main; main()"],

@@ -65,9 +65,9 @@ def test_the_json_is_that_of_the_contract(run: Run, body: Path) -> None:
         assert {*PERCENTS, "max"} <= set(data["percentiles"][column])
     nutation = data["percentiles"]["nutation_deg"]
     assert sorted(nutation[percent] for percent in PERCENTS) == [nutation[percent] for percent in PERCENTS]
-    asked = data["requirement"]
-    assert asked["low"] < asked["met_fraction"] < asked["high"]
-    assert asked["confidence"] == 0.95
+    requested = data["requirement"]
+    assert requested["low"] < requested["met_fraction"] < requested["high"]
+    assert requested["confidence"] == 0.95
     assert sum(share["analytic"] for share in data["shares"]) == pytest.approx(1.0)
     assert {share["input"] for share in data["shares"]} > {"A", "C", "omega0_1", "thrust steerable", "timing pulse 2"}
     assert all(0.0 <= share["sampled"] <= 1.0 for share in data["shares"])
@@ -215,7 +215,7 @@ def test_broken_command_lines(run: Run, body: Path, arguments: tuple[str, ...], 
     assert sorted(path.name for path in body.parent.iterdir()) == ["body.yaml"]
 
 
-def test_a_file_without_dispersions_is_told_what_to_add(run: Run, body: Path) -> None:
+def test_a_file_without_dispersions_is_reported_what_to_add(run: Run, body: Path) -> None:
     body.write_text(FILE[: FILE.index("dispersions:")])
     done = run("disperse", "body.yaml")
     assert done.returncode == 2
@@ -233,7 +233,7 @@ def test_dispersions_that_are_impossible_are_refused(run: Run, body: Path) -> No
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_disk_is_told(run: Run, body: Path) -> None:
+def test_a_full_disk_is_reported(run: Run, body: Path) -> None:
     done = run("disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "20000", "--csv", "/dev/full")
     assert done.returncode == 1
     assert "cannot write /dev/full: No space left" in done.stderr
@@ -271,7 +271,7 @@ def interrupted(body: Path, number: signal.Signals, *arguments: str, wait: str) 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: signal.Signals) -> None:
-    """The first cases are written, whole; and they are those of a run that asked for no more."""
+    """The first cases are written, whole; and they are those of a run that requested no more."""
     files = ("--csv", "s.csv", "--json", "s.json", "--resume", "kept.npz")
     status, out, err = interrupted(body, number, "--flown", "--samples", "1e8", *files, wait=".part")
     assert status == 128 + number

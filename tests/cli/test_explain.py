@@ -101,21 +101,21 @@ def test_all_equations_at_a_glance() -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "number"),
+    ("requested", "number"),
     [("17", "M(17)"), ("m17", "M(17)"), ("(17)", "M(17)"), ("M 17", "M(17)"), ("k7", "K(7)"), ("K(7)", "K(7)"),
      ("24.4", "24.4"), ("§24.4", "24.4")],
 )  # fmt: skip
-def test_numbers_as_people_write_them(asked: str, number: str) -> None:
-    assert guide.found(asked).name == number
+def test_numbers_as_people_write_them(requested: str, number: str) -> None:
+    assert guide.found(requested).name == number
 
 
-@pytest.mark.parametrize("asked", ["Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES"])
-def test_figures_as_people_write_them(asked: str) -> None:
-    assert guide.found(asked) is FIGURES
+@pytest.mark.parametrize("requested", ["Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES"])
+def test_figures_as_people_write_them(requested: str) -> None:
+    assert guide.found(requested) is FIGURES
 
 
 @pytest.mark.parametrize(
-    ("asked", "hint"),
+    ("requested", "hint"),
     [
         ("tow-pulse", "did you mean 'two-pulse'?"),
         ("nutaton", "did you mean 'nutation'?"),
@@ -128,8 +128,8 @@ def test_figures_as_people_write_them(asked: str) -> None:
         ("weather", "`nutdamp explain` lists them"),
     ],
 )
-def test_what_there_is_not_says_what_is_near(run: Run, asked: str, hint: str) -> None:
-    done = run("explain", asked)
+def test_what_there_is_not_says_what_is_near(run: Run, requested: str, hint: str) -> None:
+    done = run("explain", requested)
     assert done.returncode == 2
     assert done.stdout == ""
     assert hint in done.stderr
@@ -137,7 +137,7 @@ def test_what_there_is_not_says_what_is_near(run: Run, asked: str, hint: str) ->
 
 
 def test_every_key_of_the_models_is_in_the_file_topic() -> None:
-    """With its description, unit and example; and each can be asked for alone."""
+    """With its description, unit and example; and each can be requested alone."""
     shown = words(explained("file"))
     every = list(keys())
     schema = SpacecraftFile.model_json_schema()

@@ -170,7 +170,7 @@ def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
     assert "2 manoeuvres; --schedule FILE writes them" in shown.stderr
 
 
-def test_faults_of_a_message_are_told_by_line(run: Run, dated: Path) -> None:
+def test_faults_of_a_message_are_reported_by_line(run: Run, dated: Path) -> None:
     text = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse").stdout
     bad = text.replace("QC ", "QD ").replace("IZZ               = 80.0", "IZZ               = 800.0")
     (dated.parent / "bad.apm").write_text(bad)

@@ -268,10 +268,12 @@ def test_cones_and_pulses_per_turn_are_heeded(run: Run, tmp_path: Path) -> None:
 
 def test_the_sun_by_which_the_pulses_keep_their_phase(run: Run, tmp_path: Path) -> None:
     (tmp_path / "body.yaml").write_text("name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n")
-    asked = ("plan", "body.yaml", "--target", "40deg,0deg", "--scheme", "rhumb-line", "--json", "-")
-    straight, by_sun = (json.loads(run(*asked, *more).stdout)["plans"][0] for more in ((), ("--sun", "40deg,60deg")))
+    requested = ("plan", "body.yaml", "--target", "40deg,0deg", "--scheme", "rhumb-line", "--json", "-")
+    straight, by_sun = (
+        json.loads(run(*requested, *more).stdout)["plans"][0] for more in ((), ("--sun", "40deg,60deg"))
+    )
     assert by_sun["total_impulse_Nms"] > 1.01 * straight["total_impulse_Nms"]
-    assert run(*asked, "--sun", "190deg,0deg").returncode == 2
+    assert run(*requested, "--sun", "190deg,0deg").returncode == 2
 
 
 # --- awkward spacecraft on the screen ---------------------------------------------------------------------------------

@@ -46,22 +46,24 @@ def test_only_a_terminal_is_shown_a_bar_and_only_where_it_is_wanted(monkeypatch:
     assert shown(monkeypatch, Terminal(), 0.0, quiet=True) == ""
 
 
-@pytest.mark.parametrize(("patience", "quiet", "told"), [(0.0, False, True), (60.0, False, False), (0.0, True, False)])
+@pytest.mark.parametrize(
+    ("patience", "quiet", "reported"), [(0.0, False, True), (60.0, False, False), (0.0, True, False)]
+)
 def test_what_takes_long_is_named_while_it_is_done(
-    monkeypatch: pytest.MonkeyPatch, patience: float, quiet: bool, told: bool
+    monkeypatch: pytest.MonkeyPatch, patience: float, quiet: bool, reported: bool
 ) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(module, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning", quiet=quiet):
-        while told and "planning" not in stream.getvalue():
+        while reported and "planning" not in stream.getvalue():
             time.sleep(0.01)
-    assert ("planning" in stream.getvalue()) is told
+    assert ("planning" in stream.getvalue()) is reported
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_run_is_asked_to_stop_and_a_second_ctrl_c_interrupts(number: signal.Signals) -> None:
+def test_a_run_is_requested_to_stop_and_a_second_ctrl_c_interrupts(number: signal.Signals) -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with stoppable() as stopped:
         assert not stopped()

@@ -128,7 +128,7 @@ def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
         assert "-:1:1: " in done.stderr
 
 
-# --- places that cannot be written to are told before the work --------------------------------------------------------
+# --- places that cannot be written to are reported before the work ---------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
         "verify --json no/x.json",
     ],
 )
-def test_a_missing_folder_is_told_before_the_work(run: Run, tmp_path: Path, command: str) -> None:
+def test_a_missing_folder_is_reported_before_the_work(run: Run, tmp_path: Path, command: str) -> None:
     done = run(*command.split(), "--quiet")
     assert (done.returncode, done.stdout) == (1, "")
     assert "cannot write no/x." in done.stderr
@@ -153,7 +153,7 @@ def test_a_missing_folder_is_told_before_the_work(run: Run, tmp_path: Path, comm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_bad_file_is_told_before_a_missing_folder(run: Run, odd: str, tmp_path: Path) -> None:
+def test_a_bad_file_is_reported_before_a_missing_folder(run: Run, odd: str, tmp_path: Path) -> None:
     (tmp_path / "bad.yaml").write_text("name: 5")
     assert run("plan", "bad.yaml", "--csv", "no/x.csv").returncode == 2
 
@@ -164,7 +164,7 @@ def test_a_file_is_no_folder_for_schedules(run: Run, odd: str) -> None:
     assert done.stderr.splitlines()[-1] == "nutdamp: cannot write odd.yaml: it is there, and no directory"
 
 
-def test_a_schedule_with_semicolons_is_told_about_commas(run: Run, tmp_path: Path) -> None:
+def test_a_schedule_with_semicolons_is_sent_to_commas(run: Run, tmp_path: Path) -> None:
     pulses = run("plan", "--csv", "-", "--quiet").stdout
     done = run("simulate", "--schedule", "-", "--quiet", stdin=pulses.replace(",", ";"))
     assert done.returncode == 2

@@ -1,4 +1,4 @@
-"""No option is ignored in silence: what does nothing is told, what contradicts is refused."""
+"""No option is ignored in silence: what does nothing is reported, what contradicts is refused."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from nutdamp.cli.root import COMMANDS
         ("plan --scheme half-cone --target 10deg,45deg --per-turn 2", "--per-turn", "rhumb-line"),
     ],
 )
-def test_an_option_that_no_scheme_planned_reads_is_told(run: Run, command: str, option: str, reader: str) -> None:
+def test_an_option_that_no_scheme_planned_reads_is_reported(run: Run, command: str, option: str, reader: str) -> None:
     done = run(*command.split())
-    (told,) = [line for line in done.stderr.splitlines() if "does nothing here" in line]
-    assert told.startswith(option)
-    assert reader in told
+    (reported,) = [line for line in done.stderr.splitlines() if "does nothing here" in line]
+    assert reported.startswith(option)
+    assert reader in reported
     assert "does nothing here" not in run(*command.split(), "--quiet").stderr
 
 
@@ -86,7 +86,7 @@ def test_a_direction_of_the_sun_that_nothing_reads_is_refused(run: Run, tmp_path
         assert "--sun is for rhumb-line, which is not planned here" in done.stderr
 
 
-def test_of_schemes_that_do_not_read_the_sun_it_is_told(run: Run) -> None:
+def test_of_schemes_that_do_not_read_the_sun_it_is_reported(run: Run) -> None:
     command = ("plan", "--target", "10deg,45deg", "--sun", "70deg,0deg", "--scheme", "rhumb-line")
     assert run(*command).stderr == "no spacecraft file named, and no spacecraft.yaml here: " + (
         "using the built-in example (see `nutdamp init`)\n"

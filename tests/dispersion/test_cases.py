@@ -102,7 +102,7 @@ def test_the_attitude_is_off_by_a_rotation_vector() -> None:
     assert turned == pytest.approx(expected, abs=1e-14)
 
 
-def test_bodies_and_thrusts_that_cannot_be_are_told() -> None:
+def test_bodies_and_thrusts_that_cannot_be_are_reported() -> None:
     model = dispersed.with_jets(moments=(100.0, 100.0, 180.0))
     moments = model.physical({"A": np.array([0.0, -9.9, -10.1, -101.0]), "C": 0.0})
     assert np.asarray(moments).tolist() == [True, True, False, False]
@@ -131,7 +131,7 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
     """Idle thrusters, thrusters known by torque, sizes of zero, a torquer that gives a torque wherever it sits."""
     body = spinner(degrees=0.0, channels=(channel("T1", 8.0, 0.0, 0.0), channel("T2", 0.0, 8.0, 0.0)))
     tolerance, nothing = Tolerance("normal", 0.01), Tolerance("normal", 0.0)
-    asked = Dispersions(
+    requested = Dispersions(
         C=nothing,
         omega0=(Tolerance("normal", 0.1, True), None, None),
         thrust={"T1": tolerance, "T2": tolerance},
@@ -140,7 +140,7 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
         timing=tolerance,
     )
     fired = Schedule((channel_pulse(body.channels[0], 1.0, 0.5),))
-    found = list_inputs(replace(body, dispersions=asked), fired)
+    found = list_inputs(replace(body, dispersions=requested), fired)
     assert [entry.name for entry in found.drawn] == ["thrust T1", "timing pulse 1"]
     because = dict(found.unused)
     assert because["thrust T2"] == "the schedule does not fire T2"
@@ -151,12 +151,12 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
 
     torquer = spinner(steerable=Steerable(20.0))
     steered = Schedule((steerable_pulse(Steerable(20.0), 1.0, 0.3, on_time=0.2),))
-    asked = Dispersions(thrust_direction={"steerable": tolerance}, position={"steerable": tolerance})
-    found = list_inputs(replace(torquer, dispersions=asked), steered)
+    requested = Dispersions(thrust_direction={"steerable": tolerance}, position={"steerable": tolerance})
+    found = list_inputs(replace(torquer, dispersions=requested), steered)
     assert [entry.name for entry in found.drawn] == ["direction steerable"]
     assert [name for name, _ in found.unused] == ["position steerable"]
     idle = list_inputs(
-        replace(torquer, dispersions=replace(asked, timing=tolerance, timing_offset=tolerance)), Schedule()
+        replace(torquer, dispersions=replace(requested, timing=tolerance, timing_offset=tolerance)), Schedule()
     )
     assert not idle.drawn
     assert {name for name, _ in idle.unused} == {"direction steerable", "position steerable", "timing", "timing offset"}
@@ -164,8 +164,8 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
 
 def test_relative_sizes_are_shares_of_the_nominal_value() -> None:
     body = spinner(A=120.0, C=80.0, spin=-3.0)
-    asked = Dispersions(A=Tolerance("normal", 0.02, True), omega0=(None, None, Tolerance("bias", 0.01, True)))
-    drawn = {entry.name: entry for entry in list_inputs(replace(body, dispersions=asked), Schedule()).drawn}
+    requested = Dispersions(A=Tolerance("normal", 0.02, True), omega0=(None, None, Tolerance("bias", 0.01, True)))
+    drawn = {entry.name: entry for entry in list_inputs(replace(body, dispersions=requested), Schedule()).drawn}
     assert drawn["A"].size == pytest.approx(2.4)
     assert drawn["A"].sigma == pytest.approx(2.4)
     assert drawn["omega0_3"].size == pytest.approx(-0.03)

@@ -61,7 +61,7 @@ def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
     assert np.array_equal(2.0 * alone, drawn.block(3)[0]["C"])
 
 
-def test_what_cannot_be_is_drawn_again_and_told() -> None:
+def test_what_cannot_be_is_drawn_again_and_reported() -> None:
     """Values above one sigma are refused: 15.87 % are drawn again, of those again 15.87 % and so on."""
     entry = an_input("normal", 1.0)
     drawn = Source([entry], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)

@@ -62,9 +62,9 @@ def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> Non
 
 def test_shares_sum_to_one_and_a_bias_has_none() -> None:
     model = dispersed.with_jets()
-    asked = model.spacecraft.dispersions
-    assert asked is not None
-    body = replace(model.spacecraft, dispersions=replace(asked, C=Tolerance("bias", 0.8)))
+    requested = model.spacecraft.dispersions
+    assert requested is not None
+    body = replace(model.spacecraft, dispersions=replace(requested, C=Tolerance("bias", 0.8)))
     found = first_order(Model(body, model.schedule))
     names = [entry.name for entry in found.inputs]
     for output in OUTPUTS:

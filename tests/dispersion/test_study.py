@@ -90,12 +90,12 @@ def test_a_study_can_be_extended(plain: Results, tmp_path: Path) -> None:
 def test_only_the_same_study_is_taken_up(tmp_path: Path) -> None:
     path = str(tmp_path / "study.npz")
     save_results(path, run(Results(a_study(), 100)))
-    asked = a_study().model.spacecraft.dispersions
-    assert asked is not None
+    requested = a_study().model.spacecraft.dispersions
+    assert requested is not None
     others = [
         replace(a_study(), seed=6),
         a_study(omega0=a_study().model.spacecraft.omega0 * (1.0 + 1e-15)),
-        a_study(dispersions=replace(asked, A=Tolerance("normal", 0.1))),
+        a_study(dispersions=replace(requested, A=Tolerance("normal", 0.1))),
         a_study(requirement=None),
     ]
     for other in others:

@@ -197,7 +197,7 @@ def test_python_warns_where_the_library_was_called(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("keys", ["Ixx: 120, Iyy: 118, Izz: 80", "I1: 1, I2: 2, I3: 2", "ixx: 1, Jyy: 1, I_zz: 1"])
-def test_single_moments_are_told_about_the_tensor(keys: str) -> None:
+def test_single_moments_are_sent_to_the_tensor(keys: str) -> None:
     with pytest.raises(FaultyFile) as caught:
         read_spacecraft(f"name: X\ninertia: {{{keys}}}\nomega0: [0.1, 0, 3]\n", "f.yaml")
     assert len(caught.value.faults) == 3

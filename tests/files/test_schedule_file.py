@@ -71,13 +71,13 @@ def test_a_longer_on_time_is_what_the_thruster_then_does(written: Path) -> None:
     left = flight.flown(EXAMPLE, made).residual
     assert math.degrees(left.nutation) == pytest.approx(0.2477, abs=5e-5)
     assert left.nutation == pytest.approx(Outcome(EXAMPLE, made).nutation, abs=1e-9)
-    # Each kind of column is told once: centre, impulse, propellant.
+    # Each kind of column is reported once: centre, impulse, propellant.
     starts = [warning.partition(":5: ")[2].split()[0] for warning in warnings]
     assert starts == ["t_s", "impulse_1_Nms", "propellant_kg"]
     assert all(warning.endswith("ignored") for warning in warnings)
 
 
-def test_columns_that_contradict_in_many_rows_are_told_once(written: Path) -> None:
+def test_columns_that_contradict_in_many_rows_are_reported_once(written: Path) -> None:
     for row in (1, 2, 3):
         edited(written, row, torque_1_Nm="1", torque_2_Nm="x", propellant_kg="")
     _, warnings = read_pulses(written, EXAMPLE)
@@ -155,7 +155,7 @@ def test_an_ideal_impulse_of_a_channel(tmp_path: Path) -> None:
 
 
 def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Path) -> None:
-    """Too short, too long, off the ticks: as given, and told."""
+    """Too short, too long, off the ticks: as given, and reported."""
     (tmp_path / "s.csv").write_text("start_s,on_time_s,channel\n1,0.001,+M1\n5.0123456,3,+M2\n")
     done = run("simulate", "--schedule", "s.csv", "--set", "limits.tick=10 ms", "--json", "-")
     assert done.returncode == 0, done.stderr
@@ -166,7 +166,7 @@ def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Pa
         assert text in done.stderr
 
 
-def test_columns_that_are_not_known_are_told(tmp_path: Path) -> None:
+def test_columns_that_are_not_known_are_reported(tmp_path: Path) -> None:
     _, warnings = read("start_s,on_time_s,channel,note,nutation_after_deg\n1,1,+M1,first,77\n", tmp_path)
     assert [warning.rpartition(":1: ")[2] for warning in warnings] == ["the column 'note' is not known: ignored"]
 

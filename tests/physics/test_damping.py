@@ -156,11 +156,11 @@ def moment(A: float, C: float, spin: float, thruster: int, mirrored: bool) -> co
     """ω of size 1/5 at the moment at which the table fires a thruster, by the rates of change of Euler's equations."""
     passing, sign = TABLE[thruster]
     rate = (A - C) / A * spin
-    wanted = sign * (-1 if mirrored else 1)
+    expected = sign * (-1 if mirrored else 1)
     for omega in (0.2, -0.2, 0.2j, -0.2j):
         slope = {"omega1": rate * complex(omega).imag, "omega2": -rate * complex(omega).real}
         zero = {"omega1": complex(omega).real, "omega2": complex(omega).imag}
-        if zero[passing] == 0.0 and slope[passing] * wanted > 0:
+        if zero[passing] == 0.0 and slope[passing] * expected > 0:
             return complex(omega)
     raise AssertionError("the table names no moment")
 

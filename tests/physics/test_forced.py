@@ -195,11 +195,11 @@ def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
 def test_the_resonant_torque_reaches_a_cone_when_it_says() -> None:
     A, C, spin, torque = 120.0, 80.0, 3.0, 0.5 + 0.2j
     for start in (0.0, 0.03 - 0.02j, -0.05 + 0.01j):
-        wanted = math.radians(4.0)
-        time = forced.resonant_time(A, C, start, spin, torque, wanted)
+        expected = math.radians(4.0)
+        time = forced.resonant_time(A, C, start, spin, torque, expected)
         nutation = (A - C) / A * spin
         omega = forced.rotating_torques(np.array([time]), start, spin, A, C, np.array([torque]), np.array([-nutation]))
-        assert math.atan2(A * abs(omega[0]), C * spin) == pytest.approx(wanted, rel=1e-12)
+        assert math.atan2(A * abs(omega[0]), C * spin) == pytest.approx(expected, rel=1e-12)
     assert forced.resonant_time(A, C, 1.0, spin, torque, 0.01) == 0.0
 
 

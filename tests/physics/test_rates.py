@@ -219,7 +219,7 @@ def test_no_impulse_takes_no_time() -> None:
     st.floats(-0.1, 0.1),
     st.floats(0.01, 0.95),
 )
-def test_on_time_with_axial_torque_gives_the_impulse_asked_for(
+def test_on_time_with_axial_torque_gives_the_impulse_requested(
     a: float, spin: float, share: float, part: float
 ) -> None:
     """While the spin changes by less than a third: found, and exact to rounding."""

@@ -173,5 +173,5 @@ def test_precession_under_a_despun_torque_turns_the_axis_in_space(A: float, C: f
     assert complex(flown[0], flown[1]) == pytest.approx(steady, rel=1e-12)
     angle = abs(steady) * 10.0
     # ω lies along ±body axis 2 of the start, so that the axis goes towards σM, a torque along +1.
-    wanted = [math.copysign(math.sin(angle), spin), 0.0, math.cos(angle)]
-    assert flown[2:].reshape(3, 3)[:, 2] == pytest.approx(wanted, abs=1e-12)
+    expected = [math.copysign(math.sin(angle), spin), 0.0, math.cos(angle)]
+    assert flown[2:].reshape(3, 3)[:, 2] == pytest.approx(expected, abs=1e-12)

@@ -180,8 +180,8 @@ def test_energy_and_angular_momentum_stay(moments: Array, rates0: Array) -> None
     assert track[0] == pytest.approx(rates0, abs=1e-15 * size)
     assert np.square(track) @ moments == pytest.approx(np.square(rates0) @ moments, rel=1e-13, abs=1e-290)
     momentum = attitude.rotate(attitudes, track * moments)
-    wanted = attitude.rotate(START, rates0 * moments)
-    assert np.linalg.norm(momentum - wanted, axis=1).max() <= 1e-13 * np.linalg.norm(wanted)
+    expected = attitude.rotate(START, rates0 * moments)
+    assert np.linalg.norm(momentum - expected, axis=1).max() <= 1e-13 * np.linalg.norm(expected)
     assert turned(attitudes[:1], START[None, :]) < 1e-15
     assert np.linalg.norm(attitudes, axis=1) == pytest.approx(1.0, abs=1e-15)
 

@@ -115,7 +115,7 @@ def test_without_a_target_it_says_so() -> None:
         assert infeasibility(planning.plan(spinner(), scheme)) == "needs a target axis: --target, or goal in the file"
 
 
-def test_no_time_left_is_not_told_as_a_negative_time() -> None:
+def test_no_time_left_is_not_reported_as_a_negative_time() -> None:
     """What takes the nutation out first ends so late that the gap reaches past the horizon."""
     body = spinner(
         2.373744652338654,

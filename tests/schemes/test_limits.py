@@ -18,7 +18,7 @@ from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
 PATIENCE = 10_000_000
 """Calls of functions for one plan, which takes two million at most; so that an endless search fails, not hangs."""
 
-ASKED = {
+REQUESTED = {
     "one-pulse": ("one-pulse", Options()),
     "two-pulse": ("two-pulse", Options()),
     "two-pulse, literal": ("two-pulse", Options(literal=True)),
@@ -131,14 +131,14 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         assert len(plan.pulses) == 2
 
 
-@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("block", some(range(10), always=2))
-def test_whatever_the_limits(block: int, asked: tuple[str, Options]) -> None:
+def test_whatever_the_limits(block: int, requested: tuple[str, Options]) -> None:
     """Seeds, not hypothesis: its examples change with every module that happens to be loaded."""
     for seed in range(20 * block, 20 * (block + 1)):
         body = random_spacecraft(np.random.default_rng(seed))
         try:
-            check(body, *asked)
+            check(body, *requested)
         except BaseException as failure:
             failure.add_note(f"seed {seed}: {body}")
             raise
@@ -161,22 +161,22 @@ HARD = {
 }
 
 
-@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
-def test_awkward_limits(hard: Limits, asked: tuple[str, Options]) -> None:
+def test_awkward_limits(hard: Limits, requested: tuple[str, Options]) -> None:
     for actuators in (cross(20.0), cross(0.5, min_on_time=0.02, max_on_time=0.3), fan(16, 3.0)):
-        check(spinner(channels=actuators, limits=hard), *asked)
+        check(spinner(channels=actuators, limits=hard), *requested)
     for torque in (None, 50.0, 0.5):
-        if asked[0] != "four-pulse":
-            check(spinner(steerable=Steerable(torque), limits=hard), *asked)
+        if requested[0] != "four-pulse":
+            check(spinner(steerable=Steerable(torque), limits=hard), *requested)
 
 
-@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e9], ids=str)
-def test_units_of_mass_do_not_matter(scale: float, asked: tuple[str, Options]) -> None:
+def test_units_of_mass_do_not_matter(scale: float, requested: tuple[str, Options]) -> None:
     """Inertia and torques scaled together: the same pulses."""
     plain, scaled = (
-        planning.plan(spinner(120.0 * s, 80.0 * s, channels=cross(20.0 * s)), *asked) for s in (1.0, scale)
+        planning.plan(spinner(120.0 * s, 80.0 * s, channels=cross(20.0 * s)), *requested) for s in (1.0, scale)
     )
     assert scaled.feasible == plain.feasible
     assert [one.channel for one in scaled.pulses] == [one.channel for one in plain.pulses]
@@ -185,34 +185,36 @@ def test_units_of_mass_do_not_matter(scale: float, asked: tuple[str, Options]) -
         assert other.on_time == pytest.approx(one.on_time, rel=1e-9)
 
 
-@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("scale", [1e-6, 1e3], ids=str)
-def test_units_of_time_do_not_matter(scale: float, asked: tuple[str, Options]) -> None:
+def test_units_of_time_do_not_matter(scale: float, requested: tuple[str, Options]) -> None:
     """Spin × s, torques × s²: the same pulses s times as fast."""
-    plain, scaled = (planning.plan(spinner(spin=3.0 * s, channels=cross(20.0 * s * s)), *asked) for s in (1.0, scale))
+    plain, scaled = (
+        planning.plan(spinner(spin=3.0 * s, channels=cross(20.0 * s * s)), *requested) for s in (1.0, scale)
+    )
     assert [one.channel for one in scaled.pulses] == [one.channel for one in plain.pulses]
     for one, other in zip(plain.pulses, scaled.pulses, strict=True):
         assert other.t * scale == pytest.approx(one.t, rel=1e-8)
         assert other.on_time * scale == pytest.approx(one.on_time, rel=1e-8)
 
 
-@pytest.mark.parametrize("asked", ASKED.values(), ids=ASKED)
+@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("degrees", [1e-9, 1e-6, 1e-3, 70.0, 89.0])
-def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, asked: tuple[str, Options]) -> None:
+def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, requested: tuple[str, Options]) -> None:
     for C, spin in ((40.0, 3.0), (80.0, -3.0), (120.0, 3.0), (240.0, -3.0)):
         torque = spinner(120.0, C, spin, degrees).least_impulse * 3.0
-        check(spinner(120.0, C, spin, degrees, channels=cross(torque)), *asked)
-        if asked[0] != "four-pulse":
-            check(spinner(120.0, C, spin, degrees, steerable=Steerable(torque)), *asked)
+        check(spinner(120.0, C, spin, degrees, channels=cross(torque)), *requested)
+        if requested[0] != "four-pulse":
+            check(spinner(120.0, C, spin, degrees, steerable=Steerable(torque)), *requested)
 
 
 def test_many_channels() -> None:
     body = spinner(channels=fan(24, 4.0))
-    for asked in ASKED.values():
-        check(body, *asked)
+    for requested in REQUESTED.values():
+        check(body, *requested)
 
 
-@pytest.mark.parametrize("asked", [ASKED[name] for name in ("one-pulse", "two-pulse", "two-pulse, literal")])
+@pytest.mark.parametrize("requested", [REQUESTED[name] for name in ("one-pulse", "two-pulse", "two-pulse, literal")])
 @pytest.mark.parametrize("torque", [30.0, 100.0])
 @pytest.mark.parametrize("moments", [(120.0, 100.0, 80.0), (80.0, 70.0, 120.0)], ids=["prolate", "oblate"])
 @pytest.mark.parametrize(
@@ -221,10 +223,10 @@ def test_many_channels() -> None:
     ids=["tick", "earliest", "both", "blackout"],
 )
 def test_torquer_on_a_body_of_three_different_moments_keeps_the_limits(
-    limit: Limits, moments: tuple[float, float, float], torque: float, asked: tuple[str, Options]
+    limit: Limits, moments: tuple[float, float, float], torque: float, requested: tuple[str, Options]
 ) -> None:
     """Going from the symmetric model to the body changes on-times, and must not move starts out of the limits."""
     body = spinner(moments=moments, steerable=Steerable(torque), limits=limit)
-    made = planning.plan(body, *asked)
+    made = planning.plan(body, *requested)
     assert made.feasible, infeasibility(made)
     assert violations(body, made.pulses) == []

@@ -43,10 +43,10 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         return
     assert left is not None
     assert violations(body, plan.pulses) == []
-    asked = body.nutation + body.to_turn
-    assert left.nutation < body.nutation or left.axis_error < body.to_turn or asked < 1e-12
+    requested = body.nutation + body.to_turn
+    assert left.nutation < body.nutation or left.axis_error < body.to_turn or requested < 1e-12
     if body.inertia.symmetric:
-        assert max(left.nutation, left.axis_error) <= (0.05 if body.limits.tick is None else 0.5) * asked
+        assert max(left.nutation, left.axis_error) <= (0.05 if body.limits.tick is None else 0.5) * requested
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -64,8 +64,8 @@ def test_whatever_the_limits(block: int, scheme: str) -> None:
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, scheme: str) -> None:
-    for asked in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
-        check(aimed(spinner(limits=hard, **asked), 10.0, 45.0), scheme, Options())
+    for requested in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
+        check(aimed(spinner(limits=hard, **requested), 10.0, 45.0), scheme, Options())
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -62,8 +62,8 @@ def test_arc_efficiency(torque: float, on_time: float) -> None:
     assert 1.0 - 1e-3 < turned / spacecraft.turning_impulse < 1.0 + 1.0 / len(made)
 
 
-def asked_for(seed: int) -> tuple[Spacecraft, RhumbLineOptions]:
-    """A turn by some tens of pulses of a length that is asked for."""
+def requested(seed: int) -> tuple[Spacecraft, RhumbLineOptions]:
+    """A turn by some tens of pulses of a length that is requested."""
     rng = np.random.default_rng(seed)
     A, spin = 100.0, float(rng.choice([3.0, -3.0]))
     body = spinner(
@@ -85,10 +85,10 @@ def closes(plan: planning.Plan) -> None:
 
 @pytest.mark.slow
 def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
-    """Equal pulses, the last few within a tenth of what is asked for."""
+    """Equal pulses, the last few within a tenth of what is requested."""
     kept, named = 0, 0
     for seed in range(16):
-        spacecraft, options = asked_for(seed)
+        spacecraft, options = requested(seed)
         plan = planning.plan(spacecraft, "rhumb-line", options)
         assert options.on_time is not None
         if not plan.feasible:
@@ -208,7 +208,7 @@ def test_limits_are_kept() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
-    """Small steps on the course as it is at each point end on the target after the way told at first."""
+    """Small steps on the course as it is at each point end on the target after the way reported at first."""
     rng = np.random.default_rng(seed)
     here, target, sun = (axis / np.linalg.norm(axis) for axis in rng.normal(size=(3, 3)))
     _, way = pointing.course(here, target, sun)

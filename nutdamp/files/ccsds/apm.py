@@ -142,7 +142,7 @@ def _spin(body: Spacecraft) -> Values:
 
 
 def _inertia(body: Spacecraft) -> Values:
-    """Moments and products; the products are minus what stands beside the diagonal (annex F6)."""
+    """Moments and products; the products are minus what is off the diagonal (annex F6)."""
     tensor = body.inertia.tensor.tolist()
     return {
         "INERTIA_REF_FRAME": BODY_FRAME,

@@ -285,7 +285,7 @@ class _Reader:
         if parts is None:
             return None
         xx, yy, zz, xy, xz, yz = parts
-        # Beside the diagonal stands minus the product (annex F6); + 0.0 makes 0 of -0.
+        # Off the diagonal is minus the product (annex F6); + 0.0 makes 0 of -0.
         return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
 
     def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:

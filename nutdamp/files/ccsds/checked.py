@@ -95,7 +95,7 @@ class Checked:
             return None
 
     def has(self, keywords: Iterable[str]) -> bool:
-        """Whether all of ``keywords`` stand here; some without the others is a fault."""
+        """Whether all of ``keywords`` are here; some without the others is a fault."""
         expected = list(keywords)
         there = [keyword for keyword in expected if keyword in self.entries]
         if there and len(there) < len(expected):

@@ -132,7 +132,7 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Keywords that belong together; ``name`` is that of the layout, empty for what stands outside of blocks."""
+    """Keywords that belong together; ``name`` is that of the layout, empty for what is outside of blocks."""
 
     name: str
     entries: tuple[Entry, ...]

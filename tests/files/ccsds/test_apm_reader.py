@@ -1,4 +1,4 @@
-"""The strict reader of APMs: what is there is read in every form the standard allows, what is wrong is told by line."""
+"""The strict reader of APMs: every form that the standard allows is read, what is wrong is reported by line."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_euler_angles(folder: Path) -> None:
     assert euler("ZXZ", 0.0, 0.0, 0.0).tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_a_spin_block_that_says_something_else_is_told(folder: Path) -> None:
+def test_a_spin_block_that_says_something_else_is_reported(folder: Path) -> None:
     text = GOOD.replace("INERTIA_START", SPIN.strip() + "\n\nINERTIA_START")
     found = read(text, folder)
     line = line_of(text, "SPIN_START")
@@ -391,7 +391,7 @@ def test_files_that_cannot_be_read(folder: Path) -> None:
 @pytest.mark.parametrize("xml", [False, True], ids=["kvn", "xml"])
 @given(data=st.data())
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_whatever_stands_in_the_file_is_read_or_told(folder: Path, xml: bool, data: st.DataObject) -> None:
+def test_whatever_is_in_the_file_is_read_or_reported(folder: Path, xml: bool, data: st.DataObject) -> None:
     """Lines dropped, doubled, swapped and changed: contents, or faults with lines; never anything else."""
     text = export_text(messages.planned("prolate"), "apm", xml=True) if xml else GOOD
     lines = text.splitlines()
@@ -408,13 +408,13 @@ def test_whatever_stands_in_the_file_is_read_or_told(folder: Path, xml: bool, da
                 cut = data.draw(st.integers(0, len(lines[place % len(lines)])))
                 lines[place % len(lines)] = lines[place % len(lines)][:cut] + data.draw(st.text(max_size=3))
     (folder / "a.apm").write_text("\n".join(lines), encoding="utf-8")
-    told: list[int] = [1]
+    reported: list[int] = [1]
     try:
         imported(read_apm("a.apm"), "a.apm")
     except FaultyFile as wrong:
-        told = [fault.line for fault in wrong.faults]
-    assert told
-    assert min(told) >= 1
+        reported = [fault.line for fault in wrong.faults]
+    assert reported
+    assert min(reported) >= 1
 
 
 # --- encodings of XML -------------------------------------------------------------------------------------------------
@@ -471,7 +471,7 @@ def test_what_is_not_in_its_encoding_is_refused(folder: Path, data: bytes, probl
         read_apm(str(folder / "in.xml"))
 
 
-def test_the_message_in_shift_jis_is_told_what_it_lacks() -> None:
+def test_the_message_in_shift_jis_is_read_up_to_what_it_lacks() -> None:
     with pytest.raises(FaultyFile, match="INERTIA: missing"):
         read_apm(str(case("crash-xml-encoding.apm.txt")))
 

@@ -63,8 +63,8 @@ def test_keywords_stand_in_the_order_of_the_tables(case: str) -> None:
     plan = messages.planned(case)
     text = export_text(plan, "apm")
     starts = re.findall("^([A-Z]+)_START$", text, re.MULTILINE)
-    wanted = ["QUAT", "ANGVEL", *(["SPIN"] if plan.spacecraft.inertia.symmetric else []), "INERTIA"]
-    assert starts == [*wanted, *["MAN"] * len(plan.pulses)]
+    expected = ["QUAT", "ANGVEL", *(["SPIN"] if plan.spacecraft.inertia.symmetric else []), "INERTIA"]
+    assert starts == [*expected, *["MAN"] * len(plan.pulses)]
     for name in set(starts):
         for body in re.findall(f"^{name}_START$(.*?)^{name}_STOP$", text, re.MULTILINE | re.DOTALL):
             keywords = re.findall("^([A-Z0-9_]+) *=", body, re.MULTILINE)

@@ -178,12 +178,12 @@ def test_segments_end_at_the_edges_of_pulses(case: str) -> None:
     for segment, start, stop in zip(segments, starts, stops, strict=True):
         middle, step = 0.5 * (start + stop), 1e-3 * (stop - start)
         before, now, after = (motion(flown, middle + shift)[0] for shift in (-step, 0.0, step))
-        asked = tensor @ (after - before) / (2 * step) + np.cross(now, tensor @ now)
+        requested = tensor @ (after - before) / (2 * step) + np.cross(now, tensor @ now)
         given = sum(
             (p.torque for p in flown.schedule if p.torque is not None and p.start < middle < p.end), np.zeros(3)
         )
         scale = max(float(np.linalg.norm(tensor @ now)), 1.0)
-        assert asked == pytest.approx(messages.in_file_axes(flown.spacecraft, given), abs=1e-5 * scale)
+        assert requested == pytest.approx(messages.in_file_axes(flown.spacecraft, given), abs=1e-5 * scale)
         assert len(list(segment.getAngularCoordinates())) >= 4
 
 

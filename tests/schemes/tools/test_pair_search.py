@@ -222,8 +222,8 @@ def test_why_not(channels: tuple[object, ...], words: str) -> None:
 @pytest.mark.parametrize("moments", [(120.0, 110.0, 80.0), (80.0, 85.0, 120.0)], ids=["prolate", "oblate"])
 @pytest.mark.parametrize("actuators", ["torquer", "channels"])
 def test_three_different_moments(moments: tuple[float, float, float], actuators: str) -> None:
-    asked = {"steerable": Steerable(500.0)} if actuators == "torquer" else {"channels": cross(500.0)}
-    spacecraft = aimed(spinner(moments=moments, degrees=4.0, **asked), 6.0, 45.0)
+    requested = {"steerable": Steerable(500.0)} if actuators == "torquer" else {"channels": cross(500.0)}
+    spacecraft = aimed(spinner(moments=moments, degrees=4.0, **requested), 6.0, 45.0)
     made = acquired(spacecraft).pulses
     assert Outcome(spacecraft, made).nutation < 1e-8
     assert off_target(spacecraft, made) < 1e-8

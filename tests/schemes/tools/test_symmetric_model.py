@@ -1,4 +1,4 @@
-"""Planning real bodies: I1 ≠ I2, dissipation and disturbances are planned for, trimmed, and told."""
+"""Planning real bodies: I1 ≠ I2, dissipation and disturbances are planned for, trimmed, and reported."""
 
 from __future__ import annotations
 
@@ -117,12 +117,12 @@ def test_a_resonant_disturbance_has_no_steady_tilt_and_is_fought() -> None:
         assert left(plan(spacecraft, scheme)) > math.radians(0.02)
 
 
-def test_plans_stay_nominal_unless_asked() -> None:
+def test_plans_stay_nominal_unless_requested() -> None:
     spacecraft = replace(EXAMPLE, disturbances=(Disturbance(0.3 + 0.1j),))
     for scheme in CLASSIC:
-        told, nominal = plan(spacecraft, scheme), plan(EXAMPLE, scheme)
-        assert [pulse.t for pulse in told.pulses] == [pulse.t for pulse in nominal.pulses]
-        assert any("--with-disturbances" in remark for remark in remarks(told))
+        reported, nominal = plan(spacecraft, scheme), plan(EXAMPLE, scheme)
+        assert [pulse.t for pulse in reported.pulses] == [pulse.t for pulse in nominal.pulses]
+        assert any("--with-disturbances" in remark for remark in remarks(reported))
 
 
 def test_steady_omega_is_the_forced_term() -> None:
