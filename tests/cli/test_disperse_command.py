@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from process import Run
+from samples import slow
 
 from nutdamp import dispersion
 
@@ -269,7 +270,7 @@ def interrupted(body: Path, number: signal.Signals, *arguments: str, wait: str) 
     return process.returncode, out, err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, slow(signal.SIGTERM)])
 def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: signal.Signals) -> None:
     """The first cases are written, whole; and they are those of a run that requested no more."""
     files = ("--csv", "s.csv", "--json", "s.json", "--resume", "kept.npz")

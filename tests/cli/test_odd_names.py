@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from process import Run
+from samples import slow
 
 from nutdamp.files.examples import example_text
 
@@ -32,15 +33,15 @@ def odd(run: Run, tmp_path: Path) -> str:
     [
         "plan {0}.yaml --json out.json --plot out.png",
         "check {0}.yaml --json out.json",
-        "simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg",
+        slow("simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg"),
         "verify {0}.yaml --schedule {0}.csv --json out.json",
         "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out --resume {0}.z",
         "trade {0}.yaml --points 1 --json out.json --schedules {0}",
-        "report {0}.yaml -o out.html",
+        slow("report {0}.yaml -o out.html"),
         "report {0}.yaml -o {0}.md",
-        "animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320",
+        slow("animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320"),
         "export {0}.yaml --schedule {0}.csv --format apm -o {0}.apm",
-        "export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml",
+        slow("export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml"),
         "export {0}.yaml --schedule {0}.csv --format aem -o {0}.aem",
         "export {0}.yaml --schedule {0}.csv --format stk -o {0}.a",
         "export {0}.yaml --schedule {0}.csv --format basilisk -o {0}.py",

@@ -187,7 +187,7 @@ LEAN = (
     "plan --scheme optimal --free-axis",
     "plan --scheme optimal --least time",
     "plan --target 10deg,20deg",
-    "plan --robust",
+    "plan --robust --scheme one-pulse",
     "trade --points 2",
     "disperse --samples 100",
     "disperse --samples 100 --scheme optimal --impulses --force",

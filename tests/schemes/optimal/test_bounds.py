@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from builders import aimed, channel, cross, spinner
 from cases_dir import case
+from samples import some
 from scipy.optimize import linprog, minimize
 
 from nutdamp import flight, planning
@@ -79,7 +80,7 @@ def layout(rng: np.random.Generator, *, axial: float = 0.0, count: int | None = 
     return spinner(A, C, spin, degrees, float(rng.uniform(0, 6.28)), channels=tuple(made), limits=limits)
 
 
-@pytest.mark.parametrize("first", range(0, 200, 40))
+@pytest.mark.parametrize("first", some(range(0, 200, 40)))
 def test_the_bound_is_the_optimum_of_a_dense_grid_and_never_above_it(first: int) -> None:
     """Times on the grid are some of all times, so its optimum lies above the bound; hardly, where the grid is fine."""
     solved = 0
@@ -116,7 +117,7 @@ def every_plan_keeps_its_bound(seed: int) -> int:
     return feasible
 
 
-@pytest.mark.parametrize("first", range(0, 80, 20))
+@pytest.mark.parametrize("first", some(range(0, 80, 20)))
 def test_no_plan_of_any_scheme_is_below_its_bound(first: int) -> None:
     assert sum(every_plan_keeps_its_bound(seed) for seed in range(first, first + 20)) > 20
 
@@ -312,7 +313,7 @@ def small_angle_optimum(spacecraft: Spacecraft, points: int, *, lasting: bool) -
 
 
 @pytest.mark.parametrize("lasting", [False, True])
-@pytest.mark.parametrize("first", [0, 20])
+@pytest.mark.parametrize("first", some([0, 20]))
 def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(first: int, lasting: bool) -> None:
     """Impulses at moments of a grid for strong torques; for weak ones, on-times in cells of a grid."""
     solved = 0

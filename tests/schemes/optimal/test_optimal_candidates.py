@@ -22,6 +22,7 @@ from nutdamp.spacecraft import Limits, Spacecraft
 MICRODEGREE = math.radians(1e-6)
 
 
+@pytest.mark.slow
 def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
     """19.1 N m s, where rhumb-line --per-turn 2 --on-time 7ms takes 18.0; C|ω3|β is 17.92."""
     body = aimed(load_spacecraft(case("optimal-far-target.yaml")), 120.0, 87.29)
