@@ -14,7 +14,9 @@ import reference
 
 from nutdamp.compliance import Left
 from nutdamp.flight import Residual
-from nutdamp.planning import Plan
+from nutdamp.planning import Comparison, Plan
+from nutdamp.presentation import verdicts
+from nutdamp.recommendation import recommend
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import (
     Attitude,
@@ -198,3 +200,19 @@ def judged(
     theta, turned = math.radians(nutation), math.radians(shift)
     ended = Residual(theta, theta, 0.0, turned, turned)
     return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)
+
+
+def chosen(*plans: Plan) -> str | None:
+    """Which of the plans is recommended."""
+    best = recommend(plans).plan
+    return None if best is None else best.scheme
+
+
+def said(*plans: Plan) -> str:
+    """The reason for it."""
+    return verdicts.reason(Comparison(plans[0].spacecraft, plans))
+
+
+def warned(*plans: Plan) -> str:
+    """What is warned of."""
+    return " ".join(verdicts.warnings(Comparison(plans[0].spacecraft, plans)))

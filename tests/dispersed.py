@@ -113,3 +113,25 @@ def one_of(draws: Draws | Mapping[str, np.ndarray], case: int) -> dict[str, floa
 def body_of(model: Model) -> tuple[Spacecraft, tuple[Pulse, ...], Inertia]:
     """What a model is made of."""
     return model.spacecraft, model.schedule.pulses, model.spacecraft.inertia
+
+
+FILE = """\
+name: Dispersed
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+steerable: {torque: 60 N m, isp: 220 s, lever_arm: 1 m}
+limits: {earliest: 1 s}
+requirement: {nutation: 0.6 deg, momentum_shift: 0.4 deg, probability: 60 %}
+dispersions:
+  A: {normal: 1 %}
+  C: {normal: 1 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  thrust_per_pulse: {normal: 1 %}
+  thrust_direction: {normal: 0.5 deg}
+  timing: {uniform: 5 ms}
+  timing_offset: {bias: 2 ms}
+  position: {normal: 5 mm}
+  attitude: {normal: 0.2 deg}
+"""
+"""A spacecraft file with most kinds of dispersions."""
