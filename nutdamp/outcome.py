@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from nutdamp import compliance
 from nutdamp.compliance import Left, Part
 from nutdamp.flight import Flight
 from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft, SpinState
+from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 SHARE = 0.1
 """Of a bound of the requirement, by which the impulse sum may err."""
@@ -54,6 +55,26 @@ def seen_at(flight: Flight, time: float) -> Flight:
         spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
         until=time,
     )
+
+
+def spin_phases(flight: Flight, times: Vector) -> Vector:
+    """Magnus 1970 (2): α = ∫ω3 dt from t = 0 to each of the ascending ``times`` (n,) s, rad.
+
+    By Simpson's rule over stretches of at most half a radian, exact where ω3 is constant or changes linearly.
+    """
+    last = float(times[-1]) if len(times) else 0.0
+    edges = sorted({0.0, *times.tolist(), *(leg.end for leg in flight.legs if leg.end <= last)})
+    phases, phase = {0.0: 0.0}, 0.0
+    for begin, end in itertools.pairwise(edges):
+        spins = abs(flight.motion(np.array([begin, end]))[0][:, 2])
+        count = 2 * math.ceil(float(spins.max()) * (end - begin) / 0.5) + 2
+        spin = flight.motion(np.linspace(begin, end, count + 1)[:-1])[0][:, 2]
+        final = flight.motion(np.array([np.nextafter(end, begin)]))[0][0, 2]  # before a jump at the end
+        weights = np.ones(count)
+        weights[1::2], weights[2::2] = 4.0, 2.0
+        phase += (end - begin) / (3.0 * count) * float(weights @ spin + final)
+        phases[end] = phase
+    return np.array([phases[time] for time in times.tolist()])
 
 
 def left_by(flight: Flight) -> Left:

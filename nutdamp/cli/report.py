@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,12 +26,12 @@ from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.parameters import FILE, Count, Named, is_number
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
+from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, expect_read, goal_options
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
-    from nutdamp.planning import Plan
+    from nutdamp.planning import Comparison
 
 
 class Report(PlanningCommand):
@@ -45,6 +46,26 @@ class Report(PlanningCommand):
             if word == "--disperse" and "--" not in given and not (following and is_number(following[0])):
                 given[-1] = f"--disperse={SAMPLES}"
         return super().parse_args(ctx, given)
+
+
+CONTROL = (
+    ("title", "Title of the page."),
+    ("document", "Number of the document."),
+    ("issue", "Issue or revision."),
+    ("author", "Who answers for it."),
+    ("date", "Date of issue, as it is to stand there; default that of SOURCE_DATE_EPOCH."),
+)
+"""What configuration control writes on a page: options, and what they are."""
+
+CONTROLLED = "Configuration control"
+"""Their heading."""
+
+
+def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of `CONTROL`."""
+    for name, what in reversed(CONTROL):
+        command = click.option(f"--{name}", cls=Grouped, group=CONTROLLED, metavar="TEXT", help=what)(command)
+    return command
 
 
 @click.command("report", cls=Report)
@@ -63,9 +84,10 @@ class Report(PlanningCommand):
     "--disperse",
     type=Count(),
     metavar="[N]",
-    help=f"Fly the recommended schedule in N dispersed cases; {SAMPLES} where no number follows.",
+    help=f"Fly the schedules in N dispersed cases; {SAMPLES} where no number follows.",
 )
 @impulse_options
+@control_options
 @quiet_option
 def command(
     spacecraft: Input,
@@ -77,8 +99,9 @@ def command(
     impulses: bool,
     force: bool,
     quiet: bool,
+    **control: str | None,
 ) -> None:
-    """Write a report: spacecraft, schemes compared, schedule, pictures, error budget, and how to repeat it.
+    """Write a report: the decision, spacecraft, method, schemes, schedule, pictures, verification, how to repeat it.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as HTML. Needs the extra plot; a PDF needs Chromium, Chrome or Edge.
@@ -93,10 +116,11 @@ def command(
 
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.files.yaml_tree import dotted
-    from nutdamp.library.reports import made_of
+    from nutdamp.library.reports import controlled, made_of
     from nutdamp.planning import compare, usual
     from nutdamp.presentation.page.content import Repeat
 
+    kept = controlled(**{name: value for name, value in control.items() if value is not None})
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
     body = aim.applied(read_spacecraft(text, name, spacecraft.settings, lambda doubt: remark(doubt.as_warning)), remark)
@@ -107,12 +131,12 @@ def command(
     expect_read(schemes, options, body, remark)
     with working("planning", quiet=quiet):
         compared = compare(body, schemes, options)
-    chosen = compared.recommended
-    dispersed, note = None, ""
+    chosen, note = compared.recommended, ""
+    dispersed: dict[str, Results] = {}
     if chosen is not None and disperse is not None:
-        dispersed, note = _dispersed(chosen, disperse, impulses=impulses, force=force, quiet=quiet)
+        dispersed, note = _dispersed(compared, disperse, impulses=impulses, force=force, quiet=quiet)
     with working("writing the page", quiet=quiet):
-        made = made_of(compared, repeat, output, dispersed, note)
+        made = made_of(compared, repeat, output, dispersed, note, kept)
     deliver([(output, lambda: made.content)])
     if not made.good:
         remark(made.verdict)
@@ -122,20 +146,36 @@ def command(
         sys.exit(INTERNAL)
     if chosen is None:
         sys.exit(INFEASIBLE)
-    if chosen.meets_requirement is False or (dispersed is not None and dispersed.meets_requirement is False):
+    if chosen.meets_requirement is False or (made.dispersed and made.dispersed.meets_requirement is False):
         sys.exit(REQUIREMENT_MISSED)
 
 
-def _dispersed(chosen: Plan, samples: int, *, impulses: bool, force: bool, quiet: bool) -> tuple[Results, str]:
-    """The recommended schedule in many cases, and how far impulses err; interrupted, nothing is written."""
+def _dispersed(
+    compared: Comparison, samples: int, *, impulses: bool, force: bool, quiet: bool
+) -> tuple[dict[str, Results], str]:
+    """The schedules in many cases, the recommended one first, and how far impulses err with it.
+
+    Of the others none is there whose cases cannot be flown. Interrupted, nothing is written.
+    """
     from nutdamp.dispersion import study_of
+    from nutdamp.errors import BadRequest, Infeasible
+    from nutdamp.library.reports import feasible_first
 
-    study, note = study_of(chosen.spacecraft, chosen.pulses, flown=not impulses), ""
-    if impulses:
-        from nutdamp.dispersion.agreement import check_impulses
+    found: dict[str, Results] = {}
+    notes = []
+    for plan in feasible_first(compared):
+        study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
+        try:
+            if impulses:
+                from nutdamp.dispersion.agreement import check_impulses
 
-        note = check_impulses(study, force=force)
-    results, _, stopped_by = fly(study, samples, None, None, None, quiet)
-    if stopped_by is not None and results.done < samples:
-        raise interruption(stopped_by)
-    return results, note
+                notes.append(check_impulses(study, force=force))
+            results, _, stopped_by = fly(study, samples, None, None, None, quiet)
+        except (BadRequest, Infeasible):
+            if not found:
+                raise
+            continue
+        if stopped_by is not None and results.done < samples:
+            raise interruption(stopped_by)
+        found[plan.scheme] = results
+    return found, notes[0] if notes else ""

@@ -9,7 +9,7 @@ from nutdamp.guide.texts import topics
 from nutdamp.guide.topic import Topic
 from nutdamp.guide.units import units_topic
 
-__all__ = ["FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "found", "meant"]
+__all__ = ["FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "found", "limits", "meant"]
 
 SCHEMES, MOTION = topics("schemes.md"), topics("motion.md")
 
@@ -87,3 +87,11 @@ def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") ->
     """``did you mean 'nutation'?``, or the command by which they are ``listed``."""
     close = nearest(name, known)
     return f"did you mean {close!r}?" if close else f"`{listed}` lists them"
+
+
+def limits() -> tuple[str, ...]:
+    """Assumptions and limits, a paragraph each; the README has the same ones."""
+    from pkgutil import get_data
+
+    text = (get_data("nutdamp.guide", "limits.md") or b"").decode("utf-8")
+    return tuple(" ".join(part.split()) for part in re.split(r"^- ", text, flags=re.MULTILINE) if part.strip())

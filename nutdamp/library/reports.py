@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from os import PathLike
 
 from nutdamp import arguments, dispersion
 from nutdamp.dispersion.study import Results
+from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.files.output import write_whole
 from nutdamp.files.yaml_tree import dotted
 from nutdamp.library.calls import compare
 from nutdamp.library.craft import Source, load
 from nutdamp.library.studies import disperse as fly_cases
-from nutdamp.planning import Comparison
+from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation.page.content import Repeat, report_page
-from nutdamp.presentation.page.document import Page
+from nutdamp.presentation.page.document import UNCONTROLLED, Control, Page
 from nutdamp.presentation.page.formats import form_of
 from nutdamp.schemes import Choice
 from nutdamp.spacecraft import Spacecraft
@@ -49,35 +53,67 @@ def report(
     *,
     disperse: int | None = None,
     seed: int = dispersion.SEED,
+    **control: str,
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
     ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: .html, .md or .pdf; ``disperse``: in how
-    many dispersed cases to fly the recommended plan. Raises as `load`, `compare` and `disperse` do, BadRequest for
-    another ending, MissingExtra without the extra plot, CannotWrite.
+    many dispersed cases to fly the plans; ``control``: title, document, issue, author, date, as `controlled` takes
+    them. Raises as `load`, `compare` and `disperse` do, BadRequest for another ending, MissingExtra without the extra
+    plot, CannotWrite.
     """
-    name = arguments.path("output", output)
+    name, kept = arguments.path("output", output), controlled(**control)
     form_of(name)
     body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
     compared = compare(body, names, options)
-    cases = None
-    if disperse is not None and compared.recommended is not None:
-        cases = fly_cases(compared.recommended, disperse, seed=seed).core
+    cases: dict[str, Results] = {}
+    if disperse is not None:
+        for plan in feasible_first(compared):
+            with suppress(*([] if not cases else [Infeasible])):  # cases of another scheme that take too long to fly
+                cases[plan.scheme] = fly_cases(plan, disperse, seed=seed).core
     given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "seed": disperse and seed}
+    given |= {key: repr(value) for key, value in control.items()}
     more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
     named = f", {list(names)!r}" if names else ""
-    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), name, cases)
+    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), name, cases, control=kept)
     write_whole(name, made.content)
     return made
 
 
+def feasible_first(compared: Comparison) -> tuple[Plan, ...]:
+    """The feasible plans, the recommended one first."""
+    return tuple(sorted((plan for plan in compared if plan.feasible), key=lambda one: one is not compared.recommended))
+
+
+def controlled(**given: str) -> Control:
+    """What configuration control writes on a page; without a date that of SOURCE_DATE_EPOCH, where it is set.
+
+    Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
+    """
+    unknown = sorted(set(given) - set(Control._fields))
+    if unknown:
+        raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
+    control, epoch = Control(**given), os.environ.get("SOURCE_DATE_EPOCH", "")
+    if control.date or not epoch:
+        return control
+    try:
+        return control._replace(date=datetime.fromtimestamp(int(epoch), UTC).date().isoformat())
+    except (ValueError, OverflowError, OSError):
+        raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
+
+
 def made_of(
-    compared: Comparison, repeat: Repeat, output: str, dispersed: Results | None = None, note: str = ""
+    compared: Comparison,
+    repeat: Repeat,
+    output: str,
+    dispersed: Mapping[str, Results] | None = None,
+    note: str = "",
+    control: Control = UNCONTROLLED,
 ) -> Report:
-    """The report that goes to ``output``, not yet written; raises as `form_of` does."""
-    form = form_of(output)
-    page = report_page(compared, repeat, pictured=form.pictured, dispersed=dispersed, note=note)
-    return Report(compared, dispersed, page, form.write(page, output))
+    """The report that goes to ``output``, not yet written; ``dispersed`` by scheme. Raises as `form_of` does."""
+    form, flown, chosen = form_of(output), dispersed or {}, compared.recommended
+    page = report_page(compared, repeat, pictured=form.pictured, dispersed=flown, note=note, control=control)
+    return Report(compared, None if chosen is None else flown.get(chosen.scheme), page, form.write(page, output))
 
 
 def _repeat(body: Spacecraft, how: str) -> Repeat:

@@ -147,7 +147,7 @@ def _(compared: Comparison) -> str:
 
 @views.html.register
 def _(spacecraft: Spacecraft) -> str | None:
-    from nutdamp.presentation.page.sheets import spacecraft_facts
+    from nutdamp.presentation.page.craft import spacecraft_facts
 
     return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
 

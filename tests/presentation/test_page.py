@@ -20,9 +20,9 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Comparison, compare
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.craft import spacecraft_facts
 from nutdamp.presentation.page.html import number_in, page_html
 from nutdamp.presentation.page.markdown import page_markdown
-from nutdamp.presentation.page.sheets import spacecraft_facts
 from nutdamp.schemes import CLASSIC
 
 PAGE = Path(__file__).parents[2] / "nutdamp" / "presentation" / "page"
@@ -116,13 +116,13 @@ def test_what_a_file_says_stays_text(nasty: str) -> None:
         assert all(node.text.rstrip(":") in CLASSIC or "Basilisk" in node.text for node in tree.all(tag))
     assert len(scripts(tree)) == 1
     assert '<i>"[x](y)' in {row[0].text for row in sheet(tree, "spacecraft")[1]}
-    assert "<u>wind" in {row[0].text for row in sheet(tree, "spacecraft", 1)[1]}
-    assert tree.all("pre")[0].text == "nutdamp report 'a <b>.yaml'"
+    assert "<u>wind" in {row[0].text for row in sheet(tree, "spacecraft", 2)[1]}
+    assert tree.all("pre")[1].text == "nutdamp report 'a <b>.yaml'"
 
 
 def test_the_input_file_stands_there_to_the_letter(nasty: str, example: str) -> None:
     for text, source in ((nasty, NASTY), (example, example_text())):
-        shown = parsed(text.removeprefix("<!DOCTYPE html>")).all("pre")[1].text
+        shown = parsed(text.removeprefix("<!DOCTYPE html>")).all("pre")[2].text
         assert shown == source.rstrip("\n")
 
 
@@ -158,7 +158,7 @@ def test_the_comparison_says_what_the_json_says(example: str) -> None:
             shown = float(row[heads.index(head)].attributes["data-value"])
             assert shown == pytest.approx(expected, rel=1e-3, abs=1e-9)
         verdict = {True: "met", False: "NOT met"}[plan["meets_requirement"]]
-        assert row[heads.index("requirement")].text == verdict
+        assert row[heads.index("nominal requirement")].text == verdict
     marks = [row.attributes.get("class") for row in parsed(example).all("tr")]
     assert marks.count("mark") == 1
 
@@ -200,7 +200,7 @@ def test_without_a_feasible_plan_the_page_says_why() -> None:
     only = compared("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n", ("four-pulse",))
     made = report_page(only, Repeat("", "", ""), pictured=True)
     assert not made.good
-    assert [section.name for section in made.sections] == ["spacecraft", "schemes", "repeat"]
+    assert [section.name for section in made.sections] == ["spacecraft", "method", "schemes", "assumptions", "repeat"]
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     assert sheet(tree, "schemes")[1][0][1].text == "no thrusters"
     assert "the file names no thrusters" in tree.text
@@ -253,12 +253,12 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     assert found.recommended.meets_requirement
     results = Results(study_of(found.spacecraft, found.recommended.pulses, flown=True), 1000)
     run(results, threads=1)
-    made = report_page(found, Repeat("", "", ""), pictured=True, dispersed=results)
+    made = report_page(found, Repeat("", "", ""), pictured=True, dispersed={"two-pulse": results})
     assert made.good == good
     assert results.met_fraction is not None
     share = f"{100 * results.met_fraction:.1f} % of cases comply (90 % required)"
     said = f"met: {share}" if good else f"NOT met: {share}"
-    assert made.verdict.endswith(f" {said}.")
+    assert made.verdict.startswith(f"Requirement: {said}. ")
     assert dict(made.figures)["requirement"] == said  # the tile does not contradict the page
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     heads, rows = sheet(tree, "dispersion")

@@ -58,12 +58,12 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             source = source or example_text()
             compared = compare(read_spacecraft(source, f"{name}.yaml"), CLASSIC)
             repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
-            results = None
+            flown = {}
             if name == DISPERSED:
                 assert compared.recommended is not None
                 results = Results(study_of(compared.spacecraft, compared.recommended.pulses, flown=True), 500)
-                run(results, threads=1)
-            made = report_page(compared, repeat, pictured=True, dispersed=results)
+                flown[compared.recommended.scheme] = run(results, threads=1)
+            made = report_page(compared, repeat, pictured=True, dispersed=flown)
             target.write_text(page_html(made), encoding="utf-8")
         return target
 

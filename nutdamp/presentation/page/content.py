@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp import __version__
+from nutdamp.decision import Decision, cases_of, decide
 from nutdamp.planning import Comparison, Plan, unrounded
-from nutdamp.presentation import verdicts
-from nutdamp.presentation.check_tables import channel_table, disturbance_table
-from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation import decisions, verdicts
+from nutdamp.presentation.end_tables import direction_text, spin_text
+from nutdamp.presentation.page.craft import ends_note, ends_sheet, spacecraft_blocks
 from nutdamp.presentation.page.document import (
+    UNCONTROLLED,
     Block,
+    Control,
     Facts,
     Figure,
     Listing,
@@ -22,17 +27,16 @@ from nutdamp.presentation.page.document import (
     Remarks,
     Section,
     blocks_of,
-    facts_of,
     sheet_of,
 )
+from nutdamp.presentation.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.presentation.page.moving import moving_of
 from nutdamp.presentation.page.pictures import dispersion_pictures_of, pictures_of
-from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet, spacecraft_facts
-from nutdamp.presentation.text import degrees, mass, moment, quantity
+from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet
+from nutdamp.presentation.text import degrees
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
-from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 
 if TYPE_CHECKING:  # few reports disperse
@@ -57,121 +61,108 @@ def report_page(
     repeat: Repeat,
     *,
     pictured: bool,
-    dispersed: Results | None = None,
+    dispersed: Mapping[str, Results] | None = None,
     note: str = "",
+    control: Control = UNCONTROLLED,
 ) -> Page:
     """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
 
-    ``dispersed``: the recommended schedule flown in dispersed cases; ``note``: a remark on how.
+    ``dispersed``: schemes whose schedules were flown in dispersed cases; ``note``: a remark on how.
     """
-    body, chosen = compared.spacecraft, compared.recommended
-    sections = [_spacecraft(body), _schemes(compared)]
-    if chosen is not None:
+    body, flown = compared.spacecraft, dispersed or {}
+    decided = decide(compared, {scheme: cases_of(results) for scheme, results in flown.items()})
+    sections = [
+        Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
+        Section("method", "Method", tuple(method_blocks(compared))),
+        _schemes(compared, decided),
+    ]
+    if decided is not None:
+        chosen = decided.plan
         sections.append(_schedule(chosen))
         if pictured:
             sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
-        sections.append(_budget(chosen))
-        if dispersed is not None:
-            sections.append(_dispersion(chosen, dispersed, note, pictured=pictured))
-    good = chosen is not None and chosen.standing is Standing.COMPLIES
-    if dispersed is not None and dispersed.meets_requirement is False:
-        good = False
+        sections.append(_verification(chosen))
+        if chosen.scheme in flown:
+            sections.append(_dispersion(chosen, flown[chosen.scheme], note, pictured=pictured))
+    sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
     return Page(
-        title=f"{body.name}: damping {degrees(body.nutation)} of nutation",
-        verdict=_verdict(compared, dispersed),
-        good=good,
-        figures=() if chosen is None else tuple(_figures(chosen, dispersed)),
-        sections=(*sections, _repeat(repeat)),
+        title=control.title or f"{body.name}: damping {degrees(body.nutation)} of nutation",
+        control=control,
+        verdict=_verdict(compared, decided),
+        good=decided is not None and decided.met is not False and decided.plan.standing is Standing.COMPLIES,
+        decision=() if decided is None else tuple(_decision(decided)),
+        figures=() if decided is None else tuple(_figures(decided)),
+        sections=(*sections, _repeat(repeat, flown)),
         made_by=f"Made by nutdamp {__version__}.",
     )
 
 
-def _verdict(compared: Comparison, dispersed: Results | None) -> str:
-    chosen, reason = compared.recommended, verdicts.reason(compared)
-    if chosen is None:
+def _verdict(compared: Comparison, decided: Decision | None) -> str:
+    reason = verdicts.reason(compared)
+    if decided is None:
         return f"No recommendation: {reason}."
-    verdict = " ".join((f"Recommended: {chosen.scheme} – {reason}.", *verdicts.warnings(compared)))
-    if dispersed is None or dispersed.met_fraction is None:
-        return verdict
-    cases = verdicts.cases_verdict(dispersed.met_fraction, dispersed.probability)
-    return f"{verdict} Requirement with dispersions ({dispersed.done:,} cases) {cases}."
+    whom = "Recommended" if decided.cases is None else "Recommended for nominal values"
+    said = f"Requirement: {decisions.verdict(decided)}. {whom}: {decided.plan.scheme} – {reason}."
+    return " ".join((said, *verdicts.warnings(compared)))
 
 
-def _figures(chosen: Plan, dispersed: Results | None) -> Iterator[Figure]:
-    """The numbers to read first."""
-    body, left, pulses = chosen.spacecraft, chosen.flown, chosen.pulses
-    assert left is not None
-    yield Figure("nutation", f"{degrees(body.nutation)} → {degrees(left.nutation)}")
-    if body.goal.axis is None:
-        yield Figure("shift of H", degrees(left.momentum_shift))
-    else:
-        yield Figure("off the target", f"{degrees(body.to_turn)} → {degrees(left.axis_error)}")
-    yield Figure("pulses", f"{len(pulses)}, until {moment(pulses.end)}" if len(pulses) else "none")
-    if pulses.propellant is None:
-        yield Figure("impulse", quantity(pulses.total_impulse, "N m s"))
-    else:
-        yield Figure("propellant", mass(pulses.propellant))
-    if chosen.meets_requirement is None:
-        return
-    share = None if dispersed is None else dispersed.met_fraction
-    if dispersed is None or share is None:
-        yield Figure("requirement", verdicts.VERDICT[chosen.meets_requirement])
-        return
-    if not chosen.meets_requirement:
-        yield Figure("requirement, nominal", verdicts.VERDICT[False])
-    yield Figure("requirement", verdicts.cases_verdict(share, dispersed.probability))
+def _decision(decided: Decision) -> Iterator[Block]:
+    """The parts of the requirement with their margins, and what else the reader must know to decide."""
+    cases = decided.cases
+    how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
+    title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin"
+    yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
+    if decisions.better(decided):
+        yield Remarks((("Note", decisions.better(decided)),))
 
 
-def _spacecraft(body: Spacecraft) -> Section:
-    blocks: list[Block] = [spacecraft_facts(body)]
-    if body.channels:
-        blocks.append(
-            sheet_of("Channels, and the nutation that their shortest and longest pulse takes", channel_table(body))
-        )
-    if body.disturbances:
-        blocks.append(sheet_of("Disturbances, and what each does alone", disturbance_table(body)))
-    return Section("spacecraft", "Spacecraft", tuple(blocks))
+def _figures(decided: Decision) -> Iterator[Figure]:
+    """The numbers to read first: the verdict, where it points at the end, what it costs."""
+    flown = decided.plan.flight
+    yield Figure("requirement", decisions.verdict(decided))
+    yield Figure("spin axis ends at", direction_text(flown.spacecraft, flown.final.axis))
+    yield Figure("H ends at", direction_text(flown.spacecraft, flown.final.momentum))
+    yield Figure("final spin", spin_text(flown.final.spin))
+    for name, value in decisions.cost(decided):
+        yield Figure(name, value)
 
 
-def _schemes(compared: Comparison) -> Section:
+def _schemes(compared: Comparison, decided: Decision | None) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
-    note = Prose(
-        "By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. The other figures "
-        "integrate Euler's equations through the real widths; recommendation and requirement go by them."
-    )
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
-    blocks: tuple[Block, ...] = (comparison_sheet(compared), *hints, note)
+    blocks: tuple[Block, ...] = (comparison_sheet(compared, decided), *hints)
     return Section("schemes", "Schemes compared", (*blocks, Remarks(remarks)) if remarks else blocks)
 
 
 def _schedule(chosen: Plan) -> Section:
     title = f"Recommended schedule: {chosen.scheme}"
-    end = facts_of("Where it points after the last pulse", end_table(chosen.flight))
+    ends = (ends_sheet(chosen.flight), ends_note(chosen.flight))
     if not len(chosen.pulses):
-        return Section("schedule", title, (Prose("No pulse is needed."), end))
+        return Section("schedule", title, (Prose("No pulse is needed."), *ends))
     note = Prose(
-        "A pulse is on from its start for its on-time; the centre lies halfway. "
-        "Nutation: before the pulse, and after it."
+        "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
+        "the body has turned about axis 3. The cones are those of the coast before the pulse, and after it."
     )
-    return Section("schedule", title, (pulse_sheet(chosen), note, end))
+    return Section("schedule", title, (pulse_sheet(chosen), note, *ends))
 
 
-def _budget(chosen: Plan) -> Section:
+def _verification(chosen: Plan) -> Section:
     expected = chosen.options.with_disturbances
     verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     blocks: list[Block] = [
+        Prose(f"{verdict(verified)} {conservation(chosen.spacecraft, verified)}"),
+        checks_sheet(chosen, verified),
+        sheet_of("The schedule flown by independent means", methods_table(verified)),
+        *([Remarks(missing)] if missing else []),
         sheet_of(
-            "What each imperfection alone leaves, everything else ideal", budget_table(chosen.spacecraft, verified)
+            "Error budget: what each imperfection alone leaves, everything else ideal",
+            budget_table(chosen.spacecraft, verified),
         ),
         *[Prose(note) for note in (budget_note(verified),) if note],
-        sheet_of("The schedule flown by independent means", methods_table(verified)),
-        Prose(f"{verdict(verified)} {conservation(chosen.spacecraft, verified)}"),
     ]
-    if missing:
-        blocks.append(Remarks(missing))
-    return Section("budget", "Error budget", tuple(blocks))
+    return Section("budget", "Verification and error budget", tuple(blocks))
 
 
 def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) -> Section:
@@ -185,8 +176,13 @@ def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) 
     return Section("dispersion", "Dispersion", tuple(blocks))
 
 
-def _repeat(repeat: Repeat) -> Section:
+def _repeat(repeat: Repeat, flown: Mapping[str, Results]) -> Section:
     blocks: list[Block] = [Listing("Command", repeat.command, repeat.language), Facts("Versions", tuple(_versions()))]
+    facts = [("seed of the dispersed cases", str(results.study.seed)) for results in flown.values()][:1]
+    if repeat.text:
+        facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
+    if facts:
+        blocks.append(Facts("Input", tuple(facts)))
     if repeat.text:
         blocks.append(Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"))
     if repeat.settings:

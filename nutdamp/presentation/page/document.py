@@ -25,7 +25,8 @@ class Column(NamedTuple):
 class Sheet:
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit.
+    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit. ``stacked``: where there is
+    little room each row becomes a block, so that nothing has to be scrolled.
     """
 
     title: str
@@ -33,6 +34,7 @@ class Sheet:
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
     sortable: bool = True
+    stacked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,13 @@ class Remarks:
 
 
 @dataclass(frozen=True, slots=True)
+class Points:
+    """A list of short paragraphs."""
+
+    rows: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """An ``<svg>`` element, a caption, and what it shows in words for those who do not see it."""
 
@@ -75,7 +84,7 @@ class Listing:
     language: str = ""
 
 
-Block = Sheet | Facts | Prose | Remarks | Picture | Moving | Listing
+Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing
 
 
 class Section(NamedTuple):
@@ -93,16 +102,44 @@ class Figure(NamedTuple):
     value: str
 
 
+class Control(NamedTuple):
+    """What configuration control writes on a document; empty where nothing was given."""
+
+    title: str = ""
+    document: str = ""
+    issue: str = ""
+    author: str = ""
+    date: str = ""
+
+    @property
+    def named(self) -> tuple[tuple[str, str], ...]:
+        """Names and values of what was given, but for the title."""
+        pairs = zip(self._fields[1:], self[1:], strict=True)
+        return tuple((name, value) for name, value in pairs if value)
+
+
+UNCONTROLLED = Control()
+"""Of a page on which nobody writes anything."""
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report: title, verdict (``good``: nothing is missed), the numbers to read first, sections."""
+    """A whole report: title, verdict (``good``: nothing is missed), the decision, numbers to read first, sections."""
 
     title: str
+    control: Control
     verdict: str
     good: bool
+    decision: tuple[Block, ...]
     figures: tuple[Figure, ...]
     sections: tuple[Section, ...]
     made_by: str
+
+    @property
+    def footer(self) -> str:
+        """What stands at the foot of each sheet of paper, beside its number."""
+        document, issue, date = self.control.document, self.control.issue, self.control.date
+        return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
 
 
 def sheet_of(title: str, table: Table) -> Sheet:

@@ -39,7 +39,7 @@ def block_html(block: Block) -> str:
 @cache
 def _templates() -> Environment:
     made = templates(escape)
-    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled)
+    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css)
     return made
 
 
@@ -53,6 +53,11 @@ def _part(name: str) -> str:
 def _phrases(value: str) -> list[str]:
     """The parts of a number to read first, which breaks at commas and arrows only."""
     return re.split(r"(?<=[→,]) ", value)
+
+
+def _css(text: str) -> str:
+    """Text within a string of a style sheet: all but letters and digits by their numbers."""
+    return "".join(one if one.isascii() and one.isalnum() else f"\\{ord(one):x} " for one in text)
 
 
 def _labelled(svg: str, described: str) -> Markup:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -49,7 +50,10 @@ def needed_browser(path: str) -> str:
 
 
 def printed(page: str, path: str) -> bytes:
-    """The HTML ``page`` printed to PDF; ``path`` is where it will go, for messages. Raises CannotWrite."""
+    """The HTML ``page`` printed to PDF; ``path`` is where it will go, for messages. Raises CannotWrite.
+
+    The same page gives the same bytes with the same browser, whose version the PDF names.
+    """
     executable = needed_browser(path)
     with tempfile.TemporaryDirectory(prefix="nutdamp-", ignore_cleanup_errors=True) as folder:
         source, target = Path(folder) / "page.html", Path(folder) / "page.pdf"
@@ -67,7 +71,18 @@ def printed(page: str, path: str) -> bytes:
         if done.returncode != 0 or not target.exists():
             said = done.stderr.decode(errors="replace").strip().splitlines()
             raise CannotWrite(path, f"{executable} printed nothing: {said[-1] if said else 'it said nothing'}")
-        return target.read_bytes()
+        return _settled(target.read_bytes())
+
+
+def _settled(document: bytes) -> bytes:
+    """A PDF without the moment of its printing, and its nodes numbered from 1 on in their order.
+
+    So the same page gives the same bytes. Nothing changes its length, so that the places of objects stay.
+    """
+    dated = re.sub(rb"/(?:CreationDate|ModDate) \(D:[^)]*\)", lambda found: b" " * len(found[0]), document)
+    nodes = re.compile(rb"\(node(\d{8})\)")
+    ranks = {number: rank for rank, number in enumerate(sorted(set(nodes.findall(dated))), start=1)}
+    return nodes.sub(lambda found: b"(node%08d)" % ranks[found[1]], dated)
 
 
 def _is_root() -> bool:

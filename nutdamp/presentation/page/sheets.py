@@ -3,47 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+
+import numpy as np
 
 from nutdamp import compliance
+from nutdamp.decision import Decision
 from nutdamp.flight import Residual
+from nutdamp.outcome import spin_phases
 from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation import verdicts
+from nutdamp.presentation.decisions import COUNT
 from nutdamp.presentation.end_tables import angle_names, angle_texts
-from nutdamp.presentation.page.document import Column, Facts, Sheet, facts_of, sheet_of
-from nutdamp.presentation.plan_tables import derived_table, pulse_table
-from nutdamp.presentation.text import MISSING, degrees, duration, moment
-from nutdamp.spacecraft import Spacecraft
-
-
-def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
-    """The spacecraft at t = 0, its requirement, and the limits of its plans."""
-    return facts_of(title, derived_table(spacecraft, _limits(spacecraft)))
-
-
-def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    limits = spacecraft.limits
-    yield "horizon", duration(spacecraft.horizon)
-    kept = []
-    if limits.earliest > 0.0:
-        kept.append(f"nothing before {duration(limits.earliest)}")
-    if limits.gap > 0.0:
-        kept.append(f"{duration(limits.gap)} between pulses")
-    if limits.tick is not None:
-        kept.append(f"commands in steps of {duration(limits.tick)}")
-    if limits.max_pulses is not None:
-        kept.append(f"at most {limits.max_pulses} pulses")
-    kept += [f"no pulse from {moment(begin)} to {moment(end)}" for begin, end in limits.blackout]
-    if kept:
-        yield "limits", "; ".join(kept)
-
+from nutdamp.presentation.page.document import Column, Sheet
+from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
+from nutdamp.presentation.text import MISSING, degrees, longitude
 
 Cell = Callable[[Plan], str]
 
 
-def comparison_sheet(compared: Comparison) -> Sheet:
-    """One row a scheme; the recommended one is marked."""
+def comparison_sheet(compared: Comparison, decided: Decision | None = None) -> Sheet:
+    """One row a scheme; the recommended one is marked. With dispersed cases the share that complies."""
     columns = _columns(compared)
+    if decided is not None and decided.cases is not None and decided.shares:
+        columns.append((Column(COUNT, "%"), lambda plan: _share(decided, plan.scheme)))
     rows = []
     for plan in compared.plans:
         cells = [cell(plan) if plan.feasible else "" for _, cell in columns]
@@ -89,8 +72,15 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
             (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
         )
     if compliance.required(compared.spacecraft):
-        columns.append((Column("requirement", number=False), lambda plan: verdicts.VERDICT[plan.meets_requirement]))
+        columns.append(
+            (Column("nominal requirement", number=False), lambda plan: verdicts.VERDICT[plan.meets_requirement])
+        )
     return columns
+
+
+def _share(decided: Decision, scheme: str) -> str:
+    share, probability = decided.shares.get(scheme), decided.cases.probability if decided.cases else 1.0
+    return MISSING if share is None else verdicts.percent(share, probability).removesuffix(" %")
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:
@@ -106,8 +96,26 @@ def _angle(left: Residual | None, name: str) -> str:
 
 
 def pulse_sheet(plan: Plan) -> Sheet:
-    """One row a pulse."""
-    return sheet_of(f"Pulses of {plan.scheme}", pulse_table(plan))
+    """One row a pulse: when, at what spin phase, how long, which channel, and the cones before and after."""
+    flown, pulses, body = plan.flight, plan.pulses.pulses, plan.spacecraft
+    tracks = flown.around_pulses()
+    phases = spin_phases(flown, np.array([pulse.start for pulse in pulses]))
+    dates = [body.utc(pulse.start, MILLISECONDS) for pulse in pulses]
+    columns: list[tuple[Column, list[str]]] = [
+        (Column("pulse"), [str(index + 1) for index in range(len(pulses))]),
+        (Column("start", "s"), [f"{pulse.start:.4f}" for pulse in pulses]),
+        *([(Column("start", "UTC", number=False), [date or MISSING for date in dates])] if any(dates) else []),
+        (Column("spin phase", "deg"), [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]),
+        (Column("on-time", "s"), ["ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}" for pulse in pulses]),
+        (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
+        (Column("impulse", "N m s"), [f"{pulse.magnitude:.4g}" for pulse in pulses]),
+    ]
+    for cone in ("nutation", "body_cone", "space_cone"):
+        for track, when in zip(tracks, ("before", "after"), strict=True):
+            angles = [degrees(angle).removesuffix(" deg") for angle in getattr(track, cone).tolist()]
+            columns.append((Column(f"{cone.replace('_', ' ')} {when}", "deg"), angles))
+    rows = tuple(zip(*(cells for _, cells in columns), strict=True))
+    return Sheet(f"Pulses of {plan.scheme}", tuple(column for column, _ in columns), rows)
 
 
 def residual_sheet(title: str, left: Residual) -> Sheet:

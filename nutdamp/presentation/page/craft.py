@@ -1,0 +1,127 @@
+"""The spacecraft on the page: what it weighs, what it can fire, when and where it starts, where it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
+from nutdamp.presentation.check_tables import channel_table, disturbance_table
+from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
+from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
+from nutdamp.presentation.plan_tables import derived_table
+from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, vector
+from nutdamp.spacecraft import Spacecraft, Thruster, Vector
+
+
+def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
+    """Spacecraft data, actuators, disturbances."""
+    yield spacecraft_facts(body)
+    if body.channels:
+        yield thruster_sheet(body)
+        steps = "Channels, and the nutation that their shortest and longest pulse takes"
+        yield sheet_of(steps, channel_table(body))
+    if body.disturbances:
+        yield sheet_of("Disturbances, and what each does alone", disturbance_table(body))
+
+
+def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
+    """The spacecraft at t = 0, its requirement, and the limits of its plans."""
+    return facts_of(title, derived_table(spacecraft, (*_body(spacecraft), *_limits(spacecraft))))
+
+
+def _body(body: Spacecraft) -> Iterator[tuple[str, str]]:
+    yield "mass", MISSING if body.mass is None else mass(body.mass)
+    if not body.inertia.aligned:
+        rows = "; ".join(vector(row) for row in body.inertia.tensor)
+        yield "inertia tensor", f"{rows} kg m², in the axes of the file"
+    steerable = body.steerable
+    if steerable is not None:
+        isp, arm = quantity(steerable.isp, "s"), quantity(steerable.lever_arm, "m")
+        yield "steerable", f"{quantity(steerable.torque, 'N m')}, isp {isp}, lever arm {arm}"
+    if body.attitude is not None:
+        yield "epoch", body.attitude.epoch or MISSING
+        yield "frame", body.attitude.frame or MISSING
+    else:
+        yield "epoch, frame", f"none in the file; {FRAME_N}"
+
+
+def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    limits = spacecraft.limits
+    yield "horizon", duration(spacecraft.horizon)
+    kept = []
+    if limits.earliest > 0.0:
+        kept.append(f"nothing before {duration(limits.earliest)}")
+    if limits.gap > 0.0:
+        kept.append(f"{duration(limits.gap)} between pulses")
+    if limits.tick is not None:
+        kept.append(f"commands in steps of {duration(limits.tick)}")
+    if limits.max_pulses is not None:
+        kept.append(f"at most {limits.max_pulses} pulses")
+    kept += [f"no pulse from {moment(begin)} to {moment(end)}" for begin, end in limits.blackout]
+    if kept:
+        yield "limits", "; ".join(kept)
+
+
+def thruster_sheet(body: Spacecraft) -> Sheet:
+    """One row a thruster that can fire: where it sits, its force, torque, specific impulse and on-times."""
+    thrusters = {one.name: one for channel in body.channels for one in channel.thrusters}
+    names = ("position", "m"), ("force", "N"), ("torque", "N m")
+    columns = [Column("thruster", number=False), *(Column(name, unit, number=False) for name, unit in names)]
+    columns += [Column("isp", "s"), Column("on-time", number=False), Column("channels", number=False)]
+    rows = tuple((*_thruster(one, body), _channels(one, body)) for one in thrusters.values())
+    return Sheet("Thrusters, in the axes of the file", tuple(columns), rows)
+
+
+def _thruster(one: Thruster, body: Spacecraft) -> tuple[str, ...]:
+    at, force, torque = (_vector(part, body) for part in (one.position, one.force, one.torque))
+    if one.force is None and one.thrust is not None:
+        force = f"{one.thrust:.4g}"
+    isp = MISSING if one.isp is None else f"{one.isp:.4g}"
+    longest = "any" if math.isinf(one.max_on_time) else duration(one.max_on_time)
+    return (one.name, at, force, torque, isp, f"{duration(one.min_on_time)} to {longest}")
+
+
+def _vector(principal: Vector | None, body: Spacecraft) -> str:
+    return MISSING if principal is None else vector(body.inertia.in_file(principal))
+
+
+def _channels(one: Thruster, body: Spacecraft) -> str:
+    return ", ".join(channel.name for channel in body.channels if one.name in {each.name for each in channel.thrusters})
+
+
+def ends_sheet(flown: Flight) -> Sheet:
+    """Spin axis, H, spin and nutation at t = 0 and after the last pulse, beside the target."""
+    body, final = flown.spacecraft, flown.final
+    target = body.goal.axis
+    start, state = body.momentum, flown.settled
+    end = np.asarray(state.rates * np.asarray(body.inertia.moments))
+    size = float(np.linalg.norm(start))
+    directions = ("spin axis", _axis(body), final.axis), ("H", start / size, final.momentum)
+    rows: list[tuple[str, ...]] = []
+    for what, before, after in directions:
+        for which, name in enumerate(angle_names(body)):
+            cells = (MISSING if one is None else angle_texts(body, one)[which] for one in (before, after, target))
+            rows.append((f"{what}: {name}", *cells))
+    rows.append(("|H|", quantity(size, "N m s"), quantity(float(np.linalg.norm(end)), "N m s"), MISSING))
+    goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
+    rows.append(("spin", spin_text(body.spin), spin_text(final.spin), goal))
+    rows.append(("nutation", degrees(body.nutation), degrees(final.nutation), MISSING))
+    heads = (Column("quantity", number=False), Column("t = 0"), Column("after the last pulse"), Column("target"))
+    return Sheet("Where it points", heads, tuple(rows), sortable=False, stacked=True)
+
+
+def _axis(body: Spacecraft) -> Vector:
+    """Spin axis at t = 0, inertial unit vector (3,)."""
+    return attitude.rotate(body.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
+
+
+def ends_note(flown: Flight) -> Prose:
+    """What the directions refer to."""
+    given = flown.spacecraft.attitude
+    if given is None:
+        return Prose(f"Directions: {FRAME_N}.")
+    return Prose(f"Directions: right ascension and declination in {given.frame or 'the frame of the file'}.")

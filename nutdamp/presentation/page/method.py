@@ -1,0 +1,98 @@
+"""How the numbers of the page come about: method, equations, references, assumptions and limits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from nutdamp import flight, guide
+from nutdamp.compliance import Part, left_of
+from nutdamp.guide.topic import Formula, Rows, Topic
+from nutdamp.outcome import left_by, tolerated
+from nutdamp.planning import Comparison, Plan
+from nutdamp.presentation.page.document import Block, Column, Facts, Listing, Points, Prose, Sheet
+from nutdamp.presentation.text import MISSING, degrees, quantity
+from nutdamp.verification import AGREE, Verification
+
+EQUATIONS = ("1", "17", "18", "19")
+"""Those of Magnus that every plan and flight rest on, as the guide numbers them."""
+
+
+def method_blocks(compared: Comparison) -> Iterator[Block]:
+    """A paragraph on the method, the equations used with their symbols, the sources."""
+    names = ", ".join(plan.scheme for plan in compared.plans)
+    yield Prose(
+        f"Planned on the nominal values of the input file: {names}. Each schedule is then flown: Euler's equations "
+        "with the true principal moments are integrated through the real pulse widths by Taylor series, coasts of "
+        "symmetric bodies as exact arcs. Recommendation, requirement and verdict go by that flight. By (17), Magnus' "
+        "impulse sum, each pulse acts at its centre with its effective impulse."
+    )
+    chosen = compared.recommended
+    topics = [guide.found(number) for number in EQUATIONS]
+    lines = [line for topic in topics for line in _listed(topic, _formulas(topic)[-1])]
+    if chosen is not None:
+        scheme = guide.found(chosen.scheme)
+        lines += _listed(scheme, _formulas(scheme)[0])
+    yield Listing("Equations", "\n".join(lines))
+    yield Facts("Symbols", tuple(_symbols(topics, chosen)))
+    yield Points(guide.SOURCES[:1])
+
+
+def _formulas(topic: Topic) -> list[Formula]:
+    """The formulas of a topic; the last one of a numbered equation is what is used."""
+    return [block for part in topic.parts for block in part.blocks if isinstance(block, Formula)]
+
+
+def _listed(topic: Topic, formula: Formula) -> list[str]:
+    return [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in formula.lines), ""]
+
+
+def _symbols(topics: list[Topic], chosen: Plan | None) -> Iterator[tuple[str, str]]:
+    """Each symbol of the equations once, and those of the formula of the scheme, as its topic explains them."""
+    seen: dict[str, str] = {}
+    for topic in topics:
+        for part in topic.parts:
+            for block in part.blocks:
+                if isinstance(block, Rows):
+                    seen.update(block.rows)
+    yield from seen.items()
+    for part in () if chosen is None else guide.found(chosen.scheme).parts:
+        if any(isinstance(block, Formula) for block in part.blocks):
+            assert chosen is not None
+            yield chosen.scheme, " ".join(block for block in part.blocks if isinstance(block, str))
+            return
+
+
+def assumption_blocks() -> Iterator[Block]:
+    """Assumptions and limits, as the guide has them."""
+    yield Points(tuple(re.sub(r"`", "", limit) for limit in guide.limits()))
+
+
+def checks_sheet(plan: Plan, found: Verification) -> Sheet:
+    """What a verification must show to pass, what it shows, and whether it does."""
+    body = plan.spacecraft
+    rows = []
+    for method in found.methods:
+        if method.outside and method.missing:
+            rows.append((method.name, *MOTION_WITHIN, "not flown", MISSING))
+        elif method.outside:
+            passed = method.difference <= AGREE
+            rows.append((method.name, *MOTION_WITHIN, f"{method.difference:.1e}", PASSED[passed]))
+    steady = not body.disturbances and body.growth == 0.0
+    for what, drift in (("|H| on coasts", found.momentum_drift), ("energy on coasts", found.energy_drift)):
+        verdict = PASSED[drift <= AGREE] if steady else "not judged: disturbances or dissipation change it"
+        rows.append((what, "keeps to", f"{AGREE:g} of itself", f"{drift:.1e}", verdict))
+    one, other = (left_by(flown) for flown in (flight.by_impulses(body, plan.pulses), plan.flight))
+    for part, most in tolerated(body).items():
+        first, second = (end.spin if part is Part.SPIN else left_of(part, end, body) for end in (one, other))
+        shown, allowed = (
+            quantity(value, "rad/s") if part is Part.SPIN else degrees(value) for value in (abs(first - second), most)
+        )
+        verdict = "pass" if abs(first - second) <= most else "differs: what is flown counts"
+        rows.append((f"impulse sum (17): {part.label}", "differs from real widths by at most", allowed, shown, verdict))
+    heads = ("check", "criterion", "threshold", "found", "verdict")
+    return Sheet("Checks and their thresholds", tuple(Column(head, number=False) for head in heads), tuple(rows))
+
+
+MOTION_WITHIN = "axis, H and rates differ from the flown motion by at most", f"{AGREE:g} rad, of itself"
+PASSED = {True: "pass", False: "FAIL"}

@@ -1,0 +1,206 @@
+"""What a board needs on the page of ``report``: the decision, the data, thresholds, how to repeat it, who signs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from markup import Node, parsed
+from process import Run
+from reference import Motion, coast
+
+import nutdamp
+from nutdamp import flight, guide
+from nutdamp.outcome import spin_phases
+from nutdamp.planning import compare
+from nutdamp.presentation.page import pdf
+from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.document import Control
+from nutdamp.presentation.page.html import page_html
+from nutdamp.spacecraft import Disturbance
+
+ROOT = Path(__file__).parents[2]
+ACE = ROOT / "configs" / "ace.yaml"
+
+
+@cache
+def ace(**control: str) -> Node:
+    """The page of a body with an attitude and an epoch, without pictures."""
+    text = ACE.read_text("utf-8")
+    compared = compare(nutdamp.load(ACE), ["two-pulse", "four-pulse"])
+    made = report_page(compared, Repeat("nutdamp report", "ace.yaml", text), pictured=False, control=Control(**control))
+    return parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+
+
+def table(tree: Node, title: str) -> list[list[str]]:
+    """The rows of the table of that title, its headings first."""
+    (found,) = (one for one in tree.all("table") if one.all("caption")[0].text.startswith(title))
+    return [[cell.text for cell in row if cell.tag in ("th", "td")] for row in found.all("tr")]
+
+
+def facts(tree: Node, title: str) -> dict[str, str]:
+    return {row[0]: row[1] for row in table(tree, title)}
+
+
+def test_the_limits_are_those_of_the_readme() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
+    assert guide.limits() == tuple(" ".join(part.split()) for part in f"\n{readme}".split("\n- ") if part.strip())
+    assert len(guide.limits()) >= 8
+    (section,) = (one for one in ace().all("section") if one.attributes["id"] == "assumptions")
+    assert [item.text for item in section.all("li")] == [text.replace("`", "") for text in guide.limits()]
+
+
+def test_the_spacecraft_stands_there_whole() -> None:
+    found = facts(ace(), "At t = 0")
+    assert found["mass"] == "611.7 kg"
+    assert found["epoch"] == "2013-05-07T14:31:17Z"
+    assert found["frame"] == "EME2000"
+    heads, first, *_ = table(ace(), "Thrusters")
+    assert dict(zip(heads, first, strict=True)) == {
+        "thruster": "P1",
+        "position m": "(0, 0.7, -0.5)",
+        "force N": "(0, 0, 4.45)",
+        "torque N m": "(3.115, 0, 0)",
+        "isp s": "215",
+        "on-time": "40 ms to 0.5 s",
+        "channels": "P1",
+    }
+
+
+def test_where_it_points_is_what_the_json_says(run: Run) -> None:
+    done = run("plan", str(ACE), "-q", "--scheme", "two-pulse", "--scheme", "four-pulse", "--json", "-")
+    data = json.loads(done.stdout)
+    final = data["decision"]["final"]
+    ends = {row[0]: row[2] for row in table(ace(), "Where it points")}
+    for what, key in (("spin axis", "axis"), ("H", "momentum")):
+        for name in ("right_ascension", "declination"):
+            shown = float(ends[f"{what}: {name.replace('_', ' ')}"].removesuffix(" deg"))
+            assert shown == pytest.approx(final[key][f"{name}_deg"], abs=6e-5)
+    tiles = {one.all("dt")[0].text: one.all("dd")[0].text for one in ace().all("div") if one.all("dt")}
+    assert tiles["spin axis ends at"].startswith("right ascension ")
+
+
+def test_pulses_have_date_phase_and_cones() -> None:
+    body = nutdamp.load(ACE)
+    chosen = compare(body, ["two-pulse", "four-pulse"]).recommended
+    assert chosen is not None
+    before, after = chosen.flight.around_pulses()
+    heads, *rows = table(ace(), "Pulses of")
+    for index, pulse in enumerate(chosen.pulses):
+        row = dict(zip(heads, rows[index], strict=True))
+        assert row["start UTC"] == body.utc(pulse.start, 3)
+        turned = math.degrees(body.spin * pulse.start) % 360.0  # the spin hardly changes
+        assert float(row["spin phase deg"]) == pytest.approx(turned, abs=0.1)
+        for cone in ("nutation", "body_cone", "space_cone"):
+            for track, when in ((before, "before"), (after, "after")):
+                shown = float(row[f"{cone.replace('_', ' ')} {when} deg"])
+                assert shown == pytest.approx(math.degrees(getattr(track, cone)[index]), rel=1e-3)
+
+
+def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
+    """Against Euler's equations by DOP853, with three moments and a torque about axis 3."""
+    body = nutdamp.example().replace(disturbances=(Disturbance(0.0, 0.4),), dispersions=None)
+    times = np.array([0.0, 3.0, 11.0, 40.0])
+    found = spin_phases(flight.flown(body, nutdamp.plan(body, "none").pulses, 41.0), times)
+    assert found == pytest.approx(body.spin * times + 0.5 * 0.4 / body.inertia.C * times**2, rel=1e-12)
+    uneven = nutdamp.load(ACE)
+    flown = flight.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
+    moments = flown.moments
+    grid = np.linspace(0.0, 60.0, 6001)
+    motions = coast(moments, Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
+    spins = np.array([uneven.spin, *(one.rates[2] for one in motions)])
+    assert spin_phases(flown, grid[[-1]])[0] == pytest.approx(np.trapezoid(spins, grid), rel=1e-7)
+
+
+def test_a_verification_names_what_it_takes_to_pass() -> None:
+    rows = {row[0]: row for row in table(ace(), "Checks")}
+    check = rows["DOP853, full tensor"]
+    assert check[2] == "1e-09 rad, of itself"
+    assert float(check[3]) <= 1e-9
+    assert check[4] == "pass"
+    assert rows["|H| on coasts"][4] == "pass"
+    assert rows["impulse sum (17): nutation"][2] == "0.01 deg"  # a tenth of the requirement
+
+
+def test_equations_and_symbols_are_those_of_the_guide() -> None:
+    (listing,) = (one.text for one in ace().all("pre") if "M(17)" in one.text)
+    for number in ("M(1)", "M(17)", "M(18)", "M(19)"):
+        assert re.search(rf"^{re.escape(number)} ", listing, re.MULTILINE)
+    assert facts(ace(), "Symbols")["J_v"] == "impulse of pulse v, J1 + i J2, N m s"
+
+
+def test_configuration_control_is_written_as_given() -> None:
+    tree = ace(title="ACE <1>", document="ND-7", issue='2 "b"', author="M. Ö", date="2026-03-01")
+    assert tree.all("h1")[0].text == "ACE <1>"
+    (control,) = (one for one in tree.all("dl") if one.attributes.get("class") == "control")
+    pairs = {one.all("dt")[0].text: one.all("dd")[0].text for one in control.all("div")}
+    assert pairs == {"document": "ND-7", "issue": '2 "b"', "author": "M. Ö", "date": "2026-03-01"}
+    assert r'content: "ND\2d 7\2c \20 issue\20 2\20 \22 b\22 \2c \20 2026\2d 03\2d 01"' in tree.all("style")[0].text
+    assert not [one for one in ace().all("dl") if one.attributes.get("class") == "control"]
+
+
+def test_the_input_is_known_by_its_digest(run: Run, tmp_path: Path) -> None:
+    assert run("init", "craft.yaml").returncode == 0
+    assert run("report", "craft.yaml", "--scheme", "two-pulse", "-o", "page.md").returncode == 0
+    digest = hashlib.sha256((tmp_path / "craft.yaml").read_bytes()).hexdigest()
+    assert f"| SHA-256 of the input file | {digest} |" in (tmp_path / "page.md").read_text("utf-8")
+
+
+def test_the_date_is_that_of_the_build_where_none_is_given(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1772366400")
+    for name, more, said in (("a", (), "2026-03-01"), ("b", ("--date", "1 May 2026"), "1 May 2026")):
+        assert run("report", "--scheme", "two-pulse", "-o", f"{name}.md", *more).returncode == 0
+        assert f"date: {said}" in (tmp_path / f"{name}.md").read_text("utf-8")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    done = run("report", "-o", "c.md")
+    assert done.returncode == 2
+    assert "SOURCE_DATE_EPOCH = 'yesterday': expected a number of seconds" in done.stderr
+
+
+def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path) -> None:
+    """And so do screen, Markdown and JSON, in the same words."""
+    done = run("report", "--disperse", "4e3", "-o", "page.html")
+    assert done.returncode == 4
+    tree = parsed((tmp_path / "page.html").read_text("utf-8").removeprefix("<!DOCTYPE html>"))
+    (tile,) = (one for one in tree.all("div") if one.attributes.get("class") == "bad")
+    said = tile.all("dd")[0].text
+    assert re.fullmatch(r"NOT met: [\d.]+ % of cases comply \(99.7 % required\)", said)
+    assert not [one for one in tree.all("div") if one.attributes.get("class") == "good"]
+    assert f"Requirement: {said}." in done.stderr
+    found, *_ = tree.all("table")
+    assert [row.all("td")[-1].text for row in found.all("tr")[1:]][::2] == ["NOT met", "NOT met"]
+    heads, *rows = table(tree, "What each scheme costs")
+    shares = {row[0]: float(row[heads.index("cases that comply %")]) for row in rows}
+    assert max(shares, key=lambda name: shares[name]) == "two-pulse"
+    assert f"more cases comply with two-pulse ({shares['two-pulse']:.1f} %)" in tree.text
+    assert run("report", "--disperse", "4e3", "-o", "page.md").returncode == 4
+    assert (tmp_path / "page.md").read_text("utf-8").count(said) == 3  # verdict, tile, dispersion
+
+
+@pytest.mark.parametrize("name", ["page.html", "page.md"])
+def test_the_same_input_gives_the_same_bytes(run: Run, tmp_path: Path, name: str) -> None:
+    contents = []
+    for _ in range(2):
+        run("report", "--disperse", "1e3", "--scheme", "two-pulse", "-o", name)
+        contents.append((tmp_path / name).read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_a_pdf_does_not_say_when_it_was_printed() -> None:
+    printed = [
+        b"<</CreationDate (D:20261122101501+00'00')\n/ModDate (D:2026%d)>> (node%08d) (node%08d) (node%08d)"
+        % (day, node, node + 7, node)
+        for day, node in ((1122, 3), (1231, 90))
+    ]
+    first, second = map(pdf._settled, printed)
+    assert first == second
+    assert len(first) == len(printed[0])
+    assert first.endswith(b"(node00000001) (node00000002) (node00000001)")
