@@ -60,6 +60,11 @@ class Problem:
         """The schedule through its real pulse widths; what was flown before is remembered."""
         return flight.flown(self.spacecraft, made, dynamics=self._dynamics)
 
+    @property
+    def closed(self) -> bool:
+        """Whether the motion between pulses is that of a symmetric body left alone."""
+        return self._dynamics.free and self.spacecraft.growth == 0.0
+
     def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations

@@ -20,7 +20,7 @@ from nutdamp.compliance import DAMPED_ANGLE
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
 from nutdamp.limits import keeps_limits
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
@@ -44,6 +44,9 @@ DEAR = 0.01
 
 DEARER = 0.03
 """Share above it from which shorter horizons are looked at too."""
+
+FEW, SAVED = 2, 0.001
+"""Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
 
 WAYS = 3
 """Schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks."""
@@ -175,8 +178,46 @@ class _Search(Problem):
         # Infinite where the solver gave up: then there may be solutions all the same.
         best = None if UNMET < first.unmet < math.inf else self.programmed(first)
         if not work.exhausted() and self.doubtful(best, first):
-            best = self.cheaper(best, self.descended(best))
-        return best
+            return self.cheaper(best, self.descended(best))
+        best = self.cheapened(best)
+        return best if best is None else self.fuller(best, first)
+
+    def fuller(self, made: Schedule, first: Solution) -> Schedule:
+        """``made``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
+
+        Burns are left out by what the linear program thinks that it costs.
+        """
+        few = FEW * len(self.equations.chosen)
+        if len(made) >= few or self.options.least == "pulses" or not self.dear(made, first.cost, SAVED):
+            return made
+        program = self.program()
+        program.haste = HASTE
+        longest = sorted(program.solve().burns, key=lambda burn: -burn.impulse)[:few]
+        if len(longest) <= len(made) or work.exhausted():
+            return made
+        found = self.corrected(program, program.solve(program.about(longest)), first.cost)
+        more = self.cheapened(self.best(found))
+        return made if more is None or not self.dear(made, self.price(more), SAVED) else more
+
+    def cheapened(self, made: Schedule | None) -> Schedule | None:
+        """The schedule after some steps down on the true motion, where that is known in closed form between pulses."""
+        if made is None or not len(made) or not self.closed or self.spacecraft.limits.tick is not None:
+            return made
+        if work.exhausted():
+            return made
+        other = starting_points.cheapened(self.task(), made)
+        if other is None or not keeps_limits(self.spacecraft, other.pulses) or self.left(self.flown(other)) > LEFT:
+            return made
+        return made if self.hurried(other) > self.hurried(made) else self.cheaper(made, other)
+
+    def hurried(self, made: Schedule) -> int:
+        """How often a channel is on again before it was off for its shortest on-time: valves take their time."""
+        before, count = {channel.name: -math.inf for channel in self.channels}, 0
+        shortest = {channel.name: channel.min_on_time for channel in self.channels}
+        for pulse in made:
+            count += pulse.start - before[pulse.channel] < shortest[pulse.channel] - TOUCHING
+            before[pulse.channel] = pulse.end
+        return count
 
     def programmed(self, first: Solution) -> Schedule | None:
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
@@ -251,9 +292,9 @@ class _Search(Problem):
         there = [made for made in (one, other) if made is not None]
         return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
 
-    def dear(self, made: Schedule | None, least: float) -> bool:
+    def dear(self, made: Schedule | None, least: float, share: float = DEARER) -> bool:
         """Whether there is no schedule, or one so dear that it is worth looking for another."""
-        return made is None or self.price(made) > least * (1.0 + DEARER)
+        return made is None or self.price(made) > least * (1.0 + share)
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""

@@ -65,6 +65,12 @@ HALF = 0.5
 WIDE, MOST_KICKS = 0.25, 24
 """rad of the faster turn from which pulses are first taken as several kicks, and the most of them."""
 
+CLOSE = 1e-5
+"""Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended."""
+
+MOVES, FEWEST_MOVES = 30, 3
+"""Steps of such a descent, over the number of pulses, and the fewest."""
+
 SMALL = 1e-6
 """The impulse that is priced, as a share of all there is to do."""
 
@@ -103,6 +109,23 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
             break
         best = more
     return _flown(task, best, known)
+
+
+def cheapened(task: Task, made: Schedule) -> Schedule | None:
+    """A schedule after a few steps down on the true motion, fewer where it has many pulses; None where there is none.
+
+    Its sequence of channels stays, and what it leaves too.
+    """
+    which, t, on = _moments_of(task, made)
+    every = Moments(which[None], t[None], on[None])
+    starts = laid_out(task, every, np.array([channel.min_on_time for channel in task.channels])[every.which])
+    if not len(starts.x):
+        return None
+    descent = Descent(task, *starts, kicks=0, barrier=CLOSE)
+    descent.run(max(MOVES // len(made), FEWEST_MOVES))
+    descent.close()
+    there = bool(descent.left[0] < EXACT)
+    return _schedule(task, _moments(descent.sequences.which[0], descent.state.x[0])) if there else None
 
 
 def _pulses(task: Task, spare: int) -> int:
@@ -257,16 +280,7 @@ def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Ve
 
 def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]:
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
-    numbers = {channel.name: number for number, channel in enumerate(task.channels)}
-    given = [
-        Moments(
-            np.array([numbers[pulse.channel] for pulse in made]),
-            np.array([pulse.t for pulse in made]),
-            np.array([pulse.on_time for pulse in made]),
-        )
-        for made in known
-        if 0 < len(made) <= _pulses(task, 2 * SPARE)
-    ]
+    given = [_moments_of(task, made) for made in known if 0 < len(made) <= _pulses(task, 2 * SPARE)]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
     near = [one for one, cost in zip(ideal, best.cost, strict=True) if cost <= NEAR * best.cost[0]]
     found = _on_the_true_motion(task, [*near, *given]) or _on_the_true_motion(task, ideal)
@@ -303,6 +317,13 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
             rows = np.flatnonzero(descent.left < EXACT)
             found += [_moments(descent.sequences.which[row], descent.state.x[row]) for row in rows]
     return found
+
+
+def _moments_of(task: Task, made: Schedule) -> Moments:
+    """The pulses of a schedule."""
+    numbers = {channel.name: number for number, channel in enumerate(task.channels)}
+    which = np.array([numbers[pulse.channel] for pulse in made], dtype=int)
+    return Moments(which, np.array([pulse.t for pulse in made]), np.array([pulse.on_time for pulse in made]))
 
 
 def _moments(which: NDArray[np.int_], x: Vector) -> Moments:

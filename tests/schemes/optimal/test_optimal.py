@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from nutdamp.remarks import broken_limits, infeasibility, remarks
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.residual_equations import Equations, small_angles
+from nutdamp.schemes.optimal.search import _Search
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Channel, Limits, Spacecraft, Thruster
 
 NANODEGREE = math.radians(1e-9)
@@ -236,6 +239,42 @@ def flies(seed: int, dearest: float) -> None:
 @pytest.mark.parametrize("seed", range(16))
 def test_random_layouts_are_planned(seed: int) -> None:
     flies(seed, 1.03)
+
+
+KNOWN = {
+    9: 0.0005683514790203955,
+    17: 0.0015252966350810253,
+    109: 5.7688437020970824e-05,
+    111: 0.0001805874376459324,
+    116: 0.0012134310937840607,
+    130: 0.00027772812193374363,
+    131: 0.00044437928732715036,
+    138: 0.002253543083145223,
+    153: 0.0027131339413776203,
+}
+"""Propellant, kg, of layouts as commit b69e7e0 plans them: by linear programs alone, which another solver solved."""
+
+
+@pytest.mark.parametrize("seed", KNOWN)
+def test_layouts_cost_no_more_than_by_linear_programs_alone(seed: int) -> None:
+    made = plan(random_layout(seed), "optimal")
+    assert made.pulses.propellant is not None
+    assert made.pulses.propellant <= KNOWN[seed] * (1.0 + 1e-9)
+
+
+def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> None:
+    body = random_layout(153)
+    search = _Search(body, OptimalOptions())
+    first = search.program().solve()
+    before = search.programmed(first)
+    assert before is not None
+    after = search.cheapened(before)
+    assert after is not None
+    assert search.price(after) < search.price(before) * (1.0 - 1e-4)
+    assert [one.channel for one in after] == [one.channel for one in before]
+    assert math.degrees(search.left(search.flown(after))) < 1e-9
+    ticked = _Search(replace(body, limits=replace(body.limits, tick=1e-3)), OptimalOptions())
+    assert ticked.cheapened(before) is before  # ticks decide what a schedule leaves
 
 
 @pytest.mark.slow
