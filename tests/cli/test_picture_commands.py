@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -41,6 +42,42 @@ def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> Non
     recommended, optimal, two = ((tmp_path / f"{name}.png").read_bytes() for name in ("recommended", "optimal", "two"))
     assert recommended == optimal
     assert recommended != two
+
+
+def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> None:
+    """Also where several are named, of which no other picture could be drawn, and where none is feasible."""
+    named = ("--scheme", "one-pulse", "--scheme", "two-pulse")
+    assert run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes").returncode == 0
+    words = re.findall(r"<text[^>]*>([^<]*)</text>", (tmp_path / "schemes.svg").read_text(encoding="utf-8"))
+    assert {"one-pulse", "two-pulse", "propellant, g", "required"} <= set(words)
+    (tmp_path / "ideal.yaml").write_text(IDEAL)
+    none = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "none.svg", "--figure", "schemes")
+    assert none.returncode == 3
+    assert "no plan" in (tmp_path / "none.svg").read_text(encoding="utf-8")
+
+
+def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: Path) -> None:
+    named = ("--scheme", "two-pulse", "--robust", "--impulses", "--force", "-q")
+    run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes")
+    assert "complying cases, %" in (tmp_path / "schemes.svg").read_text(encoding="utf-8")
+
+
+def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
+    common = ("disperse", "--scheme", "two-pulse", "--impulses", "--force", "--samples", "200", "-q")
+    said = {"cases": "cases beyond, %", "momentum": "H towards you, x of N to the right", "budget": "A, 0.6 kg m²"}
+    for figure, words in said.items():
+        run(*common, "--plot", f"{figure}.svg", "--figure", figure)
+        assert words in (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")
+    run(*common, "--plot", "all.svg")
+    assert all(words in (tmp_path / "all.svg").read_text(encoding="utf-8") for words in said.values())
+    assert run("disperse", "--figure", "cases").returncode == 2
+
+
+def test_a_film_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None:
+    """7.434 s, a quarter of that, in half a second of film."""
+    done = run("animate", "--scheme", "two-pulse", "-o", "a.gif", "--seconds", "0.5", "--fps", "10", "--width", "320")
+    assert "5 frames, 18.6 s of motion in a second" in done.stderr
+    assert left(tmp_path) == ["a.gif"]
 
 
 def test_standard_output_takes_the_picture_alone(run: Run) -> None:

@@ -132,6 +132,10 @@ def test_a_firing_is_announced() -> None:
         scene = Scene(made, Timing(end, 100, 20, 1.0), 400)
     assert "firing" not in scene.caption(first.start - 0.01)
     assert f"firing 1: {first.channel}" in scene.caption(first.t)
+    over = scene.caption(first.end + 0.01)  # a short one would else be missed between two frames
+    assert f"fired 1: {first.channel}" in over
+    assert "firing" not in over
+    assert "fire" not in scene.caption(first.end + 2.0 * animation.HELD * scene.timed.pace)
 
 
 @pytest.mark.parametrize(("turns", "seconds"), [(1.0, 6.0), (20.0, 12.0), (1000.0, 30.0)])

@@ -112,9 +112,9 @@ def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) 
     cut = end > TAIL * knee > 0.0
     end = TAIL * knee if cut else end
     edges = np.linspace(found.minimum, max(end, found.minimum * (1.0 + 1e-9) + 1e-12), BINS + 1)
-    counts = found.histogram(np.append(edges, max(found.maximum, edges[-1])))
+    counts = found.histogram(np.append(edges, found.maximum) if cut else edges)
     share = 100.0 * counts / max(counts.sum(), 1.0)
-    axes.stairs(share[:-1], np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
+    axes.stairs(share[:BINS], np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
     title = f"{name}: histogram"
     if cut:
         title += f"\n{share[-1]:.2g} % of the cases lie beyond, up to {math.degrees(found.maximum):.4g}°"

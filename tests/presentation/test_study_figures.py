@@ -1,0 +1,288 @@
+"""Figures of studies: distributions, final H, tornado, dot plots of the schemes, the trade front with its marks."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from builders import aimed, cross, spinner
+from dispersed import normal
+from layout import check_layout, texts
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch, StepPatch
+
+from nutdamp import dispersion, fronts, planning
+from nutdamp.decision import cases_of, decide
+from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.statistics import Exact
+from nutdamp.dispersion.study import Results, run
+from nutdamp.planning import Comparison, Plan
+from nutdamp.presentation import figures
+from nutdamp.presentation.dispersion_tables import budget_rows
+from nutdamp.presentation.figures import dispersion as drawing
+from nutdamp.schemes.options import OptimalOptions
+from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.tolerances import Dispersions, Tolerance
+
+REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
+TOLERANCES = Dispersions(
+    A=normal(0.005, relative=True),
+    C=normal(0.005, relative=True),
+    omega0=(normal(0.002),) * 3,
+    thrust=dict.fromkeys(("+1", "-1", "+2", "-2"), normal(0.02, relative=True)),
+    timing=Tolerance("uniform", 0.005),
+    timing_offset=Tolerance("bias", 0.002),
+    attitude=normal(0.002),
+)
+BODY = replace(
+    spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), requirement=REQUIRED, limits=Limits(horizon=40.0)),
+    dispersions=TOLERANCES,
+)
+POINTED = replace(
+    aimed(spinner(steerable=Steerable(50.0), requirement=REQUIRED), 10.0, 30.0),
+    dispersions=replace(TOLERANCES, thrust={}),
+)
+NAMES = ("overview", "cases", "momentum", "budget")
+
+
+@cache
+def study(which: str = "shift", count: int = 3000) -> Results:
+    body = BODY if which == "shift" else POINTED
+    plan = planning.plan(body, "two-pulse")
+    assert plan.feasible, plan.why
+    return run(Results(dispersion.study_of(body, plan.pulses, flown=False), count))
+
+
+@cache
+def drawn(name: str, which: str = "shift") -> Figure:
+    return figures.dispersion_figure(name, study(which), scheme="two-pulse")
+
+
+def line(axes: Axes, label: str) -> Vector:
+    (found,) = (one for one in axes.lines if str(one.get_label()).startswith(label))
+    return np.asarray(found.get_xydata(), dtype=np.float64)
+
+
+# --- dispersed cases -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("which", ["shift", "target"])
+@pytest.mark.parametrize("name", NAMES)
+def test_studies_are_drawn_whole_and_say_what_is_met(name: str, which: str) -> None:
+    figure = drawn(name, which)
+    check_layout(figure)
+    heading = figure.get_suptitle()
+    assert heading.startswith("test: two-pulse by impulse sum (17), 3,000 dispersed cases\nrequirement ")
+    assert re.search(r"(NOT met|met): [\d.]+ % of cases comply \(99\.7 % required\)", heading)
+
+
+def test_histograms_reach_the_largest_value() -> None:
+    results = study()
+    for axes, output in zip(drawn("cases").axes[::2], ("nutation", "momentum_shift"), strict=True):
+        found = results.distribution(output)
+        assert found is not None
+        (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
+        values, edges, _ = stairs.get_data()
+        assert edges[-1] == pytest.approx(math.degrees(found.maximum))
+        assert float(np.sum(values)) == pytest.approx(100.0)
+        assert axes.get_xlim()[1] >= edges[-1]
+
+
+def test_a_histogram_that_is_cut_says_where_and_how_many_lie_beyond() -> None:
+    values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
+    axes = Figure().subplots()
+    drawing._histogram(axes, Exact(values), "nutation left", None)
+    assert "0.01 % of the cases lie beyond, up to 50°" in axes.get_title()
+    (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
+    assert stairs.get_data()[1][-1] < 2.1
+
+
+@pytest.mark.parametrize(("which", "output"), [("shift", "momentum_shift"), ("target", "axis_error")])
+def test_final_h_lies_as_far_out_as_the_table_says(which: str, output: str) -> None:
+    results = study(which)
+    assert results.values is not None
+    points = drawing.momentum_cases(results)
+    away = np.degrees(results.values[OUTPUTS.index(output)])
+    assert np.hypot(*points.T) == pytest.approx(away, rel=1e-6, abs=1e-9)
+    axes = drawn("momentum", which).axes[0]
+    (dots,) = (patch for patch in axes.patches if isinstance(patch, PathPatch))
+    assert np.asarray(dots.get_path().vertices)[::2] == pytest.approx(points[: drawing.DOTS])
+    required = line(axes, "required")
+    assert np.hypot(*required.T) == pytest.approx(np.full(len(required), 0.2))
+    assert axes.get_aspect() == 1.0
+    left, right = axes.get_xlim()
+    assert left < points[:, 0].min()
+    assert right > points[:, 0].max()
+
+
+def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
+    points = np.random.default_rng(2).multivariate_normal([1.0, -2.0], [[4.0, 1.5], [1.5, 1.0]], 100_000)
+    for share in (0.5, 0.9, 0.997):
+        rim = drawing.ellipse(points, share)
+        axes = np.linalg.inv(np.cov(points.T))
+        off = rim - points.mean(axis=0)
+        sizes = np.sqrt(np.einsum("ij,jk,ik->i", off, axes, off))
+        assert np.ptp(sizes) < 1e-6 * sizes[0]
+        # Rayleigh: of normal cases this share lies within.
+        assert sizes[0] == pytest.approx(math.sqrt(-2.0 * math.log(1.0 - share)), rel=0.02)
+        inside = points - points.mean(axis=0)
+        within = np.einsum("ij,jk,ik->i", inside, axes, inside) <= sizes[0] ** 2
+        assert within.mean() == pytest.approx(share, abs=1e-4)
+    still = drawing.ellipse(np.zeros((5, 2)), 0.997)
+    assert (still == 0.0).all()
+
+
+def test_the_tornado_has_the_rows_and_effects_of_the_table() -> None:
+    results = study()
+    rows = budget_rows(results.study)
+    first, figure = results.study.first_order, drawn("budget")
+    names = [entry.name for entry in first.inputs]
+    for axes, output in zip(figure.axes, ("nutation", "momentum_shift"), strict=True):
+        effects = np.degrees(first.effects(output))
+        assert len(axes.patches) == len(rows)
+        for bar, row in zip(axes.patches, rows, strict=True):
+            expected = math.sqrt(sum(float(effects[index]) ** 2 for index in row.inputs))
+            assert float(bar.get_extents().transformed(axes.transData.inverted()).x1) == pytest.approx(expected)
+            if len(row.inputs) == 1:
+                assert row.name == names[row.inputs[0]]
+            assert (bar.get_hatch() == "////") == row.bias
+    labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert any(label.startswith("A, ") for label in labels)
+    assert sorted(index for row in rows for index in row.inputs) == list(range(len(names)))
+    # The largest of what counts stands on top, side by side for nutation and H.
+    assert figure.axes[0].get_yticks()[0] == max(figure.axes[0].get_yticks())
+
+
+def test_nothing_that_varies_is_an_empty_tornado() -> None:
+    body = replace(BODY, dispersions=Dispersions(timing_offset=Tolerance("bias", 0.01)))
+    results = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False), 50))
+    for name in NAMES:
+        check_layout(figures.dispersion_figure(name, results, scheme="two-pulse"))
+
+
+# --- schemes beside each other ---------------------------------------------------------------------------------------
+
+
+@cache
+def compared() -> Comparison:
+    return planning.compare(BODY, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
+
+
+def column(figure: Figure, name: str) -> Axes:
+    (found,) = (axes for axes in figure.axes if axes.get_xlabel().startswith(name))
+    return found
+
+
+def dots(axes: Axes) -> dict[int, tuple[float, str, bool]]:
+    """By row: where the dot stands, its mark, whether it is filled."""
+    found = {}
+    for one in axes.lines:
+        if str(one.get_marker()) in "o<" and len(np.asarray(one.get_xdata())) == 1:
+            x, y = np.asarray(one.get_xydata())[0]
+            found[-int(y)] = float(x), str(one.get_marker()), one.get_markerfacecolor() == one.get_color()
+    return found
+
+
+def test_dots_stand_at_the_numbers_of_the_comparison() -> None:
+    figure = figures.schemes_figure(compared())
+    check_layout(figure)
+    plans = compared().plans
+    ends, impulses = dots(column(figure, "end")), dots(column(figure, "impulse"))
+    for row, plan in enumerate(plans):
+        assert ends[row][0] == pytest.approx(plan.end)
+        assert impulses[row][0] == pytest.approx(plan.total_impulse)
+        assert ends[row][2] == (plan is compared().recommended)
+    for name, part in (("nutation", "nutation"), ("shift of H", "momentum_shift")):
+        axes = column(figure, name)
+        assert axes.get_xscale() == "log"
+        for row, plan in enumerate(plans):
+            left = math.degrees(getattr(plan.flown, part))
+            place, mark, _ = dots(axes)[row]
+            if mark == "<":
+                assert left < place == pytest.approx(axes.get_xlim()[0])
+            else:
+                assert place == pytest.approx(left)
+            shown = [note.get_text() for note in axes.texts]
+            assert (f"{left:.4g}" if left >= 1e-9 else "< 1e-9") in shown
+
+
+def test_floor_and_requirement_are_lines() -> None:
+    figure = figures.schemes_figure(compared())
+    bounds = compared()["optimal"].pulses.bounds
+    assert bounds is not None
+    assert bounds.rigorous is not None
+    assert line(column(figure, "impulse"), "no schedule takes less")[0, 0] == pytest.approx(bounds.rigorous)
+    assert line(column(figure, "nutation"), "required")[0, 0] == pytest.approx(0.5)
+    assert line(column(figure, "shift of H"), "required")[0, 0] == pytest.approx(0.2)
+    assert not [axes for axes in figure.axes if "complying" in axes.get_xlabel()]
+
+
+def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
+    cases = {"two-pulse": cases_of(study())}
+    chosen = compared().recommended
+    assert chosen is not None
+    cases[chosen.scheme] = cases["two-pulse"]
+    figure = figures.schemes_figure(compared(), decide(compared(), cases))
+    check_layout(figure)
+    axes = column(figure, "complying cases")
+    share = cases["two-pulse"].complying
+    assert share is not None
+    assert dots(axes)[1][0] == pytest.approx(100.0 * share)
+    assert set(dots(axes)) == {1, list(compared().plans).index(chosen)}
+    assert line(axes, "required")[0, 0] == pytest.approx(99.7)
+
+
+def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
+    ideal = planning.compare(spinner(), ("one-pulse", "four-pulse"))
+    assert not ideal["four-pulse"].feasible
+    figure = figures.schemes_figure(ideal)
+    check_layout(figure)
+    assert all(set(dots(axes)) == {0} for axes in figure.axes)
+    assert any(text.get_text() == "no plan" for text, _ in texts(figure))
+    none = planning.compare(spinner(), ("four-pulse",))
+    check_layout(figures.schemes_figure(none))
+
+
+# --- time and cost ---------------------------------------------------------------------------------------------------
+
+
+@cache
+def traded() -> tuple[fronts.Front, ...]:
+    return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, fronts.EVERYWHERE))
+
+
+def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
+    figure = figures.trade_figure(BODY, traded())
+    check_layout(figure)
+    (axes,) = figure.axes
+    count = sum(len(front.points) for front in traded())
+    named = [int(number) for note in axes.texts for number in note.get_text().split(", ")]
+    assert sorted(named) == list(range(1, count + 1))
+    words = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"H ends where it was", "H may end anywhere", "no schedule takes less"} <= words
+    first, second = ({(p.plan.end, p.cost) for p in front.points} for front in traded())
+    assert first & second, "no point is on both fronts"
+    assert "the same schedule, on this front too" in words
+    rings = [one for one in axes.lines if one.get_markerfacecolor() == "none" and len(np.asarray(one.get_xdata())) == 1]
+    marks = [one for one in axes.lines if one.get_marker() == "o" and len(np.asarray(one.get_xdata()))]
+    assert len(rings) >= len(first & second)
+    assert all(ring.get_markersize() > mark.get_markersize() for ring in rings for mark in marks)
+
+
+def test_the_recommended_plan_is_marked_among_the_trade() -> None:
+    chosen: Plan | None = compared().recommended
+    assert chosen is not None
+    (axes,) = figures.trade_figure(BODY, traded(), chosen).axes
+    assert line(axes, f"recommended: {chosen.scheme}")[0] == pytest.approx([chosen.end, chosen.total_impulse])
+
+
+def test_a_trade_without_points_says_so() -> None:
+    body: Spacecraft = spinner()
+    figure = figures.trade_figure(body, (fronts.Front(0.0, (), "no channel"),))
+    check_layout(figure)
+    assert any("no schedule was found" in note.get_text() for note in figure.axes[0].texts)
