@@ -47,17 +47,18 @@ def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule
 
 SIXTEEN = spinner(degrees=8.0, channels=fan(16, 20.0))
 STEERED = spinner(steerable=TORQUER, requirement=Requirement(0.01))
+FAR = aimed(spinner(steerable=Steerable()), 110.0, 20.0)
 FORBIDDEN = spinner(channels=cross(20.0), limits=Limits(earliest=1.0, blackout=((2.0, 4.5), (6.0, 7.0), (20.0, 25.0))))
 
 ODD: dict[str, tuple[Spacecraft, Schedule]] = {
     "three moments": (spinner(moments=(120, 100, 80), degrees=25.0), Schedule()),
     "three moments, oblate": (spinner(moments=(80, 90, 120), degrees=10.0, channels=cross(1.0)), Schedule()),
     "no nutation": (spinner(degrees=0.0, channels=cross(20.0)), Schedule()),
-    "one pulse at once": (STEERED, Schedule((steerable_pulse(TORQUER, 0.0, 1.0, impulse=20.0),))),
+    "one pulse at once": (STEERED, Schedule((steerable_pulse(TORQUER, 0.2, 1.0, impulse=20.0),))),
     "one pulse": (BODY, kicks(BODY, 1, 1.0, 0.3)),
     "120 pulses": (BODY, kicks(BODY, 120, 0.4, 0.01)),
     "16 channels": (SIXTEEN, kicks(SIXTEEN, 32, 0.45, 0.05)),
-    "far target": (aimed(STEERED, 150.0, 20.0), planning.plan(aimed(STEERED, 150.0, 20.0), "two-pulse").pulses),
+    "far target": (FAR, planning.plan(FAR, "two-pulse").pulses),
     "reversed": (spinner(120, 80, -3.0, 10.0, channels=cross(20.0)), kicks(BODY, 4, 1.1, 0.2)),
     "oblate": (spinner(80, 120, 3.0, 10.0, channels=cross(20.0)), kicks(BODY, 4, 1.1, 0.2)),
     "celestial": (replace(BODY, attitude=Attitude(np.array([0.7, 0.1, 0.7, 0.1]))), kicks(BODY, 5, 0.9, 0.2)),
@@ -236,6 +237,19 @@ def test_the_sphere_names_its_lines() -> None:
 
 
 # --- many turns ------------------------------------------------------------------------------------------------------
+
+
+def test_the_log_axis_reaches_the_requirement_and_what_is_left() -> None:
+    """Whichever is less, four decades down at most; what lies below is written above the panel."""
+    for degrees, bound, left in ((5.0, 0.01, None), (5.0, 1e-6, None), (5.0, None, None), (0.0, 0.01, 0.0)):
+        body = spinner(degrees=degrees, requirement=Requirement(bound) if bound else None)
+        figure = figures.flight_figure("history", *figures.shown(planning.Plan(body, "none", Schedule())))
+        axes = figure.axes[-1]
+        low, high = axes.get_ylim()
+        assert high >= 10.0 * low
+        assert bound is None or low < math.degrees(bound)
+        assert low < degrees < high or left == 0.0
+        assert (axes.get_title("right") == "ends at 0 deg") == (left == 0.0)
 
 
 def test_many_turns_are_drawn_thin() -> None:

@@ -93,28 +93,28 @@ def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
 def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Nutation angle θ on a log axis; what it ends with is written above where the axis does not reach so far."""
     angles = np.degrees(track.nutation)
-    most, required = float(angles.max()), flight.spacecraft.requirement
-    least = most * 10.0**-DECADES if most > geometry.LEAST else geometry.LEAST
-    if required is not None and required.nutation:
-        least = min(least, 0.1 * math.degrees(required.nutation))
-    seen = angles[angles > least]
-    low = 0.5 * float(seen.min()) if len(seen) == len(angles) else least
+    most, required = max(float(angles.max()), geometry.LEAST), _required(axes, flight) or math.inf
+    least = min(most * 10.0**-DECADES, 0.1 * required)
+    low = max(0.5 * min(float(angles.min()), required, 0.1 * most), least)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=INK)
     _finish(axes, flight, track, angles, "nutation θ, deg (log)")
     axes.set_yscale("log")
-    axes.set_ylim(low, 2.0 * max(most, low))
+    axes.set_ylim(low, 2.0 * most)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("")
-    _required(axes, flight)
     if angles[-1] <= low:
         note = f"ends at {degrees(float(track.nutation[-1]))}"
         axes.set_title(note, loc="right", fontsize=style.SMALL, fontweight="normal")
 
 
-def _required(axes: Axes, flight: Flight) -> None:
+def _required(axes: Axes, flight: Flight) -> float | None:
+    """A line at the nutation that may be left, which is returned in degrees; none where none is required."""
     requested = flight.spacecraft.requirement
-    if requested is not None and requested.nutation is not None:
-        axes.axhline(math.degrees(requested.nutation), color=GREY, linewidth=0.9, linestyle=":", label="required θ")
+    if requested is None or requested.nutation is None:
+        return None
+    most = math.degrees(requested.nutation)
+    axes.axhline(most, color=GREY, linewidth=0.9, linestyle=":", label="required θ")
+    return most
 
 
 def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) -> None:
