@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,7 @@ from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.track import PIECE, Track, even_times, in_file_axes, make_track, widest
-from nutdamp.views import Tabled, figure
-
-if TYPE_CHECKING:
-    from nutdamp.views import Figure
+from nutdamp.views import Tabled
 
 IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
@@ -158,13 +154,6 @@ class Flight(Tabled):
     def track(self) -> Track:
         """The rows as arrays: SI and rad, body rates and quaternion in the axes of the file."""
         return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
-
-    def figure(self, name: str = "overview") -> Figure:
-        """A matplotlib figure: ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``.
-
-        Raises BadRequest for other names, MissingExtra without matplotlib.
-        """
-        return figure(self, name)
 
     def sampled(self, samples: int, until: float) -> Track:
         """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.

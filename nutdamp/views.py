@@ -48,7 +48,7 @@ def html(result: object) -> str | None:
 
 
 @singledispatch
-def figure(result: object, name: str) -> Figure:  # noqa: ARG001
+def figure(result: object, name: str | None) -> Figure:  # noqa: ARG001
     """A picture of it."""
     raise _missing(result)
 
@@ -99,6 +99,14 @@ class Tabled(Shown):
         Raises CannotWrite, and Infeasible for a plan without a schedule.
         """
         write_csv(self, path)
+
+    def figure(self, name: str | None = None) -> Figure:
+        """A matplotlib figure: of a comparison ``schemes``, else ``overview``, the default, or one of the motion.
+
+        That is ``motion``, ``sphere``, ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra
+        without matplotlib, Infeasible for a plan without a schedule.
+        """
+        return figure(self, name)
 
     def to_numpy(self) -> Table:
         """The rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""

@@ -20,6 +20,7 @@ from tilted import KEYS, TILTED
 
 import nutdamp
 from nutdamp.files import pulses_csv, track_csv
+from nutdamp.presentation.figures import style
 from nutdamp.presentation.page import html
 
 
@@ -226,8 +227,33 @@ def test_notebooks_show_small_tables() -> None:
         tags.feed(text)
         assert tags.open == []
         assert "table" in tags.seen or not plan.feasible or "infeasible" in text
+        assert ("svg" in tags.seen) == (shown is not craft and "infeasible" not in text)  # the motion beside the table
         assert "b" not in tags.seen
         assert repr(shown).startswith(f"<{type(shown).__name__}")
+
+
+def test_comparisons_and_plans_draw_themselves(craft: nutdamp.Spacecraft) -> None:
+    compared = nutdamp.compare(craft, ["two-pulse", "four-pulse"])
+    for figure in (compared.figure(), compared.figure("schemes")):
+        labels = [text.get_text() for axes in figure.axes for text in axes.get_yticklabels()]
+        assert {"two-pulse", "four-pulse"} <= set(labels)
+    assert len(compared["two-pulse"].figure("motion").axes) >= 2
+    for name in ("motion", "nothing"):
+        with pytest.raises(nutdamp.NutdampError, match=f"there is no figure '{name}'"):
+            compared.figure(name)
+    with pytest.raises(nutdamp.NutdampError, match="infeasible"):
+        nutdamp.plan(craft.with_(limits={"horizon": "1 ms"}), "two-pulse").figure()
+
+
+def test_notebooks_show_tables_alone_without_matplotlib(
+    craft: nutdamp.Spacecraft, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = nutdamp.plan(craft, "two-pulse")
+    monkeypatch.setattr(style, "find_spec", lambda _: None)
+    text = plan._repr_html_()
+    assert text is not None
+    assert "<table" in text
+    assert "<svg" not in text
 
 
 def test_notebooks_show_a_line_without_jinja(craft: nutdamp.Spacecraft, monkeypatch: pytest.MonkeyPatch) -> None:

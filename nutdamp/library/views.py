@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.presentation.page.document import Block
+    from nutdamp.track import Track
 
 views.sentences.register(Plan, remarks)
 views.sentences.register(Comparison, verdicts.warnings)
@@ -105,12 +106,35 @@ def _(flight: Flight, path: str | PathLike[str]) -> None:
 
 
 @views.figure.register(Flight)
-def _(flight: Flight, name: str) -> Figure:
+def _(flight: Flight, name: str | None) -> Figure:
     from nutdamp.presentation import figures
 
-    arguments.instance("name", name, str, "the name of a figure")
+    return _drawn(name, flight, flight.sampled(flight.samples, figures.until(flight)))
+
+
+@views.figure.register(Plan)
+def _(plan: Plan, name: str | None) -> Figure:
+    from nutdamp.presentation import figures
+
+    return _drawn(name, *figures.shown(feasible(plan)))
+
+
+@views.figure.register(Comparison)
+def _(compared: Comparison, name: str | None) -> Figure:
+    from nutdamp.presentation import figures
+
+    if name not in (None, "schemes"):
+        raise BadRequest(f"there is no figure {name!r}; expected 'schemes'")
+    return figures.schemes_figure(compared, decide(compared))
+
+
+def _drawn(name: str | None, flight: Flight, track: Track) -> Figure:
+    """A figure of a flight by its name; raises BadRequest."""
+    from nutdamp.presentation import figures
+
+    chosen = "overview" if name is None else arguments.instance("name", name, str, "the name of a figure")
     try:
-        return figures.flight_figure(name, flight, flight.sampled(flight.samples, figures.until(flight)))
+        return figures.flight_figure(chosen, flight, track)
     except KeyError:
         raise BadRequest(f"there is no figure {name!r}") from None
 
@@ -157,21 +181,39 @@ def _(plan: Plan) -> str | None:
     from nutdamp.presentation.page.document import Prose
     from nutdamp.presentation.page.sheets import pulse_sheet
 
-    return _block(pulse_sheet(plan) if plan.feasible else Prose(repr(plan)[1:-1]))
+    if not plan.feasible:
+        return _block(Prose(repr(plan)[1:-1]))
+    return _beside(_block(pulse_sheet(plan)), plan)
 
 
 @views.html.register
 def _(flight: Flight) -> str | None:
     from nutdamp.presentation.page.sheets import residual_sheet
 
-    return _block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual))
+    return _beside(_block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual)), flight)
 
 
 @views.html.register
 def _(compared: Comparison) -> str | None:
     from nutdamp.presentation.page.sheets import comparison_sheet
 
-    return _block(comparison_sheet(compared))
+    return _beside(_block(comparison_sheet(compared)), compared.recommended)
+
+
+def _beside(table: str | None, result: Plan | Flight | None) -> str | None:
+    """A table with the picture of the motion beside it, or below where there is no room."""
+    from nutdamp.presentation.figures.export import svg
+
+    if table is None or result is None:
+        return table
+    try:
+        picture = svg(result.figure("motion"))
+    except MissingExtra:
+        return table
+    return (
+        '<div style="display: flex; flex-wrap: wrap; gap: 1.5rem; align-items: flex-start">'
+        f'<div>{table}</div><div style="flex: 1 1 26rem; max-width: 44rem">{picture}</div></div>'
+    )
 
 
 def _block(content: Block) -> str | None:

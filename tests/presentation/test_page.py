@@ -182,7 +182,7 @@ def test_the_schedule_is_the_recommended_one(example: str) -> None:
 
 def test_pictures_are_inside_and_described(example: str) -> None:
     pictures = [svg for figure in parsed(example).all("figure") for svg in figure.all("svg")]
-    assert len(pictures) == 4
+    assert len(pictures) == 5  # schemes, motion, cones, history, timeline
     for picture in pictures:
         assert picture.attributes["aria-label"]
         assert picture.attributes["role"] == "img"

@@ -31,7 +31,7 @@ from nutdamp.presentation.page.document import (
 )
 from nutdamp.presentation.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.presentation.page.moving import moving_of
-from nutdamp.presentation.page.pictures import dispersion_pictures_of, pictures_of
+from nutdamp.presentation.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of
 from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
@@ -74,7 +74,7 @@ def report_page(
     sections = [
         Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         Section("method", "Method", tuple(method_blocks(compared))),
-        _schemes(compared, decided),
+        _schemes(compared, decided, pictured=pictured),
     ]
     if decided is not None:
         chosen = decided.plan
@@ -127,12 +127,16 @@ def _figures(decided: Decision) -> Iterator[Figure]:
         yield Figure(name, value)
 
 
-def _schemes(compared: Comparison, decided: Decision | None) -> Section:
+def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
-    blocks: tuple[Block, ...] = (comparison_sheet(compared, decided), *hints)
-    return Section("schemes", "Schemes compared", (*blocks, Remarks(remarks)) if remarks else blocks)
+    blocks: list[Block] = [comparison_sheet(compared, decided), *hints]
+    if remarks:
+        blocks.append(Remarks(remarks))
+    if pictured and decided is not None and len(compared) > 1:
+        blocks.append(schemes_picture_of(compared, decided))
+    return Section("schemes", "Schemes compared", tuple(blocks))
 
 
 def _schedule(chosen: Plan) -> Section:
