@@ -16,8 +16,15 @@ from process import Run, apart, within
 
 from nutdamp import schemes
 
-PLANNED_ONCE = ("cli", "presentation", "files")
-"""Folders of tests of what is made of plans: these may share them."""
+PLANNED_ONCE = (
+    "cli",
+    "presentation",
+    "files",
+    "test_library_results.py",
+    "test_verification.py",
+    "test_where_it_points.py",
+)
+"""Folders and modules of tests of what is made of plans: these may share them."""
 
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
 settings.register_profile("project", deadline=None, derandomize=True)

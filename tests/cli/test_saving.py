@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from process import Run
+from samples import slow
 
 LIMITED = 'ulimit -f 64; exec "$0" -m nutdamp "$@"'
 """For a shell: a run that may write no file beyond 32 KiB, as on a disk that is nearly full."""
@@ -32,12 +33,12 @@ def limited(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("command", "result"),
     [
-        ("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
+        slow("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
         ("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
         ("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "Tolerance budget"),
-        ("disperse --scheme two-pulse --samples 20000 --resume big.npz --json small.json", "Tolerance budget"),
-        ("plan --plot big.svg --json small.json", "Recommended"),
-        ("trade --points 1 --plot big.svg --json small.json", "H may end anywhere"),
+        slow("disperse --scheme two-pulse --samples 20000 --resume big.npz --json small.json", "Tolerance budget"),
+        slow("plan --plot big.svg --json small.json", "Recommended"),
+        ("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
     ],
 )
 def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, command: str, result: str) -> None:
@@ -94,11 +95,11 @@ root.main()
     ("arguments", "module", "function"),
     [
         ("plan --json x.json --csv x.csv", "output", "json_text"),
-        ("plan spacecraft.yaml --json x.json", "spacecraft_file", "read_spacecraft"),
-        ("simulate --scheme two-pulse --csv x.csv --json x.json", "output", "json_text"),
+        slow("plan spacecraft.yaml --json x.json", "spacecraft_file", "read_spacecraft"),
+        slow("simulate --scheme two-pulse --csv x.csv --json x.json", "output", "json_text"),
         ("verify --json x.json", "verification_json", "verification_json"),
-        ("report -o x.html", "spacecraft_file", "read_spacecraft"),
-        ("export --format json -o x.json", "output", "json_text"),
+        slow("report -o x.html", "spacecraft_file", "read_spacecraft"),
+        slow("export --format json -o x.json", "output", "json_text"),
         ("check --json x.json", "check_json", "check_json"),
     ],
 )

@@ -37,7 +37,7 @@ def odd(tmp_path: Path) -> str:
     "command",
     [
         ("plan",),
-        ("plan", "--robust"),
+        ("plan", "--robust", "--scheme", "one-pulse"),
         ("check",),
         ("verify",),
         ("simulate", "--scheme", "two-pulse", "--show"),

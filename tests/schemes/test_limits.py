@@ -132,7 +132,7 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
 
 
 @pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
-@pytest.mark.parametrize("block", some(range(10), always=2))
+@pytest.mark.parametrize("block", some(range(10), always=1))
 def test_whatever_the_limits(block: int, requested: tuple[str, Options]) -> None:
     """Seeds, not hypothesis: its examples change with every module that happens to be loaded."""
     for seed in range(20 * block, 20 * (block + 1)):
@@ -199,7 +199,7 @@ def test_units_of_time_do_not_matter(scale: float, requested: tuple[str, Options
 
 
 @pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
-@pytest.mark.parametrize("degrees", [1e-9, 1e-6, 1e-3, 70.0, 89.0])
+@pytest.mark.parametrize("degrees", some([1e-9, 1e-6, 1e-3, 70.0, 89.0], always=2))
 def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, requested: tuple[str, Options]) -> None:
     for C, spin in ((40.0, 3.0), (80.0, -3.0), (120.0, 3.0), (240.0, -3.0)):
         torque = spinner(120.0, C, spin, degrees).least_impulse * 3.0

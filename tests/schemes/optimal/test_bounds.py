@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from builders import aimed, channel, cross, spinner
 from cases_dir import case
-from samples import some
+from samples import slow, some
 from scipy.optimize import linprog, minimize
 
 from nutdamp import flight, planning
@@ -226,7 +226,9 @@ def test_the_bound_with_a_final_spin_is_that_of_a_linear_program(seed: int) -> N
     assert proved(body, cost=10.0 * optimum) <= optimum * (1.0 + TIGHT)
 
 
-@pytest.mark.parametrize(("degrees", "turn"), [(0.0, 40.0), (10.0, 5.0), (10.0, 60.0), (45.0, 30.0), (45.0, 160.0)])
+@pytest.mark.parametrize(
+    ("degrees", "turn"), [(0.0, 40.0), slow(10.0, 5.0), (10.0, 60.0), slow(45.0, 30.0), slow(45.0, 160.0)]
+)
 def test_the_way_of_h_is_the_shortest_round_its_sphere(degrees: float, turn: float) -> None:
     """A broken line of 40 corners outside the sphere of radius C|ω3|, shortened by an optimiser."""
     body = spinner(degrees=degrees, channels=cross(8.0))
