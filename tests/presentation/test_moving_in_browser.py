@@ -276,6 +276,43 @@ def test_no_pulse_is_passed_over_while_it_plays(browse: Browse, written: Any) ->
         assert any(said.startswith("2: ") for said in page.evaluate("window.fired"))
 
 
+UNUSUAL = {
+    "no-nutation": "inertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n",
+    "single-pulse-spin-reversed": "inertia: {A: 80, C: 120}\nstate: {spin: -30 rpm, nutation: 3 deg}\n"
+    "thrusters: [{name: T1, torque: [0, 12, 0]}]\nlimits: {max_pulses: 1}\n",
+    "three-moments": "inertia: {tensor: [[120, 3, 0], [3, 100, 0], [0, 0, 60]]}\n"
+    "state: {spin: 6 rpm, nutation: 20 deg}\n",
+    "very-small": "inertia: {A: 120, C: 80}\nstate: {spin: 30 rpm, nutation: 4e-7 deg}\n",
+    "dots": "inertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {earliest: 3000 s, horizon: 3600 s}\n",
+    "sphere": "inertia: {A: 100, C: 100}\nomega0: [0.1, 0, 3]\n",
+}
+
+
+@pytest.mark.parametrize("name", UNUSUAL)
+def test_unusual_motions_are_shown_too(browse: Browse, written: Any, name: str) -> None:
+    with browse(written(f"name: {name}\n{UNUSUAL[name]}"), 800) as page:
+        assert page.locator(".moving").is_visible()
+        shapes = "[...document.querySelectorAll('.moving [d], .moving [transform]')].map((one) => one.outerHTML).join()"
+        for key in ("End", "Home", "PageUp", "End"):
+            part(page, "slider").focus()
+            page.keyboard.press(key)
+            drawn = page.evaluate(shapes)
+            assert "NaN" not in drawn
+            assert "undefined" not in drawn
+        said = page.locator(".moving dl").text_content()
+        assert "NaN" not in said
+        assert "undefined" not in said
+        assert row(page) == int(part(page, "slider").get_attribute("max"))
+
+
+def test_where_nothing_is_feasible_there_is_no_view(browse: Browse, written: Any) -> None:
+    text = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {horizon: 1 ms}\n"
+    text += "thrusters: [{name: T, torque: [0, 5, 0], min_on_time: 1 s}]\n"
+    with browse(written(text)) as page:
+        assert page.locator(".moving").count() == 0
+        assert page.locator("h1").is_visible()
+
+
 def test_without_script_and_in_print_the_pictures_remain(browse: Browse, written: Any) -> None:
     with browse(written(EXAMPLE), java_script_enabled=False) as page:
         assert not page.locator(".moving").is_visible()

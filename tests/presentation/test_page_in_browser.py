@@ -236,7 +236,7 @@ def test_text_and_lines_are_read_on_either_ground(tab: Browse, scheme: str) -> N
         assert min(lines)[0] >= 3.0, min(lines)
 
 
-@pytest.mark.parametrize("name", [*QUICK, DISPERSED])
+@pytest.mark.parametrize("name", [*everywhere(), DISPERSED])
 def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
     axe = pytest.importorskip(
         "axe_playwright_python.sync_playwright",
