@@ -176,7 +176,7 @@ def _panels(
     axes = "" if body.inertia.aligned else ", principal axes"
     panels = (
         panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
-        panel("sky", f"Axis track: {names.view}", sky_room, (names.x, names.y)),
+        panel("sky", "Axis track, H towards you", sky_room, (names.x, names.y)),
     )
     columns = {
         **_named_columns("pole", placed(pole, *pole_room)),

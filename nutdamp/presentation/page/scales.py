@@ -19,6 +19,9 @@ EDGES = (350, 150, 1960, 1760)
 STRIP = (2000, 1000)
 """Width and height of the angles over time in units of their SVG."""
 
+EDGE = 0.03
+"""Part of a scale at either end without a number: it would touch those of the other scale."""
+
 PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
 """Prefixes of units with their factors, and the largest number of a scale that needs another one."""
 
@@ -79,8 +82,8 @@ def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, s
     names = names[0].replace(", deg", f", {prefix}deg"), names[1].replace(", deg", f", {prefix}deg")
     marks = []
     for which in (0, 1):
-        low, high = float(middle[which]) - half, float(middle[which]) + half
-        values = np.array(ticks(low, high, 5))
+        inner = (1.0 - 2.0 * EDGE) * half
+        values = np.array(ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5))
         both = np.column_stack([values, values])
         places = placed(both, middle[[which, which]], half)[which]
         marks.append(tuple(zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)))
@@ -121,7 +124,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     ]
     prefix, factor = _prefix(high - low)
     level = None if required is None else math.degrees(required)
-    edge = 0.03 * (high - low)  # a number at the very edge would touch what is above and below
+    edge = EDGE * (high - low)
     scale = tuple(
         (rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low + edge, high - edge, 5)
     )
