@@ -31,20 +31,29 @@ from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
+    from nutdamp.fronts import Front
     from nutdamp.planning import Comparison
+    from nutdamp.spacecraft import Spacecraft
+
+
+POINTS = 6
+"""Horizons tried for each front where no number follows ``--trade``."""
+
+COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
+"""Options that may come without a number, and what they then are."""
 
 
 class Report(PlanningCommand):
-    """``report``, in which ``--disperse`` may come without a number."""
+    """``report``, in which the options of `COUNTS` may come without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put in `SAMPLES` where no number follows ``--disperse``: what else follows is a file or an option."""
+        """Put in a number where none follows: what else follows is a file or an option."""
         given: list[str] = []
         for index, word in enumerate(args):
             given.append(word)
             following = args[index + 1 : index + 2]
-            if word == "--disperse" and "--" not in given and not (following and is_number(following[0])):
-                given[-1] = f"--disperse={SAMPLES}"
+            if word in COUNTS and "--" not in given and not (following and is_number(following[0])):
+                given[-1] = f"{word}={COUNTS[word]}"
         return super().parse_args(ctx, given)
 
 
@@ -86,6 +95,12 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     metavar="[N]",
     help=f"Fly the schedules in N dispersed cases; {SAMPLES} where no number follows.",
 )
+@click.option(
+    "--trade",
+    type=click.IntRange(1, 1000),
+    metavar="[POINTS]",
+    help=f"Show what an earlier end costs, as `nutdamp trade` does; {POINTS} points where no number follows.",
+)
 @impulse_options
 @control_options
 @quiet_option
@@ -96,6 +111,7 @@ def command(
     aim: Aim,
     output: str,
     disperse: int | None,
+    trade: int | None,
     impulses: bool,
     force: bool,
     quiet: bool,
@@ -135,8 +151,9 @@ def command(
     dispersed: dict[str, Results] = {}
     if chosen is not None and disperse is not None:
         dispersed, note = _dispersed(compared, disperse, impulses=impulses, force=force, quiet=quiet)
+    fronts = () if trade is None else _traded(body, trade, options, quiet)
     with working("writing the page", quiet=quiet):
-        made = made_of(compared, repeat, output, dispersed, note, kept)
+        made = made_of(compared, repeat, output, dispersed, note, kept, fronts)
     deliver([(output, lambda: made.content)])
     if not made.good:
         remark(made.verdict)
@@ -148,6 +165,15 @@ def command(
         sys.exit(INFEASIBLE)
     if chosen.meets_requirement is False or (made.dispersed and made.dispersed.meets_requirement is False):
         sys.exit(REQUIREMENT_MISSED)
+
+
+def _traded(body: Spacecraft, points: int, options: Options, quiet: bool) -> tuple[Front, ...]:
+    """Fronts of time against cost, with a bar."""
+    from nutdamp.cli.progress import progress
+    from nutdamp.library.studies import trade
+
+    with progress("searching", 2 * points, quiet=quiet) as step:
+        return trade(body, points, with_disturbances=options.with_disturbances, progress=step).fronts
 
 
 def _dispersed(

@@ -14,14 +14,16 @@ from nutdamp.dispersion.study import Results
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.files.output import write_whole
 from nutdamp.files.yaml_tree import dotted
+from nutdamp.fronts import Front
 from nutdamp.library.calls import compare
 from nutdamp.library.craft import Source, load
 from nutdamp.library.studies import disperse as fly_cases
+from nutdamp.library.studies import trade
 from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import UNCONTROLLED, Control, Page
 from nutdamp.presentation.page.formats import form_of
-from nutdamp.schemes import Choice
+from nutdamp.schemes import Choice, Options
 from nutdamp.spacecraft import Spacecraft
 
 
@@ -53,12 +55,14 @@ def report(
     *,
     disperse: int | None = None,
     seed: int = dispersion.SEED,
+    points: int | None = None,
     **control: str,
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
     ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: .html, .md or .pdf; ``disperse``: in how
-    many dispersed cases to fly the plans; ``control``: title, document, issue, author, date, as `controlled` takes
+    many dispersed cases to fly the plans; ``points``: how many horizons to try for each front of time against cost,
+    none by default; ``control``: title, document, issue, author, date, as `controlled` takes
     them. Raises as `load`, `compare` and `disperse` do, BadRequest for another ending, MissingExtra without the extra
     plot, CannotWrite.
     """
@@ -71,11 +75,14 @@ def report(
         for plan in feasible_first(compared):
             with suppress(*([] if not cases else [Infeasible])):  # cases of another scheme that take too long to fly
                 cases[plan.scheme] = fly_cases(plan, disperse, seed=seed).core
+    known = isinstance(options, Options) and options.with_disturbances
+    fronts = () if points is None else trade(body, points, with_disturbances=known).fronts
     given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "seed": disperse and seed}
+    given["points"] = points
     given |= {key: repr(value) for key, value in control.items()}
     more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
     named = f", {list(names)!r}" if names else ""
-    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), name, cases, control=kept)
+    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), name, cases, control=kept, traded=fronts)
     write_whole(name, made.content)
     return made
 
@@ -109,10 +116,13 @@ def made_of(
     dispersed: Mapping[str, Results] | None = None,
     note: str = "",
     control: Control = UNCONTROLLED,
+    traded: Sequence[Front] = (),
 ) -> Report:
     """The report that goes to ``output``, not yet written; ``dispersed`` by scheme. Raises as `form_of` does."""
     form, flown, chosen = form_of(output), dispersed or {}, compared.recommended
-    page = report_page(compared, repeat, pictured=form.pictured, dispersed=flown, note=note, control=control)
+    page = report_page(
+        compared, repeat, pictured=form.pictured, dispersed=flown, note=note, traded=traded, control=control
+    )
     return Report(compared, None if chosen is None else flown.get(chosen.scheme), page, form.write(page, output))
 
 

@@ -17,7 +17,12 @@ from nutdamp.spacecraft import Spacecraft
 
 def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableType:
     """Everything that ``trade`` shows."""
-    parts: list[RenderableType] = [header(spacecraft)]
+    return Group(header(spacecraft), *front_parts(spacecraft, found))
+
+
+def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[RenderableType]:
+    """The table of each front under its name."""
+    parts: list[RenderableType] = []
     for front in found:
         parts += [Text(), Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold")]
         if not front.points:
@@ -37,7 +42,7 @@ def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableTy
                 cells = moment(plan.pulses.end), cost, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
                 table.add_row(str(index), *cells)
         parts.append(table)
-    return Group(*parts)
+    return parts
 
 
 def front_name(front: Front, *, pointing: bool) -> str:

@@ -29,6 +29,17 @@ def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
+def test_trade_may_come_without_a_number(run: Run, tmp_path: Path) -> None:
+    """A file may follow it, and a number of points."""
+    (tmp_path / "craft.yaml").write_text(run("init", "-").stdout)
+    for given in (("--trade", "2"), ("craft.yaml", "--trade"), ("--trade", "craft.yaml")):
+        assert run("report", "-q", "-o", "a.md", *given).returncode == 0
+        text = (tmp_path / "a.md").read_text(encoding="utf-8")
+        assert "## Time against cost" in text
+        assert "| first-order least |" in text
+    assert run("report", "--trade", "0").returncode == 2
+
+
 @pytest.mark.plans_anew
 def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)

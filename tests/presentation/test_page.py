@@ -17,6 +17,7 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.plan_json import comparison_json
 from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.library.studies import trade
 from nutdamp.planning import Comparison, compare
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.page.content import Repeat, report_page
@@ -235,6 +236,23 @@ def test_markdown_holds_the_same_tables_and_nothing_of_html() -> None:
         widths = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
         assert len(widths) == 1
         assert re.fullmatch(r"\|( (:---|---:) \|)+", table.splitlines()[1])
+
+
+def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_marked() -> None:
+    found = compared(example_text())
+    fronts = trade(found.spacecraft, 3).fronts
+    made = report_page(found, Repeat("", "", ""), pictured=True, traded=fronts)
+    tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+    (section,) = (node for node in tree.all("section") if node.attributes["id"] == "trade")
+    assert len(section.all("table")) == 2
+    rows = [row for number in (0, 1) for row in sheet(tree, "trade", number)[1]]
+    assert [row[0].text for row in rows] == [str(n) for n in range(1, 1 + sum(len(front.points) for front in fronts))]
+    words = {text.text for text in section.all("text")}
+    assert found.recommended is not None
+    assert {f"recommended: {found.recommended.scheme}", "H ends where it was", "no schedule takes less"} <= words
+    plain = report_page(found, Repeat("", "", ""), pictured=False, traded=fronts)
+    assert "H may end anywhere" in page_markdown(plain)
+    assert 'id="trade"' not in page_html(report_page(found, Repeat("", "", ""), pictured=False))
 
 
 DISPERSED = """name: Wide

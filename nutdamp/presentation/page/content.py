@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, NamedTuple
 
+from rich.console import Group
+
 from nutdamp import __version__
 from nutdamp.decision import Decision, cases_of, decide
+from nutdamp.fronts import Front
 from nutdamp.planning import Comparison, Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
 from nutdamp.presentation.end_tables import direction_text, spin_text
@@ -31,9 +34,15 @@ from nutdamp.presentation.page.document import (
 )
 from nutdamp.presentation.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.presentation.page.moving import moving_of
-from nutdamp.presentation.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of
+from nutdamp.presentation.page.pictures import (
+    dispersion_pictures_of,
+    pictures_of,
+    schemes_picture_of,
+    trade_picture_of,
+)
 from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees
+from nutdamp.presentation.trade_tables import front_parts
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
@@ -63,11 +72,13 @@ def report_page(
     pictured: bool,
     dispersed: Mapping[str, Results] | None = None,
     note: str = "",
+    traded: Sequence[Front] = (),
     control: Control = UNCONTROLLED,
 ) -> Page:
     """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
 
-    ``dispersed``: schemes whose schedules were flown in dispersed cases; ``note``: a remark on how.
+    ``dispersed``: schemes whose schedules were flown in dispersed cases; ``note``: a remark on how; ``traded``: fronts
+    of time against cost.
     """
     body, flown = compared.spacecraft, dispersed or {}
     decided = decide(compared, {scheme: cases_of(results) for scheme, results in flown.items()})
@@ -75,6 +86,7 @@ def report_page(
         Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         Section("method", "Method", tuple(method_blocks(compared))),
         _schemes(compared, decided, pictured=pictured),
+        *[_trade(compared, traded, pictured=pictured)] * bool(traded),
     ]
     if decided is not None:
         chosen = decided.plan
@@ -137,6 +149,13 @@ def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) 
     if pictured and decided is not None and len(compared) > 1:
         blocks.append(schemes_picture_of(compared, decided))
     return Section("schemes", "Schemes compared", tuple(blocks))
+
+
+def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:
+    """What an earlier end costs, as ``trade`` has it."""
+    tables = blocks_of("Schedules of the scheme optimal", Group(*front_parts(compared.spacecraft, traded)))
+    pictures = [trade_picture_of(compared, traded)] * pictured
+    return Section("trade", "Time against cost", (*tables, *pictures))
 
 
 def _schedule(chosen: Plan) -> Section:
