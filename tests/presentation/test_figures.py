@@ -231,6 +231,10 @@ def test_of_a_very_long_time_the_axis_says_how_much_is_drawn() -> None:
     until = re.search(r"the first ([\d.]+) of 1e\+06", figure.axes[-1].get_xlabel())
     assert until is not None
     assert float(until[1]) == pytest.approx(figure.axes[-1].get_xlim()[1], rel=1e-3)
+    # The pictures without a time axis say so too: what they end with is not what is left.
+    heading = figures.flight_figure("motion", made, track).get_suptitle()
+    assert heading.endswith(f"drawn: the first {until[1]} s of 1e+06 s")
+    assert "drawn" not in drawn("motion", "wide pulses").get_suptitle()
 
 
 # --- the spherical view ----------------------------------------------------------------------------------------------

@@ -22,7 +22,8 @@ def flight_figure(name: str, flight: Flight, track: Track) -> Figure:
     for axes in figure.axes:
         if axes.get_xlabel() == history.TIME and until < end:
             axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
-    figure.suptitle(motion.title(flight))
+    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < end else ""
+    figure.suptitle(motion.title(flight) + part)
     style.settle(figure)
     return figure
 
