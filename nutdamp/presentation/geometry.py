@@ -65,6 +65,13 @@ def quickest(flight: Flight) -> float:
     return float(min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum)))
 
 
+def channels_fired(flight: Flight) -> list[str]:
+    """Channels that fire, in the order of the file."""
+    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
+    order = [channel.name for channel in flight.spacecraft.channels]
+    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
+
+
 class Stretch(NamedTuple):
     """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that fires, from 0."""
 

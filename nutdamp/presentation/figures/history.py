@@ -53,7 +53,7 @@ def history(flight: Flight, track: Track) -> Figure:
 
 def timeline(flight: Flight, track: Track) -> Figure:
     """Which channel fires when and for how long."""
-    figure = style.sheet(7.4, 1.7 + 0.36 * max(len(_channels(flight)), 1))
+    figure = style.sheet(7.4, 1.7 + 0.36 * max(len(geometry.channels_fired(flight)), 1))
     axes = figure.subplots()
     firings(axes, flight, float(track.t[-1]))
     axes.set_xlabel(TIME)
@@ -122,7 +122,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
 
     ``brief`` labels bars with the number of the pulse alone.
     """
-    names = _channels(flight)
+    names = geometry.channels_fired(flight)
     rows = {name: len(names) - 1 - index for index, name in enumerate(names)}
     axes.set_xlim(-EDGE * until, until)
     axes.set_ylim(-0.5, max(len(names), 1) - 0.1)
@@ -155,13 +155,6 @@ def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
     if pulse.channel == STEERABLE:
         how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
     return f"{number}: {how}"
-
-
-def _channels(flight: Flight) -> list[str]:
-    """Channels that fire, in the order of the file."""
-    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
-    order = [channel.name for channel in flight.spacecraft.channels]
-    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
 
 
 def _closed(flight: Flight, until: float) -> list[tuple[float, float]]:

@@ -115,9 +115,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         return round(height * (high - angle) / (high - low), 1)
 
     required = None if body.requirement is None else body.requirement.nutation
-    used = dict.fromkeys(pulse.channel for pulse in flown.schedule)
-    order = {channel.name: place for place, channel in enumerate(body.channels)}
-    channels = tuple(sorted(used, key=lambda name: order.get(name, -1)))
+    channels = tuple(geometry.channels_fired(flown))
     bars = [
         Bar(channels.index(pulse.channel), round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
         for pulse, (begins, ends) in zip(flown.schedule, flown.spans, strict=True)
