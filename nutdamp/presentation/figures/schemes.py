@@ -26,17 +26,24 @@ DECADES = 5.0
 """Of a log axis at most: what is less stands at its left edge."""
 
 
+class Floor(NamedTuple):
+    """What no schedule can go below that leaves as little as that of ``scheme``."""
+
+    least: float
+    scheme: str
+
+
 class Quantity(NamedTuple):
     """A column: its name, the value of a plan (None: unknown), what stands beside the dot, and the lines.
 
-    ``floor``: what no schedule can go below; ``required``: the bound of the requirement. ``log``: an angle in degrees
+    ``required``: the bound of the requirement. ``log``: an angle in degrees
     on a log axis.
     """
 
     name: str
     value: Callable[[Plan], float | None]
     text: Callable[[float], str]
-    floor: float | None = None
+    floor: Floor | None = None
     required: float | None = None
     log: bool = False
 
@@ -68,9 +75,11 @@ def _columns(compared: Comparison) -> list[Quantity]:
     plans = [plan for plan in compared.plans if plan.feasible]
     body, propellant = compared.spacecraft, by_propellant(plans)
     unit = "kg" if propellant else "N m s"
-    bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
-    proved = [bound.rigorous for bound in bounds if bound.rigorous is not None and bound.unit == unit]
-    scale = 1e3 if propellant else 1.0
+    scale, proved = 1e3 if propellant else 1.0, []
+    for plan in plans:
+        bounds = plan.pulses.bounds
+        if bounds is not None and bounds.rigorous is not None and bounds.unit == unit:
+            proved.append(Floor(scale * bounds.rigorous, plan.scheme))
     most: dict[Part, float] = {
         bound.part: math.degrees(bound.most) for bound in compliance.required(body) if bound.part is not Part.SPIN
     }
@@ -86,7 +95,7 @@ def _columns(compared: Comparison) -> list[Quantity]:
     return [
         Quantity(
             "propellant, g" if propellant else "impulse, N m s", cost, "{:.4g}".format,
-            floor=scale * min(proved) if proved else None,
+            floor=min(proved, default=None),
         ),
         Quantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
         *(
@@ -114,12 +123,13 @@ def _complying(shares: Mapping[str, float], probability: float) -> Quantity:
 def _column(axes: Axes, column: Quantity, compared: Comparison, chosen: Plan | None) -> None:
     values = [column.value(plan) if plan.feasible else None for plan in compared.plans]
     known = [value for value in values if value is not None]
-    lines = [line for line in (column.floor, column.required) if line is not None]
+    floor = None if column.floor is None else column.floor.least
+    lines = [line for line in (floor, column.required) if line is not None]
     low = _scale(axes, [*known, *lines], log=column.log)
     for row, (plan, value) in enumerate(zip(compared.plans, values, strict=True)):
         axes.axhline(-row, color=GREY, linewidth=0.5, alpha=0.5)
         if value is None:
-            if not plan.feasible:
+            if not plan.feasible and axes.get_subplotspec().is_first_col():  # type: ignore[union-attr]
                 sides = axes.get_yaxis_transform()
                 axes.annotate("no plan", (0.5, -row), xycoords=sides, ha="center", fontsize=style.SMALL)
             continue
@@ -131,7 +141,8 @@ def _column(axes: Axes, column: Quantity, compared: Comparison, chosen: Plan | N
         axes.plot([], [], "o", label=name, **look)
         style.label(axes, column.text(value), np.array([max(value, low), -row]), INK, role="vital")
     if column.floor is not None:
-        axes.axvline(column.floor, color=INK, linewidth=1.0, linestyle=":", label="no schedule takes less")
+        name = f"least to leave as little as {column.floor.scheme}"
+        axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name)
     if column.required is not None:
         axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required")
     axes.set_xlabel(column.name)
@@ -146,7 +157,7 @@ def _scale(axes: Axes, values: list[float], *, log: bool) -> float:
     if not log:
         low, high = min(values, default=0.0), max(values, default=1.0)
         room = 0.35 * (high - low) or 0.5 * abs(high) or 1.0
-        axes.set_xlim(low - room, high + room)
+        axes.set_xlim(max(low - room, 0.0), high + room)
         axes.locator_params(axis="x", nbins=3)
         return -math.inf
     seen = [value for value in values if value > math.degrees(NEGLIGIBLE)]
