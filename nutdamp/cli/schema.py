@@ -12,6 +12,6 @@ from nutdamp.cli.parameters import FILE
 def command(output: str) -> None:
     """Print the JSON Schema of the spacecraft file, for editors that complete and check YAML."""
     from nutdamp.files.output import json_text, write_whole
-    from nutdamp.files.spacecraft_file import json_schema
+    from nutdamp.files.schema import json_schema
 
     write_whole(output, json_text(json_schema()))

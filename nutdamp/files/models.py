@@ -10,7 +10,6 @@ import re
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict
-from pydantic_core import core_schema
 
 from nutdamp.files.dispersion_models import DispersionsSection
 from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, OrWord, Quantity, Section
@@ -382,26 +381,3 @@ class SpacecraftFile(Section):
         description="How far the real spacecraft may be off what the file says.",
         examples=[{"A": {"normal": "2 %"}}],
     )
-
-
-def json_schema() -> dict[str, Any]:
-    """JSON Schema (2020-12) of the spacecraft file, for editors."""
-    from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-
-    class Schema(GenerateJsonSchema):
-        """None stands for a key that is left out, which a file cannot write; and titles would repeat the keys."""
-
-        def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
-            return self.generate_inner(schema["schema"])
-
-        def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-            described = super().default_schema(schema)
-            if described.get("default", 0) is None:
-                del described["default"]
-            return described
-
-        def field_title_should_be_set(self, schema: object) -> bool:  # noqa: ARG002
-            return False
-
-    schema = SpacecraftFile.model_json_schema(schema_generator=Schema)
-    return {"$schema": Schema.schema_dialect, **schema}

@@ -25,7 +25,6 @@ from nutdamp.files.models import (
     SpacecraftFile,
     SteerableSection,
     ThrusterSection,
-    json_schema,
 )
 from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
 from nutdamp.files.settings import Setting
@@ -46,7 +45,7 @@ from nutdamp.spacecraft import (
     Thruster,
 )
 
-__all__ = ["json_schema", "load_spacecraft", "read_spacecraft"]
+__all__ = ["load_spacecraft", "read_spacecraft"]
 
 Vector = NDArray[np.float64]
 

@@ -334,15 +334,13 @@ def _place(
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
         return None
-    on_times, short = [], 0.0
-    for channel, half in ((one, halves.first), (two, halves.second)):
-        needed = grown * half * factor
-        rate = channel.axial / spacecraft.inertia.C
-        on_time = rates.on_time_for(needed, abs(channel.transverse), a, spin, rate, channel.max_on_time)
-        longest = longest_useful(channel.max_on_time, spacecraft.body_period)
-        on_times.append(max(longest if on_time is None else on_time, channel.min_on_time))
-        reached = abs(channel.transverse) * on_times[-1] * abs(rates.width_factor(a, spin, rate, on_times[-1]))
-        short += abs(needed - reached) / (spacecraft.least_impulse * factor)
+    needed = (grown * halves.first * factor, grown * halves.second * factor)
+    on_times = [_nearest(spacecraft, channel, impulse) for channel, impulse in zip((one, two), needed, strict=True)]
+    short = 0.0
+    for channel, impulse, on_time in zip((one, two), needed, on_times, strict=True):
+        reached = abs(channel.transverse) * on_time
+        reached *= abs(rates.width_factor(a, spin, channel.axial / spacecraft.inertia.C, on_time))
+        short += abs(impulse - reached) / (spacecraft.least_impulse * factor)
     if short >= 1.0:
         return None
     first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
@@ -361,6 +359,16 @@ def _place(
             return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
         first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
+
+
+def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
+    """On-time in s with which a channel gives the effective impulse ``needed`` N m s, or comes nearest to it."""
+    rate, longest = channel.axial / spacecraft.inertia.C, channel.max_on_time
+    a, spin = spacecraft.inertia.a, spacecraft.spin
+    on_time = rates.on_time_for(needed, abs(channel.transverse), a, spin, rate, longest)
+    if on_time is None:
+        on_time = longest_useful(longest, spacecraft.body_period)
+    return max(on_time, channel.min_on_time)
 
 
 def _grown(spacecraft: Spacecraft, time: float) -> float:

@@ -9,7 +9,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import json_schema, read_spacecraft
+from nutdamp.files.schema import json_schema
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.files.yaml_tree import read_tree
 
 SCHEMA = json_schema()

@@ -374,7 +374,8 @@ def test_what_the_example_shows_in_comments_works() -> None:
 
 
 def test_the_example_shows_every_key() -> None:
-    from nutdamp.files.models import SpacecraftFile, json_schema
+    from nutdamp.files.models import SpacecraftFile
+    from nutdamp.files.schema import json_schema
 
     sections = [json_schema(), *json_schema()["$defs"].values()]
     assert sections[0]["properties"].keys() == SpacecraftFile.model_fields.keys()
