@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from planned_once import Planner
 from process import Run, apart, within
 
@@ -27,7 +27,7 @@ PLANNED_ONCE = (
 """Folders and modules of tests of what is made of plans: these may share them."""
 
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
-settings.register_profile("project", deadline=None, derandomize=True)
+settings.register_profile("project", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("project")
 
 

@@ -83,6 +83,7 @@ def test_nothing_feasible(run: Run, sat: Path) -> None:
     assert "one-pulse: infeasible:" in " ".join(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_most_cases_comply_with_the_plan_picked_for_the_example(run: Run, tmp_path: Path) -> None:
     """By impulse sums four-pulse complied in 2 % of the cases, and was taken all the same."""
     done = run("plan", "--robust", "--json", "plan.json")

@@ -13,6 +13,7 @@ import pytest
 from broken import BASE, THRUSTERS
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from samples import some
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile
@@ -67,7 +68,7 @@ def test_the_example_has_many_values_to_set() -> None:
     assert len(LEAVES) > 40
 
 
-@pytest.mark.parametrize("value", ["rubbish", "-1 min", 1e9, True, None, {"x": 1}, [1, 2], ""])
+@pytest.mark.parametrize("value", some(["rubbish", 1e9, {"x": 1}, "-1 min", True, None, [1, 2], ""], always=3))
 def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
     """Each value of the example replaced in turn: the same faults, whether in the file or beside it."""
     placed: set[bool] = set()

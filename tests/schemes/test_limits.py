@@ -161,7 +161,7 @@ HARD = {
 }
 
 
-@pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
+@pytest.mark.parametrize("requested", some(REQUESTED.values(), always=2), ids=REQUESTED)
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, requested: tuple[str, Options]) -> None:
     for actuators in (cross(20.0), cross(0.5, min_on_time=0.02, max_on_time=0.3), fan(16, 3.0)):

@@ -61,7 +61,7 @@ def test_whatever_the_limits(block: int, scheme: str) -> None:
             raise
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", some(SCHEMES, always=1))
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, scheme: str) -> None:
     for requested in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
@@ -69,7 +69,7 @@ def test_awkward_limits(hard: Limits, scheme: str) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("spin", [3.0, -3.0])
+@pytest.mark.parametrize("spin", some([3.0, -3.0], always=1))
 def test_most_unlimited_cases_end_on_the_target(scheme: str, spin: float) -> None:
     """Strong channels and time: nothing is in the way."""
     rng = np.random.default_rng(7)

@@ -103,6 +103,7 @@ def test_every_limit_is_kept(limits: Limits) -> None:
     assert max(left.nutation, left.shift) < 1.1 * coarse
 
 
+@pytest.mark.slow
 def test_on_times_are_none_or_at_least_the_least() -> None:
     free = strong(20.0, 2.0)
     least = min(pulse.on_time for pulse in plan(free, "optimal").pulses)
