@@ -189,7 +189,8 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
 def test_the_same_input_gives_the_same_bytes(run: Run, tmp_path: Path, name: str) -> None:
     contents = []
     for _ in range(2):
-        run("report", "--disperse", "1e3", "--scheme", "two-pulse", "-o", name)
+        done = run("report", "--disperse", "1e3", "--scheme", "two-pulse", "-o", name)
+        assert done.returncode == 4, done.stderr
         contents.append((tmp_path / name).read_bytes())
     assert contents[0] == contents[1]
 

@@ -167,7 +167,7 @@ def test_numbers_sort_by_value_and_words_stay_last(tab: Browse) -> None:
 @pytest.mark.parametrize("key", ["Enter", "Space"])
 def test_the_keyboard_sorts(tab: Browse, key: str) -> None:
     with tab("ace") as page:
-        page.locator("#schemes .wide").focus()
+        page.locator("#schemes .wide").first.focus()
         page.keyboard.press("Tab")
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.textContent") == "pulses"
@@ -182,7 +182,7 @@ def test_the_keyboard_sorts(tab: Browse, key: str) -> None:
 
 def test_wide_tables_scroll_in_their_box(tab: Browse) -> None:
     with tab("ace", 400) as page:
-        box = page.locator("#schemes .wide")
+        box = page.locator("#schemes .wide").first
         assert box.evaluate("(box) => box.scrollWidth > box.clientWidth")
         box.focus()
         for _ in range(5):
@@ -253,3 +253,42 @@ def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
 @pytest.mark.parametrize("name", [*everywhere(), DISPERSED])
 def test_a_page_is_small_enough_to_send(pages: Callable[[str], Path], name: str) -> None:
     assert pages(name).stat().st_size <= 700_000
+
+
+VISIBLE = """(selector) => [...document.querySelectorAll(selector)].filter((one) => one.checkVisibility())
+  .map((one) => one.getBoundingClientRect()).filter((box) => box.width > 2)
+  .map((box) => [box.left, box.right, box.width])"""
+"""Left and right edges and widths of what is seen, px."""
+
+
+def test_on_a_phone_nothing_to_decide_on_has_to_be_scrolled(tab: Browse) -> None:
+    """The tiles and the requirement fit, each panel is as wide as the screen, and a table says that it scrolls."""
+    with tab(DISPERSED, 400) as page:
+        for selector in (".figures div", ".stacked td", "figure svg"):
+            boxes = page.evaluate(VISIBLE, selector)
+            assert boxes
+            assert all(left >= 0.0 and right <= 400.0 for left, right, _ in boxes), selector
+        panels = page.evaluate(VISIBLE, ".apart svg")
+        assert len(panels) >= 6
+        assert page.evaluate(VISIBLE, ".whole svg") == []
+        names = page.eval_on_selector_all(
+            ".stacked td", "all => all.map((one) => getComputedStyle(one, '::before').content)"
+        )
+        assert {'"limit"', '"margin"', '"verdict"'} <= set(names)
+        box = page.locator("#schemes .wide").first
+        assert "linear-gradient" in box.evaluate("(box) => getComputedStyle(box).backgroundImage")
+        box.evaluate("(box) => box.scrollLeft = 200")
+        first = box.locator("tbody th").first.bounding_box()
+        assert first["x"] >= 0.0
+        assert first["x"] == box.bounding_box()["x"]
+    with tab(DISPERSED, 800) as page:
+        assert page.evaluate(VISIBLE, ".apart svg") == []
+        assert len(page.evaluate(VISIBLE, ".whole svg")) >= 2
+
+
+def test_paper_has_numbers_and_the_same_bytes(chromium: Any, pages: Callable[[str], Path]) -> None:
+    text = pages(QUICK[0]).read_text(encoding="utf-8")
+    first, second = (pdf.printed(text, "report.pdf") for _ in range(2))
+    assert first == second
+    assert b"CreationDate" not in first
+    assert "counter(page)" in text

@@ -110,7 +110,11 @@ def ends_sheet(flown: Flight) -> Sheet:
     goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
     rows.append(("spin", spin_text(body.spin), spin_text(final.spin), goal))
     rows.append(("nutation", degrees(body.nutation), degrees(final.nutation), MISSING))
-    heads = (Column("quantity", number=False), Column("t = 0"), Column("after the last pulse"), Column("target"))
+    heads: tuple[Column, ...] = (Column("quantity", number=False), Column("t = 0"), Column("after the last pulse"))
+    if target is None and body.goal.spin is None:
+        rows = [row[:-1] for row in rows]
+    else:
+        heads = (*heads, Column("target"))
     return Sheet("Where it points", heads, tuple(rows), sortable=False, stacked=True)
 
 

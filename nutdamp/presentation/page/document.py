@@ -68,11 +68,16 @@ class Points:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An ``<svg>`` element, a caption, and what it shows in words for those who do not see it."""
+    """An ``<svg>`` element, a caption, and what it shows in words for those who do not see it.
+
+    ``views``: its panels as view boxes on the group called ``name`` in it, for narrow screens.
+    """
 
     svg: str
     caption: str
     described: str
+    name: str = ""
+    views: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

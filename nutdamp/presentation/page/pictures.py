@@ -10,6 +10,7 @@ from nutdamp.fronts import Front
 from nutdamp.planning import Comparison, Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.page.document import Picture
+from nutdamp.presentation.page.panels import apart
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
@@ -40,8 +41,7 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     if len(plan.pulses):
         drawn.append(("timeline", "Which channel fires, when and for how long.", "Timeline of the firings"))
     return tuple(
-        Picture(figures.svg(figures.flight_figure(name, flown, track)), caption, described)
-        for name, caption, described in drawn
+        apart(figures.flight_figure(name, flown, track), caption, described) for name, caption, described in drawn
     )
 
 
@@ -86,6 +86,6 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         ),
     )
     return tuple(
-        Picture(figures.svg(figures.dispersion_figure(name, dispersed, scheme=scheme)), caption, described)
+        apart(figures.dispersion_figure(name, dispersed, scheme=scheme), caption, described)
         for name, caption, described in drawn
     )
