@@ -141,6 +141,7 @@ class Program:
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
         self._grid: Vector | None = None
+        self._looked = 0
 
     @property
     def strong(self) -> NDArray[np.bool_]:
@@ -248,8 +249,22 @@ class Program:
 
     def _coefficients(self, columns: Columns) -> Vector:
         """What one unit of each column does in the equations, (equations, n)."""
-        rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
-        return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
+        return np.asarray(np.einsum("nek,nk->en", self._rows(columns), self._direction[columns.channel]))
+
+    def _rows(self, columns: Columns) -> Vector:
+        """What one N m s of each column about each body axis adds to the equations, (n, equations, 3).
+
+        Once slots were looked at as often as there are any, all of them are, and kept.
+        """
+        slots = columns.width > 0.0
+        self._looked += int(np.count_nonzero(slots))
+        if self._grid is None and self._looked <= len(self.centres):
+            return np.asarray(self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None])
+        rows = np.empty((len(slots), len(self.influence.goal), 3))
+        rows[slots] = self._slot_rows()[:, :, self._slot(columns.t[slots])].transpose(2, 0, 1)
+        if not slots.all():
+            rows[~slots] = self.influence.rows(columns.t[~slots])
+        return rows
 
     def _slot_rows(self) -> Vector:
         """What one N m s in each slot adds to the equations, (equations, 3, slots)."""
@@ -387,9 +402,11 @@ class Program:
                 same = np.full(len(times), index)
                 impulses = impulses.joined(Columns(same, times, np.zeros(len(times)), np.full(len(times), number)))
             else:
-                distance = np.abs(self.centres - burn.t)
-                nearer = (distance < reach) & (distance < away[index])
-                owner[index, nearer], away[index, nearer] = number, distance[nearer]
+                first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
+                near = np.arange(first, last + 1)
+                distance = np.abs(self.centres[near] - burn.t)
+                nearer = (distance < reach) & (distance < away[index, near])
+                owner[index, near[nearer]], away[index, near[nearer]] = number, distance[nearer]
         kept = np.nonzero((owner >= 0) & ~self.forbidden)
         return self._slots(*kept)._replace(burn=owner[kept]).joined(impulses)
 

@@ -10,8 +10,8 @@ import numpy as np
 from nutdamp.spacecraft import Vector
 
 WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
-    ("simplex", True, 1.0),
     ("simplex", False, 1.0),
+    ("simplex", True, 1.0),
     ("simplex", True, 1e3),
     ("ipm", True, 1.0),
     ("simplex", False, 1e-2),
@@ -64,7 +64,7 @@ class GrowingProgram:
 
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
-        found = self._solved(*WAYS[0])  # HiGHS does not presolve where there is a basis
+        found = self._solved(*WAYS[0])
         for way in WAYS:
             if found is not None:
                 break

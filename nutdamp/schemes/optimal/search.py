@@ -9,6 +9,7 @@ plan: the program's first least cost, of first order, and a rigorous one.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -208,16 +209,16 @@ class _Search(Problem):
         other = starting_points.cheapened(self.task(), made)
         if other is None or not keeps_limits(self.spacecraft, other.pulses) or self.left(self.flown(other)) > LEFT:
             return made
-        return made if self.hurried(other) > self.hurried(made) else self.cheaper(made, other)
+        return made if self.hurried(other) and not self.hurried(made) else self.cheaper(made, other)
 
-    def hurried(self, made: Schedule) -> int:
-        """How often a channel is on again before it was off for its shortest on-time: valves take their time."""
-        before, count = {channel.name: -math.inf for channel in self.channels}, 0
-        shortest = {channel.name: channel.min_on_time for channel in self.channels}
-        for pulse in made:
-            count += pulse.start - before[pulse.channel] < shortest[pulse.channel] - TOUCHING
-            before[pulse.channel] = pulse.end
-        return count
+    def hurried(self, made: Schedule) -> bool:
+        """Whether a channel is on again before it was off for its shortest on-time: valves take their time."""
+        each = ((one, [pulse for pulse in made if pulse.channel == one.name]) for one in self.channels)
+        return any(
+            after.start - before.end < one.min_on_time - TOUCHING
+            for one, pulses in each
+            for before, after in itertools.pairwise(pulses)
+        )
 
     def programmed(self, first: Solution) -> Schedule | None:
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
