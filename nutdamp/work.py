@@ -12,13 +12,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-SCHEME = 12_000.0
+SCHEME = 9_000.0
 """Units that the search of one scheme may spend."""
 
-COMMAND = 13_000.0
+COMMAND = 10_000.0
 """Units that the searches of one comparison may spend together."""
 
-FRONTS = 60_000.0
+FRONTS = 30_000.0
 """Units that the searches of all points of `trade` may spend together."""
 
 

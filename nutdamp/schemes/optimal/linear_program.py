@@ -28,8 +28,8 @@ SLOTS = 64
 MOST_SLOTS = 600_000
 """Slots of all channels together: a horizon of more is looked at as far as they reach."""
 
-SOLVED, SLOT = 3.0, 3e-4
-"""Units of `work` of a program's solution, and of each of its slots."""
+SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06
+"""Units of `work` of a program's solution, of each slot or column given, and of each burn of limited on-time."""
 
 SLACK_COST = 1e3
 """Cost of what no column supplies, over the dearest channel's: used only where there is no solution."""
@@ -153,7 +153,7 @@ class Program:
 
         ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
         """
-        work.spend(SOLVED + SLOT * self.forbidden.size)
+        work.spend(SOLVED + (SLOT * self.forbidden.size if columns is None else COLUMN * len(columns.t)))
         nothing = np.zeros(len(self.influence.goal))
         if self._scale == 0.0:
             return Solution((), 0.0, 0.0, np.zeros(2), nothing)
@@ -202,6 +202,7 @@ class Program:
             reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
         # Where H may end off its target, the shares of the directions add up to no more than `off`.
         shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
+        work.spend(LIMITED * longest)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
         goal = self.influence.goal / self._scale
         master = lp_solver.GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
