@@ -86,8 +86,9 @@ def report_page(
         Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         Section("method", "Method", tuple(method_blocks(compared))),
         _schemes(compared, decided, pictured=pictured),
-        *[_trade(compared, traded, pictured=pictured)] * bool(traded),
     ]
+    if traded:
+        sections.append(_trade(compared, traded, pictured=pictured))
     if decided is not None:
         chosen = decided.plan
         sections.append(_schedule(chosen))
@@ -154,7 +155,7 @@ def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) 
 def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:
     """What an earlier end costs, as ``trade`` has it."""
     tables = blocks_of("Schedules of the scheme optimal", Group(*front_parts(compared.spacecraft, traded)))
-    pictures = [trade_picture_of(compared, traded)] * pictured
+    pictures = (trade_picture_of(compared, traded),) if pictured else ()
     return Section("trade", "Time against cost", (*tables, *pictures))
 
 
