@@ -50,7 +50,9 @@ def seen_at(flight: Flight, time: float) -> Flight:
     kept = [index for index, one in enumerate(begun) if one]
     return replace(
         flight,
-        schedule=Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
+        schedule=flight.schedule
+        if len(kept) == len(flight.schedule)
+        else Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
         settled=SpinState(complex(first, second), third, quaternion[0]),
         spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
         until=time,

@@ -385,6 +385,8 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     Those that can set the spin are among them where it has to change.
     """
     names = schemes.COMPARED if spacecraft.goal.axis is None else schemes.POINTING
+    if spacecraft.commands is not None:
+        names = (*names, *schemes.COMMANDED)
     return names if _spun(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from nutdamp.commands import Block
 from nutdamp.spacecraft import Channel, Steerable, Vector
 
 STEERABLE = "steerable"
@@ -134,11 +135,15 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Pulses in the order of their centres, remarks of the scheme that chose them, and what others must cost."""
+    """Pulses in the order of their centres, remarks of the scheme that chose them, and what others must cost.
+
+    ``blocks`` are the commands by which the pulses are fired, where it is not one by one.
+    """
 
     pulses: tuple[Pulse, ...] = ()
     notes: tuple[str, ...] = ()
     bounds: Bounds | None = None
+    blocks: tuple[Block, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pulses", tuple(sorted(self.pulses, key=lambda pulse: pulse.t)))

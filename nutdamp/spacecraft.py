@@ -19,6 +19,8 @@ from nutdamp import arguments, views
 from nutdamp.actuators import Channel as Channel
 from nutdamp.actuators import Steerable as Steerable
 from nutdamp.actuators import Thruster as Thruster
+from nutdamp.commands import Commands as Commands
+from nutdamp.commands import SunSensor as SunSensor
 from nutdamp.demands import Goal as Goal
 from nutdamp.demands import Keep as Keep
 from nutdamp.demands import Limits as Limits
@@ -162,7 +164,8 @@ class Spacecraft(views.Shown):
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
     which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off;
     ``object_id`` names it in messages; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep``
-    are cones for the spin axis; ``source`` is what it was read from, None once a field is replaced.
+    are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
+    ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -181,6 +184,8 @@ class Spacecraft(views.Shown):
     object_id: str | None = None
     sun: Vector | None = None
     keep: tuple[Keep, ...] = ()
+    sun_sensor: SunSensor | None = None
+    commands: Commands | None = None
     source: Source | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:

@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
 import click
 
 from nutdamp.cli.failures import show_failures
-from nutdamp.cli.parameters import FILE, Named
+from nutdamp.cli.parameters import FILE, Named, SchemeName
 from nutdamp.cli.scheme_options import Aim, expect_read
 from nutdamp.cli.screen import say, show
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
@@ -73,7 +73,7 @@ set_option = click.option(
     multiple=True,
     metavar="KEY=VALUE",
     callback=_settings,
-    help="Change a key of the spacecraft file, such as limits.horizon=300s; repeatable.",
+    help="Change a key of the file, as limits.gap=1s; repeatable.",
 )
 
 
@@ -179,7 +179,7 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
 
         read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
         option = click.option("--schedule", type=FILE, help=read)(gathered)
-        return cast(Command, click.option("--scheme", type=Named(NAMES), help=scheme or default)(option))
+        return cast(Command, click.option("--scheme", type=SchemeName(NAMES), help=scheme or default)(option))
 
     return decorate
 
@@ -228,6 +228,21 @@ def plan_or_read(
     for text in sentences(plan):
         remark(text)
     return plan
+
+
+def fire_blocks(path: str, body: Spacecraft, options: Options, remark: Callable[[str], None]) -> Plan:
+    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
+    from nutdamp.errors import printable
+    from nutdamp.files.blocks_csv import read_blocks
+    from nutdamp.planning import Plan
+    from nutdamp.remarks import broken_limits
+    from nutdamp.schemes.tools.sun_pulses import fired
+
+    blocks, warnings = read_blocks(path, body)
+    made = fired(body, blocks)
+    for warning in (*warnings, *broken_limits(body, made)):
+        remark(f"warning: {warning}")
+    return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)
 
 
 def require_dispersions(body: Spacecraft) -> None:

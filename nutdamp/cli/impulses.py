@@ -17,8 +17,7 @@ def impulse_options(command: Command) -> Command:
         click.option(
             "--impulses",
             is_flag=True,
-            help="Fly dispersed cases by the impulse sum (17): faster; refused where it errs by over a tenth of the "
-            "requirement.",
+            help="Fly cases by the impulse sum (17): faster, and refused where that errs too much.",
         ),
     ):
         command = option(command)

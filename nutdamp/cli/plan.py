@@ -25,11 +25,13 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Named
+from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say
+from nutdamp.errors import BadRequest
 from nutdamp.schemes import PLANNED, Options
+from nutdamp.words import listed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -45,12 +47,19 @@ SCHEMES = "schemes"
 
 @click.command("plan", cls=PlanningCommand)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=Named(PLANNED), help="Plan it alone; repeatable.")
+@click.option(
+    "--scheme",
+    "names",
+    multiple=True,
+    type=SchemeName(PLANNED),
+    help=f"Plan it alone; repeatable: {listed(PLANNED, 'or')}.",
+)
 @scheme_options
 @goal_options
 @click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")
 @impulse_options
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
+@click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
 @plot_options((*FIGURES, SCHEMES))
@@ -64,6 +73,7 @@ def command(
     impulses: bool,
     force: bool,
     csv: str | None,
+    blocks: str | None,
     table: str | None,
     json: str | None,
     plot: str | None,
@@ -81,11 +91,11 @@ def command(
     for option, path in (("--csv", csv), ("--plot", one_plan)):
         if path is not None and len(names) > 1:
             raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
-    silent = expect_outputs(spacecraft, csv=csv, table=table, json=json, plot=plot)
+    silent = expect_outputs(spacecraft, csv=csv, blocks=blocks, table=table, json=json, plot=plot)
     expect_picture(plot, figure)
     remark = remarks(quiet)
     body = load(spacecraft, remark, aim)
-    expect_places(csv, table, json, plot)
+    expect_places(csv, blocks, table, json, plot)
 
     if robust:
         require_dispersions(body)
@@ -101,9 +111,11 @@ def command(
     dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
-    for path in (csv, one_plan):
+    for path in (csv, blocks, one_plan):
         if path is not None and chosen is None:
             say(f"{path} was not written: no plan is feasible")
+    if blocks is not None and chosen is not None and not chosen.pulses.blocks:
+        raise BadRequest(f"--blocks: {chosen.scheme} makes no command blocks; name --scheme command-block")
 
     def data() -> dict[str, Any]:
         from nutdamp.library.views import comparison_data
@@ -118,7 +130,8 @@ def command(
 
     outputs: list[Output] = [(json, data), (table, partial(_schemes, compared, decided))]
     if chosen is not None:
-        outputs += [(csv, partial(_pulses, chosen)), (one_plan, partial(_picture, chosen, figure, one_plan))]
+        outputs += [(csv, partial(_pulses, chosen)), (blocks, partial(_blocks, chosen))]
+        outputs.append((one_plan, partial(_picture, chosen, figure, one_plan)))
     if figure == SCHEMES:
         outputs.append((plot, partial(_schemes_picture, compared, decided, plot)))
     if silent:
@@ -149,6 +162,12 @@ def _pulses(chosen: Plan) -> str:
     from nutdamp.files.pulses_csv import pulses_csv
 
     return pulses_csv(chosen.flight)
+
+
+def _blocks(chosen: Plan) -> str:
+    from nutdamp.files.blocks_csv import blocks_csv
+
+    return blocks_csv(chosen.flight)
 
 
 def _schemes(compared: Comparison, decided: Decision | None) -> str:

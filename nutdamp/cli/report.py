@@ -23,7 +23,7 @@ from nutdamp.cli.common import (
 from nutdamp.cli.disperse import SAMPLES, fly
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.impulses import expect_impulses, impulse_options
-from nutdamp.cli.parameters import FILE, Count, Named, is_number
+from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
 from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, expect_read, goal_options
@@ -79,7 +79,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command("report", cls=Report)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=Named(PLANNED), help="Compare this one only; repeatable.")
+@click.option("--scheme", "names", multiple=True, type=SchemeName(PLANNED), help="Compare this one only; repeatable.")
 @goal_options
 @click.option(
     "-o",

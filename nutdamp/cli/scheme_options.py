@@ -103,7 +103,7 @@ def goal_options(command: Command) -> Command:
             group=GOAL,
             type=Direction(),
             metavar="ANGLE,ANGLE",
-            help="The Sun, given as --target is; rhumb-line keeps the phase of its pulses to it.",
+            help="The Sun, as --target; rhumb-line keeps its phase.",
         ),
         click.option(
             "--spin",
@@ -111,7 +111,7 @@ def goal_options(command: Command) -> Command:
             group=GOAL,
             type=FinalSpin("rate"),
             metavar="RATE|keep",
-            help="Spin rate at the end, such as 30rpm; set by optimal with channels that have a torque about axis 3.",
+            help="Final spin rate, such as 30rpm; optimal can set it.",
         ),
         click.option(
             "--target",
@@ -119,8 +119,7 @@ def goal_options(command: Command) -> Command:
             group=GOAL,
             type=Direction(),
             metavar="ANGLE,ANGLE",
-            help="Where the spin axis is to end: right ascension and declination where the file has an attitude, else "
-            "tilt from H and azimuth about it, such as 10deg,45deg.",
+            help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
         ),
     ):
         wrapped = option(wrapped)

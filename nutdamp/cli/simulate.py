@@ -15,6 +15,7 @@ from nutdamp.cli.common import (
     deliver,
     expect_picture,
     expect_places,
+    fire_blocks,
     flown_options,
     load,
     plan_or_read,
@@ -42,6 +43,7 @@ PICTURED = 100_000
     "Propagate", "Plan this scheme with default options and propagate it, not the recommended one; none is free motion."
 )
 @goal_options
+@click.option("--blocks", type=FILE, help="Fire the command blocks of a CSV file, as `plan --blocks` writes it.")
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(
     "--until",
@@ -61,6 +63,7 @@ def command(
     flown: Flown,
     options: Options,
     aim: Aim,
+    blocks: str | None,
     real: bool,
     until: float | None,
     samples: int,
@@ -78,7 +81,9 @@ def command(
     """
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    silent = expect_outputs(spacecraft, flown.schedule, csv=csv, json=json, plot=plot)
+    if blocks is not None and flown != (None, None):
+        raise click.UsageError("name what to propagate: one of --scheme, --schedule and --blocks")
+    silent = expect_outputs(spacecraft, flown.schedule, blocks, csv=csv, json=json, plot=plot)
     if drawn and silent:
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
     expect_picture(plot, figure)
@@ -91,7 +96,10 @@ def command(
     from nutdamp.presentation.geometry import shown_until
     from nutdamp.track import extremes
 
-    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
+    if blocks is None:
+        plan = plan_or_read(body, flown, options, remark, quiet=quiet)
+    else:
+        plan = fire_blocks(blocks, body, options, remark)
     pulses = plan.pulses
     end = pulses.end + body.inertial_period if until is None else until
     flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)

@@ -16,7 +16,7 @@ from nutdamp.errors import Fault, FaultyFile, in_order, nearest
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.facts import MOMENT, Finding
-from nutdamp.files.fields import section_of
+from nutdamp.files.fields import TAGS, section_of
 from nutdamp.files.kinds import foreign
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.plausibility import doubts
@@ -104,7 +104,8 @@ def _holds_names(annotation: Any) -> bool:
 def _type_errors(error: ValidationError) -> Iterator[Finding]:
     for details in error.errors(include_url=False):
         wording = _WORDING.get(details["type"])
-        yield Finding(details["loc"], wording(details) if wording else details["msg"])
+        path = tuple(step for step in details["loc"] if step not in TAGS)
+        yield Finding(path, wording(details) if wording else details["msg"])
 
 
 def _description(path: KeyPath) -> str:

@@ -86,6 +86,15 @@ class AxialShorthand:
         return {"anyOf": [handler(schema), *single["anyOf"]]}
 
 
+TAGS = ("[list]", "{mapping}")
+"""What pydantic adds to the path of a fault in a value that is either a list or a mapping."""
+
+
+def list_or_mapping(value: object) -> str:
+    """Which of `TAGS` is meant by a value."""
+    return TAGS[isinstance(value, dict)]
+
+
 class OrWord:
     """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
 

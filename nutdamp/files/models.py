@@ -5,60 +5,41 @@ What needs more than one key to judge is in `rules`.
 
 from __future__ import annotations
 
-import datetime
-import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, Strict
+from pydantic import ConfigDict, Field
 
 from nutdamp.files.dispersion_models import DispersionsSection
-from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, OrWord, Quantity, Section
-from nutdamp.units import shown
-
-
-def _epoch(text: str) -> str:
-    """Refuses what is not a date and a time; their text is passed on as it is."""
-    try:
-        if not re.fullmatch(_EPOCH, text):
-            raise ValueError
-        datetime.datetime.fromisoformat(text)
-    except ValueError:
-        example = "2026-03-01T12:00:00Z"
-        raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
-    return text
-
-
-_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
-
-Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
-Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
-Rate = Annotated[float, Quantity("rate")]
-Angle = Annotated[float, Quantity("angle")]
-Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-Tilt = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE)]
-Declination = Annotated[float, Quantity("angle", minimum=-RIGHT_ANGLE, maximum=RIGHT_ANGLE)]
-AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-Time = Annotated[float, Quantity("time", minimum=0)]
-PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
-Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
-Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
-Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
-Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
-
-_THREE = Field(min_length=3, max_length=3)
-Rates = Annotated[list[Rate], _THREE]
-Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
-Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
-Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
-DisturbingTorques = Annotated[Torques, AxialShorthand()]
-Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
-Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Field(min_length=4, max_length=4)]
-InTheSky = Annotated[list[Angle], Field(min_length=2, max_length=2)]
-Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
-Window = Annotated[list[Time], Field(min_length=2, max_length=2)]
-Name = Annotated[str, Field(min_length=1)]
-Epoch = Annotated[str, AfterValidator(_epoch), Field(json_schema_extra={"pattern": f"^{_EPOCH}$"})]
-Count = Annotated[int, Strict(), Field(ge=1, le=1_000_000)]
+from nutdamp.files.fields import OrWord, Section
+from nutdamp.files.quantities import (
+    AcuteAngle,
+    Angle,
+    Count,
+    Declination,
+    Direction,
+    DisturbingTorques,
+    Epoch,
+    Force,
+    InTheSky,
+    Lever,
+    Mass,
+    Moment,
+    Name,
+    Nutation,
+    Position,
+    PositiveTime,
+    Probability,
+    Quaternion,
+    Rate,
+    Rates,
+    Tensor,
+    Tilt,
+    Time,
+    Torque,
+    Torques,
+    Window,
+)
+from nutdamp.files.sky_models import CommandsSection, KeepSection, SunSensorSection
 
 
 def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
@@ -270,24 +251,6 @@ class DisturbanceSection(Section):
     )
 
 
-class KeepSection(Section):
-    """A cone about a direction in space which the spin axis must not enter, or must not leave, nutation included."""
-
-    name: Name = Field(description="Name of the cone, for reports.", examples=["Earth"])
-    direction: Annotated[InTheSky, OrWord("sun")] = Field(
-        description="Right ascension and declination in the attitude's frame, rad; or sun.",
-        examples=["sun", ["120 deg", "10 deg"]],
-    )
-    min: Apart | None = Field(
-        default=None, description="Least angle to the spin axis, rad; default 0.", examples=["4 deg"]
-    )
-    max: Apart | None = Field(
-        default=None,
-        description="Largest angle between it and the spin axis, rad; default 180 deg.",
-        examples=["20 deg"],
-    )
-
-
 class DissipationSection(Section):
     """Energy dissipation within the body, by flexible parts or liquids."""
 
@@ -375,6 +338,16 @@ class SpacecraftFile(Section):
         default=[],
         description="Cones that the spin axis keeps on its way to a target.",
         examples=[[{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}]],
+    )
+    sun_sensor: SunSensorSection | None = Field(
+        default=None, description="The sensor whose pulse fires command blocks.", examples=[{"azimuth": "35 deg"}]
+    )
+    commands: CommandsSection | None = Field(
+        default=None,
+        description="Command blocks: pulses fired by the Sun pulse.",
+        examples=[
+            {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}}
+        ],
     )
     dispersions: DispersionsSection | None = Field(
         default=None,

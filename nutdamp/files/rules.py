@@ -44,9 +44,9 @@ def findings(root: Node) -> Iterator[Finding]:
         _dissipation,
         _limits,
         _goal,
-        sky_findings,
     ):
         yield from rule(facts)
+    yield from sky_findings(facts, spin_of(facts), _spin_axis(facts))
 
 
 def force_vector(direction: Iterable[float], force: float) -> Vector:
@@ -175,6 +175,14 @@ def _motion(facts: Facts) -> Iterator[Finding]:
     for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
         if spin is not None and abs(spin) < SMALLEST:
             yield Finding(path, "the spin is zero; expected a rate about axis 3; nothing nutates without it")
+
+
+def _spin_axis(facts: Facts) -> Vector:
+    """Principal axis 3 in the axes of the file, (3,); the file's third where the tensor cannot be read."""
+    tensor = tensor_of(facts)
+    if tensor is None or tensor_fault(tensor) is not None:
+        return np.array([0.0, 0.0, 1.0])
+    return np.asarray(principal_axes(symmetric(tensor))[1][:, 2])
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:

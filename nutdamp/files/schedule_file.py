@@ -7,19 +7,16 @@ the steerable torquer, and of channels that the file does not know, take their t
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from nutdamp.epoch import Epoch
-from nutdamp.errors import Fault, FaultyFile, nearest, printable
-from nutdamp.files.input import read_utf8
+from nutdamp.errors import nearest, printable
 from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
+from nutdamp.files.table import Cells, Table
 from nutdamp.planning import Plan
 from nutdamp.remarks import broken_limits
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, overlapping
@@ -30,18 +27,7 @@ from nutdamp.units import shown
 AGREES = 1e-6
 """Relative difference up to which columns of a schedule say the same."""
 
-LARGEST = 1e15
-"""Larger magnitudes are no schedule of a spacecraft, and would overflow later."""
-
-MOST_BYTES = 32 << 20
-"""Of a schedule file: many times more than its most pulses take."""
-
-MOST_PULSES = 100_000
-"""Rows of a schedule file."""
-
 STARTS = ("start_s", "t_s")
-
-Cells = dict[str, str]
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
@@ -49,17 +35,8 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
 
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
-    name = str(path)
-    reader = csv.reader(io.StringIO(read_utf8(name, MOST_BYTES), newline=""))
-    try:
-        rows = [(reader.line_num, row) for row in reader if row]
-    except csv.Error as reason:
-        raise FaultyFile([Fault(name, reader.line_num, 1, "", f"not CSV: {reason}")]) from reason
-    if not rows:
-        raise FaultyFile([Fault(name, 1, 1, "", f"empty; the first line names the columns: {','.join(HEADER)}")])
-    if len(rows) > MOST_PULSES + 1:
-        raise FaultyFile([Fault(name, rows[-1][0], 1, "", f"more than {MOST_PULSES} pulses")])
-    return _Reader(name, spacecraft, [entry.strip() for entry in rows[0][1]]).read(rows[1:])
+    table = Table(path, (*HEADER, UTC), "pulses")
+    return _Reader(table, spacecraft).read()
 
 
 def read_plan(
@@ -77,43 +54,22 @@ def read_plan(
 class _Reader:
     """Rows of one file into pulses, collecting faults, contradictions and warnings."""
 
-    def __init__(self, name: str, spacecraft: Spacecraft, header: list[str]) -> None:
-        self.name, self.spacecraft, self.header = name, spacecraft, header
+    def __init__(self, table: Table, spacecraft: Spacecraft) -> None:
+        self.table, self.spacecraft = table, spacecraft
         self.channels = {channel.name: channel for channel in spacecraft.channels}
-        self.faults: list[Fault] = []
-        self.warnings: dict[str, list[tuple[int, str]]] = {}
 
-    def read(self, rows: list[tuple[int, list[str]]]) -> tuple[Schedule, list[str]]:
-        self._columns()
-        pulses = [(line, pulse) for line, row in rows if (pulse := self._pulse(line, row)) is not None]
+    def read(self) -> tuple[Schedule, list[str]]:
+        header = self.table.header
+        if not set(STARTS) & set(header):
+            problem = f"the column is missing (or {STARTS[1]}, the centre){self.table.misspelt(STARTS[0])}"
+            self.table.fault(1, STARTS[0], problem)
+        bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
+        self.table.expect("on_time_s", *["channel"] * bare)
+        pulses = [(line, pulse) for line, row in self.table.rows if (pulse := self._pulse(line, row)) is not None]
         for line, other in overlapping(pulses):
-            self._fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
-        if self.faults:
-            raise FaultyFile(self.faults)
-        return Schedule(tuple(pulse for _, pulse in pulses)), [self._told(found) for found in self.warnings.values()]
-
-    def _columns(self) -> None:
-        """Look at the first line. Raises FaultyFile."""
-        if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
-            raise FaultyFile([Fault(self.name, 1, 1, "", "columns are separated by commas, not by semicolons or tabs")])
-        if not set(STARTS) & set(self.header):
-            self._fault(1, STARTS[0], f"the column is missing (or {STARTS[1]}, the centre){self._misspelt(STARTS[0])}")
-        bare = not {*TORQUE, *IMPULSE} & set(self.header)  # else a pulse without channel is one of the torquer
-        for column in ("on_time_s", "channel") if bare else ("on_time_s",):
-            if column not in self.header:
-                self._fault(1, column, f"the column is missing{self._misspelt(column)}")
-        for column in {entry for entry in self.header if self.header.count(entry) > 1}:
-            self._fault(1, column, "the column is given twice")
-        if self.faults:
-            raise FaultyFile(self.faults)
-        for column in self.header:
-            if column not in HEADER and column != UTC:
-                self._warn(1, column, f"the column {shown(column)} is not known: ignored")
-
-    def _misspelt(self, column: str) -> str:
-        """The column of the header that may be meant to be a missing one, in words."""
-        found = nearest(column, [entry for entry in self.header if entry not in HEADER])
-        return "" if found is None else f"; rename {shown(found)} if that is meant"
+            self.table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
+        self.table.check()
+        return Schedule(tuple(pulse for _, pulse in pulses)), self.table.warned
 
     def _instead(self, name: str) -> str:
         """The channel that a name not in the file may stand for, or all there are."""
@@ -130,13 +86,14 @@ class _Reader:
 
     def _pulse(self, line: int, row: list[str]) -> Pulse | None:
         """The pulse of one row; None where it has faults."""
-        if len(row) != len(self.header):
-            self._fault(line, "", f"{len(row)} values under {len(self.header)} columns")
+        cells = self.table.cells(line, row)
+        if cells is None:
             return None
-        cells = dict(zip(self.header, (entry.strip() for entry in row), strict=True))
         name = cells.get("channel") or STEERABLE
         if not name.isprintable():
-            self._fault(line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected")
+            self.table.fault(
+                line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
+            )
             return None
         timing = self._timing(line, cells)
         if timing is None:
@@ -151,22 +108,24 @@ class _Reader:
         """Centre and on-time, s; the start rules where there is one."""
         column = next((column for column in STARTS if cells.get(column)), None)
         if column is None:
-            self._fault(line, STARTS[0], "the time is missing")
+            self.table.fault(line, STARTS[0], "the time is missing")
             return None
-        time, on_time = self._number(line, cells, column), self._number(line, cells, "on_time_s")
+        time, on_time = self.table.number(line, cells, column), self.table.number(line, cells, "on_time_s")
         if time is None or on_time is None:
             return None
         if on_time < 0.0:
-            self._fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
+            self.table.fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
             return None
         start = time if column == STARTS[0] else time - 0.5 * on_time
         if start < -1e-9:
-            self._fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
+            self.table.fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
             return None
         t = max(start, 0.0) + 0.5 * on_time if column == STARTS[0] else max(time, 0.5 * on_time)
         if not Pulse(t, on_time, "", np.zeros(3)).resolved:
             step = math.ulp(t + 0.5 * on_time)
-            self._fault(line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart")
+            self.table.fault(
+                line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart"
+            )
             return None
         self._compare(line, cells, (STARTS[1],), [t], f"start_s + on_time_s/2 = {t:g}", scale=max(t, on_time))
         return t, on_time
@@ -186,15 +145,15 @@ class _Reader:
 
     def _as_given(self, line: int, cells: Cells, name: str, t: float, on_time: float) -> Pulse | None:
         """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
-        inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.faults)
+        inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.table.faults)
         torque = self._vector(line, cells, TORQUE) if on_time > 0.0 else None
         impulse = self._vector(line, cells, IMPULSE)
         if torque is not None:
             self._compare(line, cells, IMPULSE, torque * on_time, f"torque × on_time_s, {_vector(torque * on_time)}")
             impulse = torque * on_time
         if impulse is None:
-            if len(self.faults) == faults:
-                self._fault(line, "on_time_s" if channel else "channel", self._missing(name, channel, on_time))
+            if len(self.table.faults) == faults:
+                self.table.fault(line, "on_time_s" if channel else "channel", self._missing(name, channel, on_time))
             return None
         given = inertia.axes.T @ impulse
         push = None if on_time == 0.0 else given / on_time
@@ -218,38 +177,22 @@ class _Reader:
         """Propellant of a pulse that flies as the schedule has it, kg; warns of what is not as in the file."""
         if channel is not None:
             ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-            self._warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
+            self.table.warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
             return None
         torquer = self.spacecraft.torquer
         if name != STEERABLE or torquer is None:
             known = ", ".join(map(shown, self.channels)) or STEERABLE
             text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
-            self._warn(line, f"unknown {name}", text)
+            self.table.warn(line, f"unknown {name}", text)
             return None
         size = 0.0 if torque is None else float(np.linalg.norm(torque))
         if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
             text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
-            self._warn(line, "steerable torque", text)
+            self.table.warn(line, "steerable torque", text)
         rate = torquer.propellant_per_impulse
         return None if rate is None else rate * float(np.linalg.norm(impulse))
 
     # --- cells -------------------------------------------------------------------------------------------------------
-
-    def _number(self, line: int, cells: Cells, column: str) -> float | None:
-        """The number in a cell that must have one; None for a fault."""
-        try:
-            value = float(cells[column])
-        except ValueError:
-            self._fault(line, column, f"{shown(cells[column])} is not a number")
-            return None
-        if not abs(value) <= LARGEST:
-            self._fault(
-                line,
-                column,
-                f"{shown(cells[column])} is out of range, {-LARGEST:g} to {LARGEST:g}",
-            )
-            return None
-        return value
 
     def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
         """Three numbers; None where none is given, or one is a fault."""
@@ -257,7 +200,7 @@ class _Reader:
             return None
         for column in columns:
             cells.setdefault(column, "")
-        numbers = [self._number(line, cells, column) for column in columns]
+        numbers = [self.table.number(line, cells, column) for column in columns]
         return None if None in numbers else np.array(numbers, dtype=float)
 
     def _compare(
@@ -281,7 +224,7 @@ class _Reader:
             named = columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
             given = ", ".join(map(_brief, texts))
             given = given if len(columns) == 1 else f"({given})"
-            self._warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
+            self.table.warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
 
     def _compare_dates(self, line: int, cells: Cells, pulse: Pulse) -> None:
         expected = self.spacecraft.utc(pulse.start)
@@ -292,22 +235,7 @@ class _Reader:
         except ValueError:
             off = math.inf
         if not off <= AGREES * max(pulse.t, 1.0):
-            self._warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
-
-    # --- the warnings ------------------------------------------------------------------------------------------------
-
-    def _fault(self, line: int, where: str, problem: str) -> None:
-        self.faults.append(Fault(self.name, line, 1, where, problem))
-
-    def _warn(self, line: int, subject: str, text: str) -> None:
-        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
-        self.warnings.setdefault(subject, []).append((line, text))
-
-    def _told(self, found: list[tuple[int, str]]) -> str:
-        line, text = found[0]
-        others = len(found) - 1
-        more = f" (and so in {others} more row{'s' if others > 1 else ''})" if others else ""
-        return f"{self.name}:{line}: {text}{more}"
+            self.table.warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
 
 
 def _vector(parts: Vector) -> str:

@@ -5,18 +5,71 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from nutdamp.epoch import Epoch
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.yaml_tree import KeyPath
+from nutdamp.physics import attitude
+
+Vector = NDArray[np.float64]
+
+ALONG = 1e-3
+"""rad from the spin axis, up to which the Sun counts as along it."""
 
 NO_ATTITUDE = "needs attitude, which says where the body points at t = 0"
 
 
-def sky_findings(facts: Facts) -> Iterator[Finding]:
-    """Everything wrong with ``sun`` and ``keep``."""
+def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
+    """Everything wrong with ``sun``, ``keep`` and ``commands``.
+
+    ``axis`` (3,) is the axis in the body about which it spins at ``spin`` rad/s, or None where that cannot be read.
+    """
     yield from _sun(facts)
+    yield from _command_blocks(facts, spin, axis)
     for index, _ in facts.children("keep"):
         yield from _cone(facts, ("keep", index))
+
+
+def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
+    """What is wrong between sun_sensor and commands; ``axis`` (3,) is axis 3, and ``spin`` rad/s its rate."""
+    if facts.has("commands") and not facts.has("sun_sensor"):
+        yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
+    if facts.has("sun_sensor") and not facts.has("sun"):
+        yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
+    if spin is not None:
+        turn = 2.0 * math.pi / abs(spin)
+        longest, width = (facts.number("time", "commands", *path) for path in (("delay_max",), ("width", "max")))
+        for path, time in ((("delay_max",), longest), (("width", "max"), width)):
+            if time is not None and time >= turn:
+                problem = f"{time:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
+                yield Finding(("commands", *path), problem)
+        yield from _sun_in_view(facts, math.copysign(1.0, spin) * axis)
+    least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
+    if least is not None and most is not None and least > most:
+        yield Finding(("commands", "width", "min"), f"{least:g} s exceeds max; expected at most {most:g} s")
+
+
+def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
+    """A Sun that gives no pulse: along the spin ``axis`` (3,) in the body at t = 0, or out of the sensor's view."""
+    turned, sun = facts.vector("number", 4, "attitude", "quaternion"), facts.vector("angle", 2, "sun")
+    if not facts.has("sun_sensor") or turned is None or sun is None or not np.any(turned):
+        return
+    seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), attitude.on_sphere(*sun.tolist()))
+    angle = float(attitude.angle_between(seen, axis))
+    if min(angle, math.pi - angle) < ALONG:
+        yield Finding(("sun",), "lies along the spin axis at t = 0: then there is no Sun pulse to fire blocks by")
+        return
+    middle = facts.number("angle", "sun_sensor", "elevation") or 0.0
+    half_width = facts.number("angle", "sun_sensor", "half_width")
+    if half_width is not None and abs(0.5 * math.pi - angle - middle) > half_width:
+        low, high = (math.degrees(0.5 * math.pi - middle + side * half_width) for side in (-1.0, 1.0))
+        problem = (
+            f"never sees the Sun, which is {math.degrees(angle):.4g} deg from the spin axis at t = 0; "
+            f"it sees from {max(low, 0.0):.4g} to {min(high, 180.0):.4g} deg"
+        )
+        yield Finding(("sun_sensor",), problem, True)
 
 
 def _sun(facts: Facts) -> Iterator[Finding]:

@@ -19,7 +19,6 @@ from nutdamp.files.models import (
     DisturbanceSection,
     GoalSection,
     InertiaSection,
-    KeepSection,
     LimitsSection,
     RequirementSection,
     SpacecraftFile,
@@ -28,12 +27,14 @@ from nutdamp.files.models import (
 )
 from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
 from nutdamp.files.settings import Setting
+from nutdamp.files.sky_models import CommandsSection, KeepSection, SunSensorSection
 from nutdamp.files.yaml_tree import read_text
 from nutdamp.physics import attitude, sun
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import (
     Attitude,
     Channel,
+    Commands,
     Disturbance,
     Goal,
     Inertia,
@@ -42,6 +43,7 @@ from nutdamp.spacecraft import (
     Requirement,
     Spacecraft,
     Steerable,
+    SunSensor,
     Thruster,
 )
 
@@ -94,6 +96,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         goal=_goal(contents.goal, spacecraft),
         sun=sunward,
         keep=tuple(_keep(entry, sunward) for entry in contents.keep),
+        sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
+        commands=_commands(contents.commands),
     )
 
 
@@ -207,6 +211,29 @@ def _keep(section: KeepSection, sunward: Vector | None) -> Keep:
     direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
     assert direction is not None
     return Keep(section.name, direction, section.min or 0.0, math.pi if section.max is None else section.max)
+
+
+def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | None:
+    if section is None:
+        return None
+    azimuth = section.azimuth
+    if not np.array_equal(axes, np.eye(3)):
+        first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        azimuth = math.atan2(second, first)
+    return SunSensor(azimuth, section.elevation, section.half_width, section.jitter)
+
+
+def _commands(section: CommandsSection | None) -> Commands | None:
+    if section is None:
+        return None
+    given, step = section.width, None
+    if isinstance(given, list):
+        widths = np.unique(given)
+    else:
+        step = given.step
+        widths = given.min + step * np.arange(math.floor((given.max - given.min) / step * (1.0 + 1e-12)) + 1)
+    every = tuple(sorted(set(section.every)))
+    return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
 
 def _limits(section: LimitsSection | None) -> Limits:

@@ -16,6 +16,7 @@ from nutdamp.decision import decide
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Comparison, Plan
 from nutdamp.presentation import verdicts
+from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.decisions import decision_screen
 from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, spin_text
 from nutdamp.presentation.layout import columns, facts
@@ -35,7 +36,10 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     if decided is None:
         parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
         return Group(*parts, *found)
-    found += [Text(), pulse_table(decided.plan)] if len(decided.plan.pulses) else []
+    if decided.plan.pulses.blocks:
+        found += [Text(), blocks_screen(decided.plan.flight)]
+    elif len(decided.plan.pulses):
+        found += [Text(), pulse_table(decided.plan)]
     return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *found)
 
 

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from nutdamp.aspect import aspects
 from nutdamp.flight import Flight
+from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import channel_text, header
@@ -27,6 +28,8 @@ def simulation_screen(
     if len(flight.schedule) < pulses:
         begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
         parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
+    if flight.schedule.blocks:
+        parts += [Text(), blocks_screen(flight)]
     if len(flight.schedule):
         parts += [Text(), _pulses(flight)]
     parts += [Text(), _ends(impulses, flown, found.until)]

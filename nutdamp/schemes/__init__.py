@@ -15,7 +15,18 @@ from typing import TYPE_CHECKING, cast
 from nutdamp.arguments import shown
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.options import LEAST, Options, SchemeOptions
-from nutdamp.schemes.registry import CLASSIC, COMPARED, NAMES, PLANNED, POINTING, SCHEMES, SPINNING, SUNLIT, Scheme
+from nutdamp.schemes.registry import (
+    CLASSIC,
+    COMMANDED,
+    COMPARED,
+    NAMES,
+    PLANNED,
+    POINTING,
+    SCHEMES,
+    SPINNING,
+    SUNLIT,
+    Scheme,
+)
 
 if TYPE_CHECKING:  # so that the command line can know the names without loading numpy
     from nutdamp.schedule import Schedule
@@ -24,6 +35,7 @@ if TYPE_CHECKING:  # so that the command line can know the names without loading
 
 __all__ = [
     "CLASSIC",
+    "COMMANDED",
     "COMPARED",
     "LEAST",
     "NAMES",
@@ -66,7 +78,10 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     from nutdamp.schemes.tools.symmetric_model import model_of
 
     scheme = SCHEMES[name]
-    chosen, model = options_of(scheme, options), model_of(spacecraft)
+    chosen = options_of(scheme, options)
+    if scheme.on_true_body:
+        return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
+    model = model_of(spacecraft)
 
     def planned(body: Spacecraft) -> Schedule:
         return cast("Schedule", _loaded(scheme).schedule(body, chosen))

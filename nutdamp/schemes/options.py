@@ -117,9 +117,19 @@ class FourPulseOptions(SchemeOptions):
 class HalfConeOptions(SchemeOptions):
     """What may be chosen of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
 
-    cones: int | None = _option(
-        None, COUNT, "How many half cones; default: the fewest of which one more would save less than 1 %."
-    )
+    cones: int | None = _option(None, COUNT, "Half cones; default: until one more saves less than 1 %.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandBlockOptions(SchemeOptions):
+    """What may be chosen of command-block; ``max_blocks`` None: three, of which as few are used as will do."""
+
+    max_blocks: int | None = _option(None, COUNT, "Largest number of command blocks; default 3.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """What is commanded is what is fired."""
+        return True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,10 +153,10 @@ class OptimalOptions(SchemeOptions):
     least: str = _option(
         LEAST[0],
         Kind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
-        "What to save; impulse where propellant is unknown.",
+        "What to save; impulse if propellant is unknown.",
     )
     free_axis: bool = _option(False, FLAG, "Let the angular momentum end anywhere.")
-    shift: float | None = _option(None, ANGLE, "How far from its target the angular momentum may end, such as 0.2deg.")
+    shift: float | None = _option(None, ANGLE, "How far from its target H may end, such as 0.2deg.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -160,7 +170,15 @@ class OptimalOptions(SchemeOptions):
         return self.free_axis
 
 
-KINDS = (SchemeOptions, FourPulseOptions, TwoPulseOptions, HalfConeOptions, RhumbLineOptions, OptimalOptions)
+KINDS = (
+    SchemeOptions,
+    FourPulseOptions,
+    TwoPulseOptions,
+    HalfConeOptions,
+    RhumbLineOptions,
+    CommandBlockOptions,
+    OptimalOptions,
+)
 
 Chosen = TypeVar("Chosen", bound=SchemeOptions)
 

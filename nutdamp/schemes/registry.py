@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nutdamp.schemes.options import (
+    CommandBlockOptions,
     FourPulseOptions,
     HalfConeOptions,
     OptimalOptions,
@@ -22,7 +23,9 @@ class Scheme:
     none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
     to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
     function ``alternatives`` too, of schedules about as good. ``body_fixed``: fires channels of
-    the file only, no steerable torquer. ``slow``: may take seconds.
+    the file only, no steerable torquer. ``reads_commands``: makes blocks of the ``commands``
+    of the file, and is planned where there are some. ``on_true_body``: needs no symmetric model. ``slow``: may take
+    seconds.
     """
 
     name: str
@@ -36,6 +39,8 @@ class Scheme:
     sets_spin: bool = False
     weighs_alternatives: bool = False
     body_fixed: bool = False
+    reads_commands: bool = False
+    on_true_body: bool = False
     slow: bool = False
 
 
@@ -65,10 +70,22 @@ RHUMB_LINE = Scheme(
     reads_sun=True,
     body_fixed=True,
 )
+COMMAND_BLOCK = Scheme(
+    "command-block",
+    "nutdamp.schemes.command_block",
+    CommandBlockOptions,
+    reads_commands=True,
+    on_true_body=True,
+    body_fixed=True,
+    slow=True,
+)
 NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
 """Free motion, for comparison."""
 
-SCHEMES = {scheme.name: scheme for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, NONE)}
+SCHEMES = {
+    scheme.name: scheme
+    for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, COMMAND_BLOCK, NONE)
+}
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
@@ -78,3 +95,4 @@ POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda o
 """In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
+COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)

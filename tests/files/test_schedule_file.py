@@ -16,7 +16,7 @@ from process import Run
 
 from nutdamp import flight, planning
 from nutdamp.errors import FaultyFile
-from nutdamp.files import schedule_file
+from nutdamp.files import table
 from nutdamp.files.examples import example_text
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.files.schedule_file import read_pulses
@@ -231,10 +231,10 @@ def test_schemes_plan_no_pulse_that_the_clock_cannot_tell(late: float) -> None:
 def test_a_schedule_that_is_no_schedule_by_its_size_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "huge.csv"
     with path.open("wb") as stream:
-        stream.truncate(schedule_file.MOST_BYTES + 1)
+        stream.truncate(table.MOST_BYTES + 1)
     with pytest.raises(FaultyFile, match="larger than 32 MiB"):
         read_pulses(path, EXAMPLE)
-    monkeypatch.setattr(schedule_file, "MOST_PULSES", 3)
+    monkeypatch.setattr(table, "MOST_ROWS", 3)
     rows = "".join(f"{start},0.5,+M1\n" for start in range(4))
     assert problems(f"start_s,on_time_s,channel\n{rows}", tmp_path) == ["5: : more than 3 pulses"]
 

@@ -1,0 +1,57 @@
+"""What a spinner is commanded with: a Sun sensor that starts the clock of each spin, and blocks of pulses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class SunSensor:
+    """Gives a pulse in each spin, when the Sun passes its ``azimuth``: rad in the body, about axis 3 from axis 1.
+
+    It sees the Sun at most ``half_width`` rad from ``elevation``, which is counted from the plane square to axis 3
+    towards the spin axis. ``jitter`` s is one sigma of its pulses.
+    """
+
+    azimuth: float
+    elevation: float = 0.0
+    half_width: float = 0.5 * math.pi
+    jitter: float = 0.0
+
+    def sees(self, sun_angle: float) -> bool:
+        """Whether it sees the Sun at this angle (rad) from the spin axis."""
+        return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Commands:
+    """What a block may hold: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
+    ``max_count`` pulses, one in ``every`` so many spins.
+    """
+
+    delay_step: float
+    delay_max: float
+    widths: NDArray[np.float64]
+    max_count: int
+    every: tuple[int, ...]
+    width_step: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """``count`` pulses of ``channel``, each ``width`` s long and begun ``delay`` s after a Sun pulse.
+
+    ``first`` is the number of the Sun pulse of the first one, 1 the first after t = 0; from then on every
+    ``every``-th Sun pulse fires one.
+    """
+
+    channel: str
+    first: int
+    delay: float
+    width: float
+    count: int
+    every: int = 1

@@ -1,0 +1,64 @@
+"""Command blocks as an operator loads them, and what they do to Sun angle, spin and nutation."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
+from nutdamp.presentation.end_tables import spin_text
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.text import degrees, mass, moment
+from nutdamp.spacecraft import Spacecraft, Vector
+
+
+def blocks_screen(flown: Flight) -> RenderableType:
+    """The blocks of a flown schedule, and its figures before and after."""
+    return Group(Text("Command blocks", style="bold"), _blocks(flown), Text(), _effects(flown))
+
+
+def _blocks(flown: Flight) -> Table:
+    body, commands = flown.spacecraft, flown.spacecraft.commands
+    names = ("block", "channel", "first Sun", "delay", "", "", "width", "", "pulses", "every")
+    units = ("", "", "pulse", "s", "counts", "deg", "s", "counts", "", "spin")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    for index, block in enumerate(flown.schedule.blocks, start=1):
+        table.add_row(
+            str(index),
+            block.channel,
+            str(block.first),
+            f"{block.delay:.6g}",
+            "" if commands is None else str(round(block.delay / commands.delay_step)),
+            f"{math.degrees(block.delay * abs(body.spin)):.2f}",
+            f"{block.width:.6g}",
+            "" if commands is None or commands.width_step is None else str(round(block.width / commands.width_step)),
+            str(block.count),
+            str(block.every),
+        )
+    return table
+
+
+def _effects(flown: Flight) -> Table:
+    body, made, final = flown.spacecraft, flown.schedule, flown.final
+    before, after = flown.around_pulses()
+    table = facts()
+    for name, pulse in (("first pulse", made.pulses[0]), ("last pulse", made.pulses[-1])):
+        dated = body.utc(pulse.start, 3)
+        table.add_row(name, f"starts at {moment(pulse.start)}" + (f", {dated}" if dated else ""))
+    table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
+    table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
+    largest = float(max(before.nutation.max(), after.nutation.max()))
+    table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
+    used = made.propellant
+    left = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
+    table.add_row("propellant", f"{mass(used)}{left}")
+    return table
+
+
+def _sun_angle(body: Spacecraft, direction: Vector) -> str:
+    assert body.sun is not None
+    return degrees(float(attitude.angle_between(direction, body.sun)))

@@ -1,0 +1,306 @@
+"""Blocks of pulses as spinners are commanded: channel, delay after the Sun pulse, width, number of pulses.
+
+All blocks that can be commanded are looked at in closed form (`tools.block_model`): of one block every channel, width,
+number of pulses and interval, each at the delays next to the two that serve best, one for the heading of H and one for
+the nutation. Where one does not do, a second and a third are looked for behind the most promising. The best dozen are
+flown from the Sun pulses of the nutating body, and the best of these is the schedule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import compliance, flight, work
+from nutdamp.commands import Block, Commands
+from nutdamp.compliance import Part
+from nutdamp.errors import Infeasible
+from nutdamp.limits import usable
+from nutdamp.outcome import left_by
+from nutdamp.physics.sun_train import phasor_sum
+from nutdamp.schedule import Schedule
+from nutdamp.schemes.options import CommandBlockOptions
+from nutdamp.schemes.tools.block_model import BlockModel, State, Trial
+from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.schemes.tools.sun_pulses import fired
+from nutdamp.spacecraft import Channel, Spacecraft
+
+Array = NDArray[np.float64]
+
+FLOWN = 12
+"""Sequences of blocks that are flown."""
+
+AROUND = (0, 1)
+"""Steps of the delay that are looked at, from the one below the best delay."""
+
+WAITS, LATER_WAITS = 24, 12
+"""Sun pulses that may pass before a first and before a later block, so that its nutation meets the one before."""
+
+MOST_WIDTHS = 24
+"""Widths that are looked at for a second and a third block, where more can be commanded."""
+
+SHARES = np.linspace(0.0, 1.0, 13)[1:]
+"""Shares of the way that a first block may go, where others follow."""
+
+FIRST = 48
+"""First blocks behind which others are looked for."""
+
+BLOCKS = 3
+"""Blocks of a schedule, at most."""
+
+FLOWN_PULSES = 1000
+"""Pulses that are flown, after which no further sequence is."""
+
+SURELY = 3.0
+"""Times its error by which the length of a block that ends at the target differs from the way there, at most."""
+
+LOOKED = 2e-6
+"""Units of `work` of a block that is looked at."""
+
+
+class Found(NamedTuple):
+    """Blocks, the motion after them in closed form, and how good that is: the less, the better (`Search.rank`)."""
+
+    blocks: tuple[Block, ...]
+    state: State
+    rank: tuple[float, float]
+
+
+def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
+    """The blocks that meet the requirement with the least propellant, else those that leave least.
+
+    ``options.max_blocks``: how many there may be. Raises Infeasible with the reason.
+    """
+    commands = spacecraft.commands
+    if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
+        raise Infeasible("the file says nothing of commands: it needs the keys sun, sun_sensor and commands")
+    channels = usable(spacecraft)
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    search = Search(spacecraft, channels, commands)
+    flights, pulses = [], 0
+    for found in search.best(options.max_blocks or BLOCKS):
+        one = search.flown(found)
+        if one is not None:
+            flights.append(one)
+            pulses += len(one[1])
+        if pulses > FLOWN_PULSES:
+            break
+    if not flights:
+        raise Infeasible("no block that can be commanded ends within the horizon; a longer limits.horizon may help")
+    _, made, chosen = min(flights, key=lambda one: one[0])
+    return replace(made, notes=(search.note(chosen, made),))
+
+
+class Search:
+    """The blocks of one spacecraft: which there are, and how good they are."""
+
+    def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
+        self.body, self.channels, self.commands = spacecraft, channels, commands
+        self.model = BlockModel(spacecraft)
+        self.bounds = compliance.bounds(spacecraft)
+        self.looked = 0
+
+    def best(self, most: int) -> list[Found]:
+        """The best few sequences of up to ``most`` blocks, those that are flown."""
+        start = Found((), self.model.start, (math.inf, math.inf))
+        found = self._single(start)
+        firsts = found
+        for number in range(2, most + 1):
+            if min((one.rank for one in found), default=(1.0,))[0] <= 0.0 or work.exhausted():
+                break
+            if number == 2:
+                firsts = [*sorted(found, key=lambda one: one.rank)[: FIRST // 2], *self._parts(start)]
+            firsts = [
+                more
+                for first in firsts[: FIRST if number == 2 else FIRST // 3]
+                for more in self._behind(first, self._rest(first), few=4)
+            ]
+            firsts.sort(key=lambda one: one.rank)
+            found += firsts
+        return sorted(found, key=lambda one: one.rank)[:FLOWN]
+
+    def flown(self, one: Found) -> tuple[tuple[float, float], Schedule, Found] | None:
+        """How good the blocks are when they are flown; None where they cannot be."""
+        try:
+            made = fired(self.body, one.blocks)
+        except Infeasible:
+            return None
+        if made.end > self.body.horizon or work.exhausted():
+            return None
+        left = left_by(flight.flown(self.body, made))
+        shares = max(held.left / held.bound.most for held in compliance.held(self.body, left))
+        return (0.0, made.cost) if shares <= 1.0 else (shares, made.cost), made, one
+
+    def note(self, chosen: Found, made: Schedule) -> str:
+        """What was looked at, and how far flight and closed form are apart, in words."""
+        form, flown = self.model.left(chosen.state), left_by(flight.flown(self.body, made))
+        apart = [
+            math.degrees(abs(float(getattr(form, part)) - float(getattr(flown, part)))) for part in ("nutation", "aim")
+        ]
+        one = len(chosen.blocks) == 1
+        scope = "no other single block" if one else f"no other sequence of the {self.looked:,} looked at"
+        return (
+            f"{scope} does better in closed form; flown from the Sun pulses of the nutating body, nutation differs "
+            f"by {apart[0]:.2g}° and the end of H by {apart[1]:.2g}°"
+        )
+
+    def _behind(self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN) -> Iterator[Found]:
+        """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``."""
+        number = 1
+        for block in before.blocks[-1:]:
+            number = block.first + (block.count - 1) * block.every + 1
+        spent = math.fsum(self._cost(block) for block in before.blocks)
+        for channel, trial in trials:
+            state = self.model.after(before.state, channel, trial)
+            left = self.model.left(state)
+            shape = np.shape(left.nutation)
+            self.looked += int(np.prod(shape))
+            work.spend(LOOKED * float(np.prod(shape)))
+            severity = np.max(np.broadcast_arrays(*(self._share(bound, left) for bound in self.bounds)), axis=0)
+            over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
+            severity = np.where(np.isnan(severity) | over, np.inf, severity)
+            cost = spent + self._rate(channel) * np.broadcast_to(trial.count * trial.width, shape)
+            failed = np.where(severity <= 1.0, 0.0, severity).ravel()
+            for index in np.lexsort((cost.ravel(), failed))[:few]:
+                if math.isfinite(failed[index]):
+                    at = np.unravel_index(index, shape)
+                    wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
+                    block = Block(channel.name, number + wait, delay, width, count, every)
+                    here = State(*(np.broadcast_to(part, shape)[at] for part in vars(state).values()))
+                    yield Found((*before.blocks, block), here, (float(failed[index]), float(cost.ravel()[index])))
+
+    def _share(self, bound: compliance.Bound, left: compliance.Left) -> Array:
+        return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
+
+    def _rate(self, channel: Channel) -> float:
+        return channel.cost_rate(by_propellant=True)
+
+    def _cost(self, block: Block) -> float:
+        channel = next(one for one in self.channels if one.name == block.channel)
+        return self._rate(channel) * block.count * block.width
+
+    def _widths(self, channel: Channel) -> Array:
+        """Those that can be commanded and that the channel allows."""
+        widths = self.commands.widths
+        return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
+
+    def _counts(self, start: State, every: int) -> NDArray[np.int64]:
+        """Numbers of pulses up to the horizon."""
+        most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
+        return np.arange(1, max(min(most, self.commands.max_count), 0) + 1)
+
+    def _single(self, start: Found) -> list[Found]:
+        """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
+
+        What surely ends worse than the best ones found is left out: see `_short_by`.
+        """
+        short = [
+            (channel, every, self._short_by(start.state, channel, every))
+            for channel in self.channels
+            for every in self.commands.every
+        ]
+        most = max((one.max() for _, _, one in short if one.size), default=0.0)
+        within = SURELY
+        while True:
+            trials = (
+                (channel, trial)
+                for channel, every, lacks in short
+                for trial in self._chosen(start.state, channel, every, np.argwhere(lacks <= within))
+            )
+            found = sorted(self._behind(start, trials), key=lambda one: one.rank)
+            enough = SURELY * max(found[0].rank[0], 1.0) if found else math.inf
+            if enough <= within or within >= most or work.exhausted():
+                return found
+            within = min(enough, 10.0 * within, most)
+
+    def _short_by(self, state: State, channel: Channel, every: int) -> Array:
+        """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
+
+        With a target the length of the rhumb line: a block that is longer or shorter than the way ends no nearer than
+        a third of the difference. Without one the nutation, which they can lower by the sum of their kicks at most.
+        """
+        widths, counts = self._widths(channel)[:, None], self._counts(state, every)[None, :]
+        bounds = {bound.part: bound.most for bound in self.bounds}
+        if self.body.goal.axis is None:
+            kick = abs(channel.transverse) * widths
+            kicks = kick * np.abs(phasor_sum(counts, self.model.rate * self.body.spin * every * self.model.turn))
+            left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
+            return np.asarray(np.maximum(left, 0.0) / bounds[Part.NUTATION])
+        way = float(self.model.course(state)[1])
+        length = counts * self.model.turned_by(channel, widths, self.body.spin)
+        return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
+
+    def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
+        """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
+        if len(index):
+            widths, counts = self._widths(channel)[index[:, 0]], self._counts(state, every)[index[:, 1]]
+            for wait in range(WAITS if abs(state.phasor) > 0.0 else 1):
+                yield self._at_delays(state, channel, wait, widths, counts, every)
+
+    def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
+        """Blocks that go the rest of the way, or take the nutation that is left."""
+        state = before.state
+        _, way = self.model.course(state)
+        for channel in self.channels:
+            widths = _spread(self._widths(channel), MOST_WIDTHS)
+            if not len(widths):
+                continue
+            step = self.model.turned_by(channel, widths, float(state.spin))
+            near = np.rint(float(way) / step)[:, None] + np.arange(-1, 2)
+            few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
+            counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
+            for every in self.commands.every:
+                for wait in range(LATER_WAITS):
+                    yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
+
+    def _parts(self, start: Found) -> Iterator[Found]:
+        """First blocks that go a part of the way to the target."""
+        heading, way = self.model.course(start.state)
+        if self.body.goal.axis is None:
+            return
+        for channel in self.channels:
+            widths = _spread(self._widths(channel), 3)
+            for width in widths.tolist():
+                step = float(self.model.turned_by(channel, width, float(start.state.spin)))
+                counts = np.unique(np.rint(SHARES * float(way) / step).clip(1, self.commands.max_count).astype(int))
+                delay = self._commanded(self.model.delay(channel, heading, width))
+                for count in counts.tolist():
+                    trial = Trial(0, delay, width, count, self.commands.every[0])
+                    yield from self._behind(start, iter([(channel, trial)]), few=1)
+
+    def _at_delays(
+        self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
+    ) -> Trial:
+        """The blocks at the delays that serve the heading best, and at those that serve the nutation best."""
+        widths, counts = np.broadcast_arrays(widths, counts)
+        chosen = []
+        if self.body.goal.axis is not None:
+            heading, _ = self.model.course(state)
+            chosen.append(self.model.delay(channel, heading, widths))
+        if abs(state.phasor) > 0.0:
+            chosen.append(self.model.damping_delay(state, channel, Trial(wait, 0.0, widths, counts, every)))
+        if not chosen:
+            chosen.append(np.zeros(widths.shape))
+        steps = np.concatenate(
+            [np.floor(delay / self.commands.delay_step)[..., None] + AROUND for delay in chosen], axis=-1
+        )
+        delay = self._commanded(steps * self.commands.delay_step)
+        return Trial(wait, delay, widths[..., None], counts[..., None], every)
+
+    def _commanded(self, delay: Array) -> Array:
+        """The nearest delay that can be commanded."""
+        step = self.commands.delay_step
+        most = math.floor(self.commands.delay_max / step * (1.0 + 1e-12))
+        return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
+
+
+def _spread(values: Array, most: int) -> Array:
+    """At most so many of the ``values``, evenly."""
+    index = np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int))
+    return np.asarray(values[index])
