@@ -1,0 +1,104 @@
+"""Command blocks in files: what `plan` writes is what `simulate` fires, and faults of edited ones have their place."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+from process import Run
+
+from nutdamp.errors import FaultyFile
+from nutdamp.files.blocks_csv import HEADER, read_blocks
+from nutdamp.files.spacecraft_file import read_spacecraft
+
+FILE = """
+name: Spinner
+mass: 300 kg
+inertia: {A: 120 kg m^2, C: 180 kg m^2}
+state: {spin: 12 rpm, nutation: 0 deg}
+attitude: {epoch: 1998-01-07T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+thrusters:
+  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, max_on_time: 2 s}
+sun: epoch
+sun_sensor: {azimuth: 35 deg}
+commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, every: [1, 2]}
+limits: {horizon: 1200 s}
+requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
+"""
+CRAFT = read_spacecraft(FILE, "f.yaml")
+TOP = "channel,first_sun_pulse,delay_s,width_s,count\n"
+GOAL = ("--target", "20deg,82deg")
+
+
+def problems(text: str, folder: Path) -> list[str]:
+    path = folder / "blocks.csv"
+    path.write_text(text)
+    with pytest.raises(FaultyFile) as caught:
+        read_blocks(path, CRAFT)
+    return [f"{fault.line}: {fault.where}: {fault.problem}" for fault in caught.value.faults]
+
+
+def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
+    made = run("plan", "-", *GOAL, "--blocks", "blocks.csv", "--csv", "pulses.csv", stdin=FILE)
+    assert made.returncode == 0, made.stderr
+    for text in (
+        "Recommended: command-block",
+        "first Sun",
+        "Sun angle of H",
+        "no other single block",
+        "mass 300 kg to",
+    ):
+        assert text in made.stdout
+    text = (tmp_path / "blocks.csv").read_text()
+    (row,) = csv.DictReader(io.StringIO(text))
+    assert tuple(row) == HEADER
+    assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
+    assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
+    assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))
+    pulses = list(csv.DictReader(io.StringIO((tmp_path / "pulses.csv").read_text())))
+    assert row["first_utc"] == pulses[0]["utc"]
+    assert len(pulses) == int(row["count"])
+    fired = run("simulate", "-", *GOAL, "--blocks", "blocks.csv", "--json", "end.json", stdin=FILE)
+    assert fired.returncode == 0, fired.stderr
+    assert f"{float(pulses[-1]['t_s']):.4f}" in fired.stdout
+    assert "warning" not in fired.stderr
+
+
+def test_an_edited_block_is_fired_and_what_cannot_be_commanded_is_named(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "blocks.csv").write_text(TOP + "T1,3,1.001,0.1,4\nT1,20,1.5,0.1,300\n")
+    done = run("simulate", "-", "--blocks", "blocks.csv", stdin=FILE)
+    assert done.returncode == 0
+    assert "blocks.csv:2: delay_s is none of the commands of the spacecraft file: flown as given" in done.stderr
+    assert "blocks.csv:3: count is none of the commands" in done.stderr
+    assert "304" in done.stdout
+
+
+def test_all_faults_of_a_file_are_listed(tmp_path: Path) -> None:
+    rows = "T2,1,1,0.1,4\nT1,0,-1,0,1.5\nT1,4,1,0.1,10\nT1,8,1,0.1,2\nT1,30,x,0.1,1\n"
+    assert problems(TOP + rows, tmp_path) == [
+        "2: channel: the spacecraft file has no channel 'T2'; it has 'T1'",
+        "3: delay_s: -1 s is negative; expected a time of at least 0",
+        "3: width_s: 0 s fires nothing; expected a time above 0",
+        "3: first_sun_pulse: expected a whole number from 1 to 100000, got 0",
+        "3: count: expected a whole number from 1 to 100000, got 1.5",
+        "5: first_sun_pulse: Sun pulse 8 comes before the block before is over; expected 14 or later",
+        "6: delay_s: 'x' is not a number",
+    ]
+    assert problems("channel,delay\nT1,1\n", tmp_path)[0] == "1: first_sun_pulse: the column is missing"
+
+
+def test_schemes_without_blocks_write_none(run: Run, tmp_path: Path) -> None:
+    done = run("plan", "-", *GOAL, "--scheme", "rhumb-line", "--blocks", "blocks.csv", stdin=FILE)
+    assert done.returncode == 2
+    assert "makes no command blocks" in done.stderr
+    assert not (tmp_path / "blocks.csv").exists()
+
+
+def test_blocks_need_a_sun_pulse(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "blocks.csv").write_text(TOP.replace("\n", ",every\n") + "+M1,1,0.1,0.1,4,\n")
+    done = run("simulate", "--blocks", "blocks.csv")
+    assert done.returncode == 3
+    assert "sun_sensor" in done.stderr
+    assert run("simulate", "--blocks", "blocks.csv", "--scheme", "none").returncode == 2

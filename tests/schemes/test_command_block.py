@@ -1,0 +1,293 @@
+"""Command blocks: their closed form, the Sun pulses of the nutating body, and the search, by independent means."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference
+from builders import aimed, channel, cross, spinner
+from numpy.typing import NDArray
+from samples import some
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from nutdamp import compliance, flight, planning, remarks
+from nutdamp.commands import Block
+from nutdamp.errors import Infeasible
+from nutdamp.outcome import left_by
+from nutdamp.physics import attitude, sun_train
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options
+from nutdamp.schemes.command_block import Search
+from nutdamp.schemes.tools.block_model import BlockModel, Trial
+from nutdamp.schemes.tools.sun_pulses import fired, sun_pulses
+from nutdamp.spacecraft import Commands, Limits, Requirement, Spacecraft, SunSensor
+
+Array = NDArray[np.float64]
+
+
+def commanded(body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 500, widths: int = 40) -> Spacecraft:
+    """The body with a Sun, a sensor, and blocks of delays and widths in steps of a spin turn over ``grid``."""
+    turn = 2.0 * math.pi / abs(body.spin)
+    commands = Commands(
+        turn / grid, turn * (1.0 - 1.0 / grid), np.arange(4.0, 4.0 + widths) * (turn / 400), 255, (1, 2)
+    )
+    return replace(
+        body,
+        sun=sun / np.linalg.norm(sun),
+        sun_sensor=SunSensor(azimuth),
+        commands=commands,
+        limits=Limits(horizon=600.0 * turn),
+    )
+
+
+def some_body(seed: int, *, target: bool = True) -> Spacecraft:
+    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away; the Sun is not near its axis."""
+    rng = np.random.default_rng(seed)
+    A, spin = 100.0, rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 3.0)
+    C = A * rng.choice([rng.uniform(0.4, 0.85), rng.uniform(1.15, 1.9)])
+    turn = rng.uniform(1.0, 60.0)
+    torque = C * spin**2 * math.radians(turn) * rng.uniform(0.15, 1.0)
+    body = spinner(A, C, spin, rng.choice([0.0, 0.0, 0.3]), rng.uniform(0.0, 6.0), channels=cross(torque))
+    while True:
+        sun = rng.normal(size=3)
+        sun /= np.linalg.norm(sun)
+        aim = aimed(body, turn, rng.uniform(0.0, 360.0))
+        ends = [float(attitude.angle_between(sun, axis)) for axis in (aim.momentum, aim.target_axis)]
+        if min(*ends, *(math.pi - end for end in ends)) > 0.4:
+            return commanded(aim if target else body, sun, rng.uniform(-3.0, 3.0))
+
+
+# --- by an integrator that shares nothing ----------------------------------------------------------------------------
+
+
+def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[reference.Motion, list[float]]:
+    """The motion after the last pulse, and when each began: Euler's equations, Sun pulses as their roots."""
+    moments = np.asarray(body.inertia.moments)
+    torques = {one.name: one.torque for one in body.channels}
+    assert body.sun is not None
+    assert body.sun_sensor is not None
+    sun, mark = body.sun, body.sun_sensor.azimuth
+    state = np.concatenate([body.omega0, attitude.matrix(body.initial.quaternion).ravel()])
+    now, passed, last, starts = 0.0, 0, -1.0, []
+    turn = 2.0 * math.pi / abs(body.spin)
+
+    def slope(_: float, y: Array, torque: Array) -> Array:
+        w, rotation = y[:3], y[3:].reshape(3, 3)
+        cross_ = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        return np.concatenate([(torque - cross_ @ (moments * w)) / moments, (rotation @ cross_).ravel()])
+
+    def behind(y: Array) -> float:
+        """Sine of the angle by which the Sun is past the sensor, and positive cosine near it."""
+        seen = y[3:].reshape(3, 3).T @ sun
+        return float(math.cos(mark) * seen[1] - math.sin(mark) * seen[0])
+
+    def before(y: Array) -> bool:
+        seen = y[3:].reshape(3, 3).T @ sun
+        return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
+
+    def move(until: float, torque: Array) -> list[float]:
+        """Sun pulses on the way; ``state`` and ``now`` go on."""
+        nonlocal state, now
+        found = solve_ivp(
+            slope, (now, until), state, method="DOP853", rtol=1e-11, atol=1e-13, args=(torque,), dense_output=True
+        )
+        at = found.sol
+        assert at is not None
+        grid = np.linspace(now, until, max(int(48 * (until - now) / turn), 4) + 1)
+        values = [behind(at(t)) for t in grid]
+        roots = [
+            brentq(lambda t: behind(at(t)), *edge, xtol=1e-13)
+            for edge, pair in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
+            if pair[0] * pair[1] < 0.0 and before(at(edge[0]))
+        ]
+        state, now = found.y[:, -1], until
+        return [float(root) for root in roots]
+
+    none, due = np.zeros(3), {}
+    for block in blocks:
+        due.update({block.first + k * block.every: block for k in range(block.count)})
+    while due:
+        for root in move(now + 0.05 * turn, none) if min(due) > passed else []:
+            if root > last + 0.3 * turn:
+                passed, last = passed + 1, root
+        if passed >= min(due):
+            block = due.pop(min(due))
+            starts.append(last + block.delay)
+            seen = move(starts[-1], none) if starts[-1] > now else []
+            assert now <= starts[-1] + 1e-12
+            seen += move(starts[-1] + block.width, torques[block.channel])
+            for root in seen:
+                if root > last + 0.3 * turn:
+                    passed, last = passed + 1, root
+    return reference.Motion(state[:3], state[3:].reshape(3, 3)), starts
+
+
+def check_against_reference(body: Spacecraft, blocks: tuple[Block, ...]) -> None:
+    made = fired(body, blocks)
+    motion, starts = flown_by_reference(body, blocks)
+    assert [one.start for one in made] == pytest.approx(starts, abs=1e-8)
+    settled = flight.flown(body, made).settled
+    assert settled.rates == pytest.approx(motion.rates, abs=1e-7 * abs(body.spin))
+    assert reference.turned(attitude.matrix(settled.quaternion), motion.rotation) < 1e-7
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3, 5])
+def test_blocks_fire_from_the_sun_pulses_of_the_nutating_body(seed: int) -> None:
+    body = some_body(seed)
+    turn = 2.0 * math.pi / abs(body.spin)
+    late = Block("+1", 2, 0.96 * turn, 0.07 * turn, 4, 1)  # still on when the next Sun pulse comes
+    check_against_reference(body, (late, Block("-2", 9, 0.3 * turn, 0.02 * turn, 3, 2)))
+
+
+def test_with_three_moments_and_an_axial_torque_too() -> None:
+    body = spinner(moments=(110.0, 95.0, 150.0), spin=-2.0, degrees=1.0, channels=(channel("T", 8.0, 3.0, 2.0),))
+    check_against_reference(commanded(body, np.array([1.0, 0.3, -0.4])), (Block("T", 1, 0.5, 0.2, 6, 1),))
+
+
+def test_without_nutation_a_sun_pulse_comes_every_turn() -> None:
+    body = commanded(spinner(degrees=0.0, spin=-3.0), np.array([1.0, 1.0, 0.5]), azimuth=2.0)
+    found = sun_pulses(flight.flown(body, Schedule(), 20.0), 20.0)
+    assert np.diff(found) == pytest.approx(2.0 * math.pi / 3.0, rel=1e-12)
+    assert len(found) == 10
+
+
+def test_a_sun_out_of_view_gives_no_pulse() -> None:
+    body = commanded(spinner(degrees=0.0, channels=cross(8.0)), np.array([1.0, 0.0, 0.2]))
+    blind = replace(body, sun_sensor=SunSensor(0.0, elevation=1.2, half_width=0.3))
+    with pytest.raises(Infeasible, match="does not see the Sun"):
+        fired(blind, (Block("+1", 1, 0.1, 0.1, 2),))
+
+
+# --- the closed form -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
+def test_a_rhumb_line_is_the_solution_of_its_equations(heading: float) -> None:
+    """dγ/ds = cos χ, dλ/ds = sin χ/sin γ, and its meridian turns by cos γ dλ."""
+
+    def slope(_: float, y: Array) -> list[float]:
+        return [math.cos(heading), math.sin(heading) / math.sin(y[0]), math.sin(heading) / math.tan(y[0])]
+
+    expected = solve_ivp(slope, (0.0, 0.7), [1.2, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert [float(one) for one in sun_train.rhumb_end(1.2, heading, 0.7)] == pytest.approx(expected, abs=1e-10)
+
+
+def test_a_rhumb_line_past_the_sun_ends_nowhere() -> None:
+    assert math.isnan(float(sun_train.rhumb_end(0.3, math.pi, 0.4).sun_angle))
+
+
+@pytest.mark.parametrize("step", [0.3, 0.0, 2 * math.pi, 4 * math.pi, -2 * math.pi, math.pi, 7.1])
+def test_phasors_of_a_train_add_up(step: float) -> None:
+    for count in (1, 2, 5, 8):
+        expected = sum(np.exp(1j * number * step) for number in range(count))
+        assert abs(sun_train.phasor_sum(count, step) - expected) < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    body, blocks, number = some_body(seed), [], 1
+    model = BlockModel(body)
+    state, turn = model.start, 2.0 * math.pi / abs(body.spin)
+    width = 0.02 * turn * math.radians(0.3) / float(model.turned_by(body.channels[0], 0.02 * turn, body.spin))
+    for _ in range(2):
+        chosen = body.channels[rng.integers(4)]
+        trial = Trial(int(rng.integers(3)), rng.uniform(0, 0.8) * turn, width, int(rng.integers(1, 12)), 1)
+        blocks.append(Block(chosen.name, number + trial.wait, trial.delay, width, trial.count, 1))
+        number += trial.wait + trial.count
+        state = model.after(state, chosen, trial)
+    form, flown = model.left(state), left_by(flight.flown(body, fired(body, blocks)))
+    # Pulses turn H by 0.3 deg or less: what is left out is of second order in that.
+    assert float(form.nutation) == pytest.approx(flown.nutation, abs=math.radians(0.03))
+    assert float(form.aim) == pytest.approx(flown.aim, abs=math.radians(0.03))
+
+
+# --- the search ------------------------------------------------------------------------------------------------------
+
+
+def scanned(body: Spacecraft) -> tuple[float, float]:
+    """How good the best single block of the whole grid is in closed form: share of a bound used up, then cost."""
+    model, bounds, commands = BlockModel(body), compliance.bounds(body), body.commands
+    assert commands is not None
+    best = (math.inf, math.inf)
+    delays = commands.delay_step * np.arange(round(commands.delay_max / commands.delay_step) + 1)
+    for one, every, wait in itertools.product(body.channels, commands.every, range(24 if body.transverse_rate else 1)):
+        trial = Trial(
+            wait, delays[:, None, None], commands.widths[:, None], np.arange(1, commands.max_count + 1), every
+        )
+        left = model.left(model.after(model.start, one, trial))
+        shares = np.max([compliance.left_of(bound.part, left, body) / bound.most for bound in bounds], axis=0)
+        shares = np.where(np.isnan(shares), np.inf, shares)
+        cost = np.broadcast_to(trial.width * trial.count * one.strength, shares.shape)
+        failed = np.where(shares <= 1.0, 0.0, shares)
+        index = np.lexsort((cost.ravel(), failed.ravel()))[0]
+        best = min(best, (float(failed.ravel()[index]), float(cost.ravel()[index])))
+    return best
+
+
+@pytest.mark.parametrize("seed", some(range(12), always=3))
+def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
+    body = some_body(seed, target=seed % 4 != 3)
+    body = body if seed % 4 != 3 else replace(body, omega0=np.array([0.02, 0.01, 1.0]) * body.spin)
+    commands = body.commands
+    assert commands is not None
+    turn = 2.0 * math.pi / abs(body.spin)
+    body = replace(
+        body,
+        commands=Commands(turn / 60, turn * 59 / 60, commands.widths[::8], 30, (1, 2)),
+        requirement=Requirement(math.radians(0.5), math.radians(0.5) if seed % 4 != 3 else None),
+    )
+    assert body.commands is not None
+    found = Search(body, body.channels, body.commands).best(1)
+    assert found[0].rank == pytest.approx(scanned(body), rel=1e-9)
+
+
+def outcome(seed: int) -> tuple[float, float]:
+    """Turn, and how far the reference is from what the plan says, rad; asserts that the pulses are the same."""
+    body = replace(some_body(seed), requirement=Requirement(math.radians(1.0), math.radians(0.3)))
+    plan = planning.plan(body, "command-block")
+    assert plan.feasible, remarks.infeasibility(plan)
+    assert 1 <= len(plan.pulses.blocks) <= 3
+    motion, starts = flown_by_reference(body, plan.pulses.blocks)
+    assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
+    off = reference.angle(reference.momentum(body.inertia.moments, motion), body.target_axis)
+    assert plan.left is not None
+    return body.to_turn, abs(off - float(plan.left.aim))
+
+
+@pytest.mark.parametrize("seed", some(range(100), always=2))
+def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: int) -> None:
+    turn, off = outcome(seed)
+    assert off < 1e-3 * turn
+
+
+def test_more_blocks_where_one_does_not_do() -> None:
+    """Tight bounds: one block leaves more than is required; two or three do better, and --max-blocks keeps to one."""
+    body = replace(some_body(2), requirement=Requirement(math.radians(0.05), math.radians(0.05)))
+    plan, single = planning.plan(body, "command-block"), planning.plan(body, "command-block", one_block())
+    assert len(single.pulses.blocks) == 1
+    assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
+    assert plan.severity <= single.severity
+
+
+def one_block() -> Options:
+    return Options(max_blocks=1)
+
+
+def test_without_commands_the_scheme_says_which_keys_it_needs() -> None:
+    plan = planning.plan(aimed(spinner(channels=cross(8.0)), 5.0, 0.0), "command-block")
+    assert not plan.feasible
+    assert "sun, sun_sensor and commands" in remarks.infeasibility(plan)
+
+
+def test_it_is_compared_where_the_file_has_commands() -> None:
+    body = some_body(1)
+    assert "command-block" in planning.usual(body)
+    assert "command-block" in planning.usual(replace(body, goal=replace(body.goal, axis=None)))
+    assert "command-block" not in planning.usual(replace(body, commands=None))
