@@ -72,7 +72,7 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
         assert math.degrees(track.nutation.max()) == pytest.approx(said["nutation_deg"], rel=1e-4)
         for key in ("nutation_deg", "body_cone_deg", "space_cone_deg"):
             assert left[key] == pytest.approx(said[key], rel=1e-12)
-        assert f"{said['nutation_deg']:.3g}°" in title(made)
+        assert f"nutation at most {said['nutation_deg']:.4g} deg" in title(made)
         assert "at most" in title(made)
 
 
