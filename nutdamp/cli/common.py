@@ -155,6 +155,10 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
     return example_text(), "example.yaml"
 
 
+JITTER_SEED = 1
+"""Of the errors of the Sun pulses from which blocks are fired: the same in every run."""
+
+
 class Flown(NamedTuple):
     """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, else the recommended plan."""
 
@@ -239,7 +243,15 @@ def fire_blocks(path: str, body: Spacecraft, options: Options, remark: Callable[
     from nutdamp.schemes.tools.sun_pulses import fired
 
     blocks, warnings = read_blocks(path, body)
-    made = fired(body, blocks)
+    jitter = 0.0 if body.sun_sensor is None else body.sun_sensor.jitter
+    if jitter > 0.0:
+        import numpy as np
+
+        errors = np.random.default_rng(JITTER_SEED)
+        remark(f"the Sun pulses come with a jitter of {jitter:g} s (one sigma, seed {JITTER_SEED})")
+        made = fired(body, blocks, lambda: float(errors.normal(0.0, jitter)))
+    else:
+        made = fired(body, blocks)
     for warning in (*warnings, *broken_limits(body, made)):
         remark(f"warning: {warning}")
     return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from process import Run
 
@@ -73,6 +75,21 @@ def test_an_edited_block_is_fired_and_what_cannot_be_commanded_is_named(run: Run
     assert "blocks.csv:2: delay_s is none of the commands of the spacecraft file: flown as given" in done.stderr
     assert "blocks.csv:3: count is none of the commands" in done.stderr
     assert "304" in done.stdout
+
+
+def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "blocks.csv").write_text(TOP + "T1,1,1,0.1,40\n")
+    shaky = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, jitter: 5 ms}")
+    starts = []
+    for text, name in ((FILE, "still"), (shaky, "first"), (shaky, "second")):
+        done = run("simulate", "-", "--blocks", "blocks.csv", "--json", f"{name}.json", "--samples", "2", stdin=text)
+        assert done.returncode == 0
+        assert ("a jitter of 0.005 s" in done.stderr) == (text == shaky)
+        pulses = json.loads((tmp_path / f"{name}.json").read_text())["pulses"]
+        starts.append(np.array([one["start_s"] for one in pulses]))
+    still, first, second = starts
+    assert np.array_equal(first, second)
+    assert 0.003 < np.std(first - still) < 0.007
 
 
 def test_all_faults_of_a_file_are_listed(tmp_path: Path) -> None:
