@@ -81,6 +81,18 @@ def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
     return next((one for one in aspects(flown) if not one.kept), None) if spacecraft.keep else None
 
 
+def at_target(spacecraft: Spacecraft) -> Aspect | None:
+    """The first cone that an axis on the target breaks, at no time; None where there is none, or no target."""
+    if spacecraft.goal.axis is None:
+        return None
+    for keep in spacecraft.keep:
+        angle = float(attitude.angle_between(spacecraft.goal.axis, keep.direction))
+        one = Aspect(keep, angle, math.inf, angle, math.inf)
+        if not one.kept:
+            return one
+    return None
+
+
 def _peaks(times: Vector, values: Vector) -> Vector:
     """The times at which ``values`` (n,) may be largest: of the largest row, and on parabolas through three in a row.
 

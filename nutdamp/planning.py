@@ -210,10 +210,14 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
         able = " and ".join(schemes.SPINNING)
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
+    forbidden = aspect.at_target(spacecraft) if scheme in schemes.PLANNED else None
+    if forbidden is not None:
+        return Plan(spacecraft, scheme, None, astray=forbidden)
     chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
     with work.budget(scheme, work.SCHEME) as spent:
         try:
-            made = judged(spacecraft, scheme, schemes.schedule(scheme, known(spacecraft, chosen), chosen), chosen)
+            body = spacecraft if schemes.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
+            made = judged(spacecraft, scheme, schemes.schedule(scheme, body, chosen), chosen)
         except Infeasible as reason:
             made = Plan(spacecraft, scheme, None, str(reason))
         if made.astray is not None and schemes.SCHEMES[scheme].points:
@@ -385,8 +389,9 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     Those that can set the spin are among them where it has to change.
     """
     names = schemes.COMPARED if spacecraft.goal.axis is None else schemes.POINTING
-    if spacecraft.commands is not None:
-        names = (*names, *schemes.COMMANDED)
+    if spacecraft.commands is not None:  # before those that may take all the work
+        slow = [name for name in names if schemes.SCHEMES[name].slow]
+        names = (*(name for name in names if name not in slow), *schemes.COMMANDED, *slow)
     return names if _spun(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 

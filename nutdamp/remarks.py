@@ -47,6 +47,8 @@ def infeasibility(plan: Plan) -> str:
 def _infeasibility(plan: Plan) -> str:
     if plan.breach is not None:
         return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
+    if plan.astray is not None and math.isinf(plan.astray.least_at):
+        return _strays(plan.astray)
     if plan.astray is not None:
         return f"{_strays(plan.astray)}; no way round it was found within the limits"
     if plan.worse is not None:
@@ -62,6 +64,8 @@ def _strays(found: Aspect) -> str:
         if found.too_near
         else (found.largest, found.largest_at, f"max = {math.degrees(keep.most):.6g}°")
     )
+    if math.isinf(at):
+        return f"the target is {math.degrees(angle):.4g}° from {keep.name} ({bound})"
     return f"the spin axis comes to {math.degrees(angle):.4g}° from {keep.name} at {at:.4g} s ({bound})"
 
 

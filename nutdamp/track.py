@@ -138,6 +138,8 @@ def extremes(pieces: Iterable[Track]) -> Extremes:
     far, near = _Record(), _Record()
     ranges, ascension = _Range(3), _Circle()
     for piece in pieces:
+        if not len(piece.t):
+            continue
         start = piece.momentum[0] if rows == 0 else start
         rows, until = rows + len(piece.t), float(piece.t[-1])
         away = attitude.angle_between(piece.axis, start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -114,8 +115,7 @@ def command(
     for path in (csv, blocks, one_plan):
         if path is not None and chosen is None:
             say(f"{path} was not written: no plan is feasible")
-    if blocks is not None and chosen is not None and not chosen.pulses.blocks:
-        raise BadRequest(f"--blocks: {chosen.scheme} makes no command blocks; name --scheme command-block")
+    commanded = None if blocks is None else _commanded(compared, chosen, remark)
 
     def data() -> dict[str, Any]:
         from nutdamp.library.views import comparison_data
@@ -130,8 +130,10 @@ def command(
 
     outputs: list[Output] = [(json, data), (table, partial(_schemes, compared, decided))]
     if chosen is not None:
-        outputs += [(csv, partial(_pulses, chosen)), (blocks, partial(_blocks, chosen))]
+        outputs.append((csv, partial(_pulses, chosen)))
         outputs.append((one_plan, partial(_picture, chosen, figure, one_plan)))
+    if commanded is not None:
+        outputs.append((blocks, partial(_blocks, commanded)))
     if figure == SCHEMES:
         outputs.append((plot, partial(_schemes_picture, compared, decided, plot)))
     if silent:
@@ -156,6 +158,20 @@ def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: 
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=quiet) as advance:
         return robust.compare(compared, trials, advance, impulses=impulses, force=force)
+
+
+def _commanded(compared: Comparison, chosen: Plan | None, remark: Callable[[str], None]) -> Plan | None:
+    """The plan whose blocks are written: the one to fly, or else one that was compared; None without any plan.
+
+    Raises BadRequest where plans have pulses, but no blocks.
+    """
+    plans = [one for one in (chosen, *compared) if one is not None and one.feasible]
+    found = next((one for one in plans if one.pulses.blocks), None)
+    if plans and found is None:
+        raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
+    if found is not None and found is not chosen:
+        remark(f"writing the blocks of {found.scheme}, which is not the recommended plan")
+    return found
 
 
 def _pulses(chosen: Plan) -> str:

@@ -83,14 +83,14 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     for line, row in table.rows:
         cells = table.cells(line, row)
         block = None if cells is None else _block(table, line, cells, spacecraft)
-        if block is None:
+        if cells is None or block is None:
             continue
         before = blocks[-1] if blocks else None
         over = 0 if before is None else before.first + (before.count - 1) * before.every
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
             table.fault(line, "first_sun_pulse", problem)
-        _against_commands(table, line, block, spacecraft)
+        _against_commands(table, line, cells, block, spacecraft)
         blocks.append(block)
     if sum(block.count for block in blocks) > MOST_FIRED:
         table.fault(1, "count", f"the blocks fire more than {MOST_FIRED} pulses")
@@ -132,7 +132,7 @@ def _whole(table: Table, line: int, cells: Cells, column: str) -> int | None:
     return None if value is None else int(value)
 
 
-def _against_commands(table: Table, line: int, block: Block, spacecraft: Spacecraft) -> None:
+def _against_commands(table: Table, line: int, cells: Cells, block: Block, spacecraft: Spacecraft) -> None:
     """Warn of what cannot be commanded: it is flown as given."""
     commands = spacecraft.commands
     if commands is None:
@@ -144,5 +144,10 @@ def _against_commands(table: Table, line: int, block: Block, spacecraft: Spacecr
         "count": block.count > commands.max_count,
         "every": block.every not in commands.every,
     }
+    for name, time, step in (("delay", block.delay, commands.delay_step), ("width", block.width, commands.width_step)):
+        given = cells.get(f"{name}_counts", "")
+        if given and step is not None and given != _counts(time, step):
+            text = f"{name}_counts = {given} contradicts {name}_s = {time:g}, which is {_counts(time, step)}: ignored"
+            table.warn(line, f"{name}_counts", text)
     for column in (column for column, is_off in off.items() if is_off):
         table.warn(line, column, f"{column} is none of the commands of the spacecraft file: flown as given")

@@ -165,7 +165,7 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
     if Part.NUTATION in parts and plan.hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
         spent = plan.hindrance.obstacle in (Obstacle.LIMITS, Obstacle.SCHEME)
         yield _spent(plan) if spent else sentence(obstacle(plan))
-    if Part.DISTANCE in parts and plan.scheme not in schemes.POINTING:
+    if Part.DISTANCE in parts and plan.scheme not in (*schemes.POINTING, *schemes.COMMANDED):
         yield f"{plan.scheme} does not turn H to a target; {', '.join(schemes.POINTING)} do."
     if _optimal_untried(compared) and parts != {Part.SPIN}:
         more = "can fire several pulses of a channel in each half turn" if plan.hindrance.full else "may reach more"

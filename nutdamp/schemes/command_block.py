@@ -59,16 +59,23 @@ FLOWN_PULSES = 1000
 SURELY = 3.0
 """Times its error by which the length of a block that ends at the target differs from the way there, at most."""
 
+LOWER = 0.98
+"""Share of the nutation above which it does not count as lowered."""
+
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
 
 
 class Found(NamedTuple):
-    """Blocks, the motion after them in closed form, and how good that is: the less, the better (`Search.rank`)."""
+    """Blocks, the motion after them in closed form, and how good that is: the less, the better.
+
+    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost; ``share``: the share.
+    """
 
     blocks: tuple[Block, ...]
     state: State
     rank: tuple[float, float]
+    share: float = math.inf
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
@@ -83,16 +90,18 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     search = Search(spacecraft, channels, commands)
-    flights, pulses = [], 0
+    flights: list[tuple[tuple[float, float], Schedule, Found]] = []
+    pulses, why = 0, "no block that can be commanded ends within the horizon; a longer limits.horizon may help"
     for found in search.best(options.max_blocks or BLOCKS):
-        one = search.flown(found)
-        if one is not None:
-            flights.append(one)
-            pulses += len(one[1])
-        if pulses > FLOWN_PULSES:
+        if pulses > FLOWN_PULSES or work.exhausted():
             break
+        try:
+            flights.append(search.flown(found))
+            pulses += len(flights[-1][1])
+        except Infeasible as reason:
+            why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
     if not flights:
-        raise Infeasible("no block that can be commanded ends within the horizon; a longer limits.horizon may help")
+        raise Infeasible(why)
     _, made, chosen = min(flights, key=lambda one: one[0])
     return replace(made, notes=(search.note(chosen, made),))
 
@@ -103,8 +112,18 @@ class Search:
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
-        self.bounds = compliance.bounds(spacecraft)
+        self.bounds = [self._lowered(bound) for bound in compliance.bounds(spacecraft)]
         self.looked = 0
+        limits = spacecraft.limits
+        self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
+        self.pause = math.ceil(limits.gap / self.model.turn)
+        self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
+
+    def _lowered(self, bound: compliance.Bound) -> compliance.Bound:
+        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
+        if bound.part is not Part.NUTATION or self.body.goal.axis is not None:
+            return bound
+        return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
     def best(self, most: int) -> list[Found]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -123,18 +142,18 @@ class Search:
             ]
             firsts.sort(key=lambda one: one.rank)
             found += firsts
-        return sorted(found, key=lambda one: one.rank)[:FLOWN]
+        # The flight differs a little: half of them are the cheapest that comply, half those that do most clearly.
+        cheap = sorted(found, key=lambda one: one.rank)[: FLOWN // 2]
+        clear = sorted(found, key=lambda one: one.share)[: FLOWN // 2]
+        return list({one.blocks: one for one in (*cheap, *clear)}.values())
 
-    def flown(self, one: Found) -> tuple[tuple[float, float], Schedule, Found] | None:
-        """How good the blocks are when they are flown; None where they cannot be."""
-        try:
-            made = fired(self.body, one.blocks)
-        except Infeasible:
-            return None
-        if made.end > self.body.horizon or work.exhausted():
-            return None
+    def flown(self, one: Found) -> tuple[tuple[float, float], Schedule, Found]:
+        """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
+        made = fired(self.body, one.blocks)
+        if made.end > self.body.horizon:
+            raise Infeasible(f"it ends at {made.end:.6g} s, after the horizon")
         left = left_by(flight.flown(self.body, made))
-        shares = max(held.left / held.bound.most for held in compliance.held(self.body, left))
+        shares = max(float(self._share(bound, left)) for bound in self.bounds)
         return (0.0, made.cost) if shares <= 1.0 else (shares, made.cost), made, one
 
     def note(self, chosen: Found, made: Schedule) -> str:
@@ -167,13 +186,15 @@ class Search:
             severity = np.where(np.isnan(severity) | over, np.inf, severity)
             cost = spent + self._rate(channel) * np.broadcast_to(trial.count * trial.width, shape)
             failed = np.where(severity <= 1.0, 0.0, severity).ravel()
-            for index in np.lexsort((cost.ravel(), failed))[:few]:
+            chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
+            for index in dict.fromkeys(chosen):
                 if math.isfinite(failed[index]):
                     at = np.unravel_index(index, shape)
                     wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
                     block = Block(channel.name, number + wait, delay, width, count, every)
                     here = State(*(np.broadcast_to(part, shape)[at] for part in vars(state).values()))
-                    yield Found((*before.blocks, block), here, (float(failed[index]), float(cost.ravel()[index])))
+                    rank = float(failed[index]), float(cost.ravel()[index])
+                    yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
 
     def _share(self, bound: compliance.Bound, left: compliance.Left) -> Array:
         return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
@@ -190,10 +211,16 @@ class Search:
         widths = self.commands.widths
         return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
 
+    def _spaced(self, every: int) -> bool:
+        """Whether pulses in one of ``every`` spins are as far apart as limits.gap asks for."""
+        return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
+
     def _counts(self, start: State, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
-        return np.arange(1, max(min(most, self.commands.max_count), 0) + 1)
+        if not self._spaced(every):
+            return np.arange(0)
+        return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
 
     def _single(self, start: Found) -> list[Found]:
         """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
@@ -241,7 +268,7 @@ class Search:
         if len(index):
             widths, counts = self._widths(channel)[index[:, 0]], self._counts(state, every)[index[:, 1]]
             for wait in range(WAITS if abs(state.phasor) > 0.0 else 1):
-                yield self._at_delays(state, channel, wait, widths, counts, every)
+                yield self._at_delays(state, channel, self.earliest + wait, widths, counts, every)
 
     def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
         """Blocks that go the rest of the way, or take the nutation that is left."""
@@ -256,13 +283,16 @@ class Search:
             few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
             counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
             for every in self.commands.every:
-                for wait in range(LATER_WAITS):
+                if not self._spaced(every):
+                    continue
+                for wait in range(self.pause, self.pause + LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
 
     def _parts(self, start: Found) -> Iterator[Found]:
         """First blocks that go a part of the way to the target."""
         heading, way = self.model.course(start.state)
-        if self.body.goal.axis is None:
+        every = next((one for one in self.commands.every if self._spaced(one)), None)
+        if self.body.goal.axis is None or every is None:
             return
         for channel in self.channels:
             widths = _spread(self._widths(channel), 3)
@@ -271,7 +301,7 @@ class Search:
                 counts = np.unique(np.rint(SHARES * float(way) / step).clip(1, self.commands.max_count).astype(int))
                 delay = self._commanded(self.model.delay(channel, heading, width))
                 for count in counts.tolist():
-                    trial = Trial(0, delay, width, count, self.commands.every[0])
+                    trial = Trial(self.earliest, delay, width, count, every)
                     yield from self._behind(start, iter([(channel, trial)]), few=1)
 
     def _at_delays(

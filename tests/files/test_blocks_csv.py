@@ -109,7 +109,7 @@ def test_all_faults_of_a_file_are_listed(tmp_path: Path) -> None:
 def test_schemes_without_blocks_write_none(run: Run, tmp_path: Path) -> None:
     done = run("plan", "-", *GOAL, "--scheme", "rhumb-line", "--blocks", "blocks.csv", stdin=FILE)
     assert done.returncode == 2
-    assert "makes no command blocks" in done.stderr
+    assert "no plan is made of command blocks" in done.stderr
     assert not (tmp_path / "blocks.csv").exists()
 
 

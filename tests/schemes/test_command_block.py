@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from nutdamp.schemes import Options
 from nutdamp.schemes.command_block import Search
 from nutdamp.schemes.tools.block_model import BlockModel, Trial
 from nutdamp.schemes.tools.sun_pulses import fired, sun_pulses
-from nutdamp.spacecraft import Commands, Limits, Requirement, Spacecraft, SunSensor
+from nutdamp.spacecraft import Commands, Disturbance, Limits, Requirement, Spacecraft, SunSensor
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
     assert body.sun_sensor is not None
     sun, mark = body.sun, body.sun_sensor.azimuth
     state = np.concatenate([body.omega0, attitude.matrix(body.initial.quaternion).ravel()])
-    now, passed, last, starts = 0.0, 0, -1.0, []
+    now, passed, last, starts = 0.0, 0, -math.inf, []
     turn = 2.0 * math.pi / abs(body.spin)
 
     def slope(_: float, y: Array, torque: Array) -> Array:
@@ -91,8 +92,8 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
         seen = y[3:].reshape(3, 3).T @ sun
         return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
 
-    def move(until: float, torque: Array) -> list[float]:
-        """Sun pulses on the way; ``state`` and ``now`` go on."""
+    def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
+        """Sun pulses on the way; ``state`` and ``now`` go on, to the first one where it ``stops`` there."""
         nonlocal state, now
         found = solve_ivp(
             slope, (now, until), state, method="DOP853", rtol=1e-11, atol=1e-13, args=(torque,), dense_output=True
@@ -106,14 +107,15 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
             for edge, pair in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
             if pair[0] * pair[1] < 0.0 and before(at(edge[0]))
         ]
-        state, now = found.y[:, -1], until
+        stop = next((root for root in roots if root > last + 0.3 * turn), until) if stops else until
+        state, now, roots = at(stop), stop, [root for root in roots if root <= stop]
         return [float(root) for root in roots]
 
     none, due = np.zeros(3), {}
     for block in blocks:
         due.update({block.first + k * block.every: block for k in range(block.count)})
     while due:
-        for root in move(now + 0.05 * turn, none) if min(due) > passed else []:
+        for root in move(now + 0.05 * turn, none, stops=True) if min(due) > passed else []:
             if root > last + 0.3 * turn:
                 passed, last = passed + 1, root
         if passed >= min(due):
@@ -291,3 +293,50 @@ def test_it_is_compared_where_the_file_has_commands() -> None:
     assert "command-block" in planning.usual(body)
     assert "command-block" in planning.usual(replace(body, goal=replace(body.goal, axis=None)))
     assert "command-block" not in planning.usual(replace(body, commands=None))
+
+
+def a_turn(**limits: Any) -> Spacecraft:
+    """A spinner at rest that is to turn by 8 deg, with the Sun square to its axis."""
+    body = aimed(spinner(120.0, 180.0, 1.2, 0.0, channels=(channel("T", 5.0, 0.0, 0.0),)), 8.0, 40.0)
+    body = commanded(body, np.array([1.0, -0.3, 0.1]))
+    body = replace(body, requirement=Requirement(math.radians(0.5), math.radians(0.2)))
+    return replace(body, limits=replace(body.limits, **limits))
+
+
+def test_blocks_keep_the_limits_on_earliest_start_number_and_gap() -> None:
+    for body in (a_turn(earliest=60.0), a_turn(max_pulses=30), a_turn(gap=6.0)):
+        plan = planning.plan(body, "command-block")
+        assert plan.feasible, remarks.infeasibility(plan)
+        assert plan.meets_requirement
+
+
+def test_with_disturbances_the_sun_pulses_are_those_of_the_disturbed_motion() -> None:
+    body = replace(a_turn(), disturbances=(Disturbance(0.003 + 0.0j, 0.002),))
+    plan = planning.plan(body, "command-block")
+    assert plan.feasible, remarks.infeasibility(plan)
+    again = fired(body, plan.pulses.blocks)
+    assert [one.start for one in again] == [one.start for one in plan.pulses]
+
+
+def test_a_looser_requirement_is_met_as_well() -> None:
+    """Damping: blocks lower the nutation, though it is no more than is required already."""
+    body = commanded(
+        spinner(120.0, 180.0, 1.2, 0.5, channels=(channel("T", 5.0, 0.0, 0.0),)), np.array([1.0, -0.3, 0.1])
+    )
+    for most in (0.4, 0.51, 1.0):
+        plan = planning.plan(replace(body, requirement=Requirement(math.radians(most))), "command-block")
+        assert plan.feasible, remarks.infeasibility(plan)
+        assert plan.left is not None
+        assert plan.left.nutation < min(math.radians(most), body.nutation)
+
+
+def test_what_cannot_be_flown_says_why() -> None:
+    """The sensor loses the Sun on the way: a longer horizon would be no cure."""
+    body = a_turn()
+    assert body.sun is not None
+    ends = [float(attitude.angle_between(body.sun, axis)) for axis in (body.momentum, body.target_axis)]
+    middle = 0.5 * math.pi - ends[0]
+    blind = replace(body, sun_sensor=SunSensor(0.4, elevation=middle, half_width=0.3 * abs(ends[1] - ends[0])))
+    plan = planning.plan(blind, "command-block")
+    assert not plan.feasible
+    assert "does not see the Sun" in remarks.infeasibility(plan)
