@@ -297,7 +297,7 @@ def test_it_is_compared_where_the_file_has_commands() -> None:
 
 def a_turn(**limits: Any) -> Spacecraft:
     """A spinner at rest that is to turn by 8 deg, with the Sun square to its axis."""
-    body = aimed(spinner(120.0, 180.0, 1.2, 0.0, channels=(channel("T", 5.0, 0.0, 0.0),)), 8.0, 40.0)
+    body = aimed(spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("T", 5.0, 0.0, 0.0),)), 8.0, 40.0)
     body = commanded(body, np.array([1.0, -0.3, 0.1]))
     body = replace(body, requirement=Requirement(math.radians(0.5), math.radians(0.2)))
     return replace(body, limits=replace(body.limits, **limits))
