@@ -17,7 +17,7 @@ import numpy as np
 from nutdamp import schemes, work
 from nutdamp.demands import Keep
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -95,13 +95,8 @@ def _aside(start: Vector, target: Vector, place: float, bend: float) -> Vector:
     on_the_way = _along(start, target, np.array([place]))[0]
     normal = np.cross(start, target)
     size = float(np.linalg.norm(normal))
-    left = normal / size if size > 0.0 else _square_to(start)
+    left = normal / size if size > 0.0 else pointing.square_to(start)
     return np.asarray(math.cos(bend) * on_the_way + math.sin(bend) * left)
-
-
-def _square_to(direction: Vector) -> Vector:
-    square = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
-    return np.asarray(square / np.linalg.norm(square))
 
 
 def _along(start: Vector, end: Vector, shares: Vector) -> Vector:

@@ -243,15 +243,9 @@ def fire_blocks(path: str, body: Spacecraft, options: Options, remark: Callable[
     from nutdamp.schemes.tools.sun_pulses import fired
 
     blocks, warnings = read_blocks(path, body)
-    jitter = 0.0 if body.sun_sensor is None else body.sun_sensor.jitter
-    if jitter > 0.0:
-        import numpy as np
-
-        errors = np.random.default_rng(JITTER_SEED)
-        remark(f"the Sun pulses come with a jitter of {jitter:g} s (one sigma, seed {JITTER_SEED})")
-        made = fired(body, blocks, lambda: float(errors.normal(0.0, jitter)))
-    else:
-        made = fired(body, blocks)
+    if body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
+        remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
+    made = fired(body, blocks, JITTER_SEED)
     for warning in (*warnings, *broken_limits(body, made)):
         remark(f"warning: {warning}")
     return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)

@@ -57,7 +57,7 @@ def two_jumps(
     along = np.cross(axes, target)
     size = np.linalg.norm(along, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        along = np.where(size > 0.0, along / size, _square_to(target))
+        along = np.where(size > 0.0, along / size, square_to(target))
         foot = h * (axes + target) / (1.0 + axes @ target)[:, None]  # of the line, nearest to hS and to hT
         place = along @ momentum
         to_line = np.linalg.norm(momentum - foot - place[:, None] * along, axis=-1)
@@ -97,7 +97,7 @@ def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, 
     sideways = target - (axes @ target)[:, None] * axes
     size = np.linalg.norm(sideways, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sideways = np.where(size > 0.0, sideways / size, _square_to(target))
+        sideways = np.where(size > 0.0, sideways / size, square_to(target))
     return h * (axes + np.tan(half)[:, None] * sideways), (2 * cones - 1) * h * np.tan(half)
 
 
@@ -131,7 +131,7 @@ def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
         return np.asarray(np.arcsin(rate * impulses / torque) / rate)
 
 
-def _square_to(vector: Array) -> Array:
+def square_to(vector: Array) -> Array:
     """Some unit vector square to ``vector`` (3,)."""
     other = np.eye(3)[int(np.argmin(np.abs(vector)))]
     square = np.cross(vector, other)

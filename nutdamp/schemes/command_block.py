@@ -20,7 +20,7 @@ from nutdamp import compliance, flight, work
 from nutdamp.commands import Block, Commands
 from nutdamp.compliance import Part
 from nutdamp.errors import Infeasible
-from nutdamp.limits import usable
+from nutdamp.limits import keeps_limits, usable
 from nutdamp.outcome import left_by
 from nutdamp.physics.sun_train import phasor_sum
 from nutdamp.schedule import Schedule
@@ -78,6 +78,14 @@ class Found(NamedTuple):
     share: float = math.inf
 
 
+class Flown(NamedTuple):
+    """What was found, flown: how good it is, those that break a limit last, and its pulses."""
+
+    rank: tuple[bool, float, float]
+    made: Schedule
+    found: Found
+
+
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     """The blocks that meet the requirement with the least propellant, else those that leave least.
 
@@ -90,20 +98,21 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     search = Search(spacecraft, channels, commands)
-    flights: list[tuple[tuple[float, float], Schedule, Found]] = []
+    flights: list[Flown] = []
     pulses, why = 0, "no block that can be commanded ends within the horizon; a longer limits.horizon may help"
-    for found in search.best(options.max_blocks or BLOCKS):
+    best = search.best(options.max_blocks or BLOCKS)
+    for found in best:
         if pulses > FLOWN_PULSES or work.exhausted():
             break
         try:
             flights.append(search.flown(found))
-            pulses += len(flights[-1][1])
+            pulses += len(flights[-1].made)
         except Infeasible as reason:
             why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
     if not flights:
         raise Infeasible(why)
-    _, made, chosen = min(flights, key=lambda one: one[0])
-    return replace(made, notes=(search.note(chosen, made),))
+    chosen = min(flights, key=lambda one: one.rank)
+    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank <= best[0].rank),))
 
 
 class Search:
@@ -129,7 +138,7 @@ class Search:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
         start = Found((), self.model.start, (math.inf, math.inf))
         found = self._single(start)
-        firsts = found
+        firsts: list[Found] = []
         for number in range(2, most + 1):
             if min((one.rank for one in found), default=(1.0,))[0] <= 0.0 or work.exhausted():
                 break
@@ -147,26 +156,23 @@ class Search:
         clear = sorted(found, key=lambda one: one.share)[: FLOWN // 2]
         return list({one.blocks: one for one in (*cheap, *clear)}.values())
 
-    def flown(self, one: Found) -> tuple[tuple[float, float], Schedule, Found]:
+    def flown(self, found: Found) -> Flown:
         """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
-        made = fired(self.body, one.blocks)
-        if made.end > self.body.horizon:
-            raise Infeasible(f"it ends at {made.end:.6g} s, after the horizon")
+        made = fired(self.body, found.blocks)
         left = left_by(flight.flown(self.body, made))
-        shares = max(float(self._share(bound, left)) for bound in self.bounds)
-        return (0.0, made.cost) if shares <= 1.0 else (shares, made.cost), made, one
+        share = max(float(self._share(bound, left)) for bound in self.bounds)
+        return Flown((not keeps_limits(self.body, made), share if share > 1.0 else 0.0, made.cost), made, found)
 
-    def note(self, chosen: Found, made: Schedule) -> str:
-        """What was looked at, and how far flight and closed form are apart, in words."""
-        form, flown = self.model.left(chosen.state), left_by(flight.flown(self.body, made))
-        apart = [
-            math.degrees(abs(float(getattr(form, part)) - float(getattr(flown, part)))) for part in ("nutation", "aim")
-        ]
-        one = len(chosen.blocks) == 1
-        scope = "no other single block" if one else f"no other sequence of the {self.looked:,} looked at"
+    def note(self, chosen: Flown, *, first: bool) -> str:
+        """What was looked at, and how far flight and closed form are apart; ``first``: it is the best in that form."""
+        blocks, form = chosen.found.blocks, self.model.left(chosen.found.state)
+        flown = left_by(flight.flown(self.body, chosen.made))
+        nutation, end = (math.degrees(abs(float(one) - other)) for one, other in zip(form[:2], flown[:2], strict=True))
+        what = "single block" if len(blocks) == 1 else f"sequence of the {self.looked:,} looked at"
+        scope = f"no other {what} does better in closed form" if first else "of those flown none does better"
         return (
-            f"{scope} does better in closed form; flown from the Sun pulses of the nutating body, nutation differs "
-            f"by {apart[0]:.2g}° and the end of H by {apart[1]:.2g}°"
+            f"{scope}; flown from the Sun pulses of the nutating body, nutation differs by {nutation:.2g}° and the end "
+            f"of H by {end:.2g}°"
         )
 
     def _behind(self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN) -> Iterator[Found]:

@@ -330,6 +330,26 @@ def test_a_looser_requirement_is_met_as_well() -> None:
         assert plan.left.nutation < min(math.radians(most), body.nutation)
 
 
+def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
+    """Where another was taken because it does better when flown, the note says no more than that."""
+    body = a_turn()
+    assert body.commands is not None
+    search = Search(body, body.channels, body.commands)
+    best = search.best(1)
+    assert "no other single block does better in closed form" in search.note(search.flown(best[0]), first=True)
+    assert "no other" not in search.note(search.flown(best[-1]), first=False)
+    tight = replace(body, requirement=Requirement(math.radians(0.5), math.radians(0.02)))
+    for one in (body, tight):
+        search = Search(one, one.channels, body.commands)
+        flights, plan = (
+            [search.flown(found) for found in search.best(1)],
+            planning.plan(one, "command-block", one_block()),
+        )
+        assert plan.pulses.blocks == min(flights, key=lambda made: made.rank).found.blocks
+        is_first = plan.pulses.blocks == search.best(1)[0].blocks
+        assert is_first <= ("no other single block" in plan.pulses.notes[0])
+
+
 def test_what_cannot_be_flown_says_why() -> None:
     """The sensor loses the Sun on the way: a longer horizon would be no cure."""
     body = a_turn()

@@ -74,7 +74,6 @@ class BlockModel:
             spin=spacecraft.spin,
         )
         self.turn = spin_turn(spacecraft)
-        self.size = float(np.linalg.norm(spacecraft.momentum))
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """By how much one pulse turns H, rad."""

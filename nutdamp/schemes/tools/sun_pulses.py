@@ -7,7 +7,7 @@ without nutation. So each pulse moves the Sun pulses after it, and a block is fl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -86,20 +86,23 @@ def _ahead(flown: Flight, times: Vector) -> Vector:
     return np.asarray(math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi))
 
 
-def fired(spacecraft: Spacecraft, blocks: Sequence[Block], jitter: Callable[[], float] = lambda: 0.0) -> Schedule:
+def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
     """The pulses that ``blocks`` fire, with the Sun pulses of the motion that they make.
 
-    ``jitter`` gives the error of each Sun pulse in s. Raises Infeasible where there is no Sun pulse, where a channel is
-    not known, and where a pulse would begin before the one before is over.
+    With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. Raises Infeasible
+    where there is no Sun pulse, where a channel is not known, and where a pulse would begin before the one before is
+    over.
     """
     channels = {channel.name: channel for channel in spacecraft.channels}
     builder, clock = FlownBuilder(spacecraft), Clock(spacecraft)
+    sensor, errors = spacecraft.sun_sensor, np.random.default_rng(seed)
+    jitter = 0.0 if seed is None or sensor is None else sensor.jitter
     for block in blocks:
         channel = channels.get(block.channel)
         if channel is None:
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
         for number in range(block.first, block.first + block.count * block.every, block.every):
-            start = clock.time_of(number) + jitter() + block.delay
+            start = clock.time_of(number) + jitter * errors.standard_normal() + block.delay
             _fire(builder, clock, channel, start, block.width)
     return replace(builder.schedule(), blocks=tuple(blocks))
 
