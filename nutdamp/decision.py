@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nutdamp import compliance
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Final
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 
 if TYPE_CHECKING:  # few decisions rest on dispersed cases
     from nutdamp.dispersion.study import Results

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import planning
+from nutdamp.comparison import Comparison, attempt
 from nutdamp.compliance import Part, aim, missed
 from nutdamp.decision import Cases, Decision, cases_of
 from nutdamp.dispersion import SAMPLES, SEED, study_of
@@ -23,7 +24,7 @@ from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Spacecraft
@@ -230,7 +231,7 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 
 def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:
-    return [(variant, planning.attempt(body, scheme, options))]
+    return [(variant, attempt(body, scheme, options))]
 
 
 def _dispersed(plan: Plan, variant: str, samples: int, *, impulses: bool, force: bool) -> Candidate:

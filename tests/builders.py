@@ -12,9 +12,10 @@ from types import FrameType
 import numpy as np
 import reference
 
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Left
 from nutdamp.flight import Residual
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import recommend
 from nutdamp.schedule import Pulse, Schedule

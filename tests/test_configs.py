@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from nutdamp.comparison import compare
 from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.planning import compare
 from nutdamp.remarks import broken_limits, infeasibility
 from nutdamp.schemes import CLASSIC
 

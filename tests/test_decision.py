@@ -15,12 +15,12 @@ import pytest
 from process import Run
 
 import nutdamp
+from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
 from nutdamp.decision import Cases, Decision, cases_of, decide
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results
 from nutdamp.dispersion.study import run as fly
-from nutdamp.planning import Comparison, compare
 from nutdamp.presentation import decisions
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Goal, Requirement

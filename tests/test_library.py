@@ -16,6 +16,7 @@ from tilted import KEYS, TILTED
 
 import nutdamp
 from nutdamp import errors, flight, planning, spacecraft
+from nutdamp.comparison import Comparison
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = Path(__file__).with_name("library_example.py")
@@ -131,7 +132,7 @@ def test_there_is_one_type_of_each_name(craft: nutdamp.Spacecraft) -> None:
     for made, kind in (
         (craft, spacecraft.Spacecraft),
         (plan, planning.Plan),
-        (compared, planning.Comparison),
+        (compared, Comparison),
         (plan.fly(), flight.Flight),
     ):
         assert type(made) is kind is getattr(nutdamp, kind.__name__)

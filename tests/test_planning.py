@@ -16,8 +16,9 @@ from scipy.integrate import simpson
 
 from nutdamp import schemes
 from nutdamp.actuators import STANDARD_GRAVITY
+from nutdamp.comparison import compare
 from nutdamp.limits import Limit, Windows, breaches, keeps_limits
-from nutdamp.planning import Plan, compare, plan
+from nutdamp.planning import Plan, plan
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import broken_limits, infeasibility, remarks
 from nutdamp.schedule import Bounds, Schedule, channel_pulse

@@ -11,8 +11,9 @@ from builders import chosen, cross, judged, said, spinner, warned
 from cases_dir import case
 
 from nutdamp import planning, schemes
+from nutdamp.comparison import Comparison, compare, usual
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import Comparison, Plan, compare
+from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.remarks import infeasibility
@@ -232,11 +233,11 @@ def test_a_scheme_that_cannot_set_the_spin_says_so() -> None:
     compared = compare(body, (*schemes.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
     assert all("cannot set the spin" in infeasibility(one) for one in compared.plans)
-    assert "optimal" in planning.usual(body)
+    assert "optimal" in usual(body)
     assert planning.plan(body, "none").meets_requirement is False
     kept = replace(body, goal=Goal(spin=3.0))
     assert planning.plan(kept, "two-pulse").meets_requirement is True
-    assert planning.usual(kept) == (*schemes.CLASSIC, "optimal")
+    assert usual(kept) == (*schemes.CLASSIC, "optimal")
 
 
 def test_a_spin_that_is_kept_by_itself_takes_no_channel() -> None:

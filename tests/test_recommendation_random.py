@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from builders import Outcome, aimed, channel, spinner
 
-from nutdamp.planning import Comparison, Plan, compare, usual
+from nutdamp.comparison import Comparison, compare, usual
+from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Standing
 from nutdamp.schemes import Options

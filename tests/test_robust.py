@@ -12,6 +12,7 @@ from builders import cross, judged, spinner
 from checker import violations
 
 from nutdamp import planning, robust
+from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
 from nutdamp.decision import Cases
 from nutdamp.dispersion import study_of
@@ -52,7 +53,7 @@ def dispersed(
 
 
 def planned(body: Spacecraft, names: tuple[str, ...] = CLASSIC) -> robust.RobustComparison:
-    compared = planning.compare(body, names)
+    compared = compare(body, names)
     return robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
 
 
@@ -121,7 +122,7 @@ def test_variants_are_other_alignments_later_starts_and_fewer_channels() -> None
 
 
 def test_how_far_it_is_can_be_watched() -> None:
-    compared = planning.compare(dispersed(EXACT), ("four-pulse",))
+    compared = compare(dispersed(EXACT), ("four-pulse",))
     trials, reported = robust.attempts(compared), list[int]()
     robust.compare(compared, trials, reported.append, samples=SAMPLES)
     assert reported == list(range(len(trials)))
@@ -160,7 +161,7 @@ def test_the_plan_in_which_most_cases_comply() -> None:
 def test_each_share_is_that_of_the_real_widths() -> None:
     """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
     body = dispersed(Dispersions(A=normal(0.002)), Requirement(None, math.radians(0.7)))
-    compared = planning.compare(body, ("four-pulse",))
+    compared = compare(body, ("four-pulse",))
     found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
     for one in found.candidates:
         results = run(Results(study_of(body, one.plan.pulses), found.samples))
@@ -212,7 +213,7 @@ def of_given(
 
     monkeypatch.setattr(robust, "_dispersed", fares)
     trials: list[robust.Attempt] = [partial(list, [("as planned", replace(plan, spacecraft=body))]) for plan in plans]
-    return robust.compare(planning.Comparison(body, plans), trials, samples=1_000)
+    return robust.compare(Comparison(body, plans), trials, samples=1_000)
 
 
 @pytest.mark.parametrize(
@@ -256,6 +257,6 @@ def test_nothing_feasible() -> None:
 
 
 def test_without_dispersions_there_is_nothing_to_go_by() -> None:
-    compared = planning.compare(replace(dispersed(EXACT), dispersions=None), ("four-pulse",))
+    compared = compare(replace(dispersed(EXACT), dispersions=None), ("four-pulse",))
     with pytest.raises(BadRequest, match="no dispersions"):
         robust.compare(compared, robust.attempts(compared), samples=SAMPLES)

@@ -6,7 +6,7 @@ import pytest
 from builders import channel, cross, spinner
 
 from nutdamp import flight, schemes
-from nutdamp.planning import compare
+from nutdamp.comparison import compare
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule
 

@@ -12,9 +12,10 @@ from builders import aimed, channel, cross, judged, off_target, said, spinner, w
 from cases_dir import case
 
 from nutdamp import compliance, planning, schemes
+from nutdamp.comparison import compare
 from nutdamp.compliance import Part
 from nutdamp.hindrance import Hindrance, Obstacle
-from nutdamp.planning import Plan, compare
+from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import infeasibility, remarks

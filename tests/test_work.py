@@ -9,6 +9,7 @@ from builders import cross, spinner
 from cases_dir import CASES
 
 from nutdamp import dynamics, flight, planning, remarks, work
+from nutdamp.comparison import compare
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.schedule import Schedule
 
@@ -78,6 +79,6 @@ def test_a_comparison_shares_one_budget(monkeypatch: pytest.MonkeyPatch) -> None
     body = load_spacecraft(CASES / "slow-optimal.yaml")
     monkeypatch.setattr(work, "COMMAND", 30.0)
     with work.budget("test", 1e9) as spent:
-        compared = planning.compare(body, ("one-pulse", "optimal"))
+        compared = compare(body, ("one-pulse", "optimal"))
     assert compared.plans[-1].cut
     assert spent.done < 330.0

@@ -200,11 +200,12 @@ def plan_or_read(
     scheme, schedule = flown
     from nutdamp import planning
     from nutdamp.cli.progress import working
+    from nutdamp.comparison import compare, usual
     from nutdamp.errors import Infeasible
     from nutdamp.remarks import infeasibility
     from nutdamp.remarks import remarks as sentences
 
-    expect_read(() if schedule else (scheme,) if scheme else planning.usual(body), options, body, remark)
+    expect_read(() if schedule else (scheme,) if scheme else usual(body), options, body, remark)
     if schedule is not None:
         from nutdamp.files.schedule_file import read_plan
 
@@ -218,7 +219,7 @@ def plan_or_read(
         else:
             from nutdamp.presentation import verdicts
 
-            compared = planning.compare(body, planning.usual(body), options)
+            compared = compare(body, usual(body), options)
             plan = compared.recommended
             show_failures(compared)
             if plan is not None:

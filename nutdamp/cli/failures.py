@@ -9,7 +9,7 @@ import click
 from nutdamp.cli.screen import say
 
 if TYPE_CHECKING:
-    from nutdamp.planning import Comparison
+    from nutdamp.comparison import Comparison
 
 DEBUG = "nutdamp.debug"
 """Where the context of a command line keeps that ``--debug`` is given."""

@@ -37,8 +37,9 @@ from nutdamp.words import listed
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from nutdamp.comparison import Comparison
     from nutdamp.decision import Decision
-    from nutdamp.planning import Comparison, Plan
+    from nutdamp.planning import Plan
     from nutdamp.robust import RobustComparison
 
 
@@ -102,8 +103,8 @@ def command(
         require_dispersions(body)
 
     from nutdamp.cli.progress import working
+    from nutdamp.comparison import compare, usual
     from nutdamp.decision import decide
-    from nutdamp.planning import compare, usual
 
     names = names or usual(body)
     expect_read(names, options, body, remark)

@@ -30,9 +30,9 @@ from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, expect_rea
 from nutdamp.schemes import PLANNED, Options
 
 if TYPE_CHECKING:
+    from nutdamp.comparison import Comparison
     from nutdamp.dispersion.study import Results
     from nutdamp.fronts import Front
-    from nutdamp.planning import Comparison
     from nutdamp.spacecraft import Spacecraft
 
 
@@ -130,10 +130,10 @@ def command(
     remark = remarks(quiet)
     text, name = source(spacecraft.path, remark)
 
+    from nutdamp.comparison import compare, usual
     from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.files.yaml_tree import dotted
     from nutdamp.library.reports import controlled, made_of
-    from nutdamp.planning import compare, usual
     from nutdamp.presentation.page.content import Repeat
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})

@@ -13,7 +13,8 @@ import numpy as np
 from nutdamp.files.dispersion_models import BY_THRUSTER, QUANTITIES, by_name, size_of, thrust_behind
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.fields import RIGHT_ANGLE
-from nutdamp.files.rules import instead, symmetric, tensor_fault, tensor_of
+from nutdamp.files.rules import symmetric, tensor_fault, tensor_of
+from nutdamp.files.thruster_rules import instead
 from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE

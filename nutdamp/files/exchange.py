@@ -28,9 +28,9 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     if until is not None and form not in TRACKS:
         raise BadRequest(f"an end belongs to a track ({' or '.join(TRACKS)}); {form} is none")
     if form == "json":
+        from nutdamp.comparison import Comparison
         from nutdamp.files.output import json_text
         from nutdamp.files.plan_json import comparison_json
-        from nutdamp.planning import Comparison
 
         return json_text(comparison_json(Comparison(plan.spacecraft, (plan,)), {"reason": "the plan exported"}))
     if form == "basilisk":

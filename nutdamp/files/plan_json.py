@@ -8,9 +8,10 @@ from typing import Any
 
 from nutdamp import __version__
 from nutdamp.aspect import Aspect
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Part
 from nutdamp.flight import Flight, Residual
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import plan_json
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 
 WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
 """Columns of text."""

@@ -25,9 +25,10 @@ from nutdamp.files.models import (
     SteerableSection,
     ThrusterSection,
 )
-from nutdamp.files.rules import CANCELLED, disturbance_kind, force_vector, symmetric
+from nutdamp.files.rules import disturbance_kind, symmetric
 from nutdamp.files.settings import Setting
 from nutdamp.files.sky_models import CommandsSection, KeepSection, SunSensorSection
+from nutdamp.files.thruster_rules import CANCELLED, force_vector
 from nutdamp.files.yaml_tree import read_text
 from nutdamp.physics import attitude, sun
 from nutdamp.physics.inertia import principal_axes

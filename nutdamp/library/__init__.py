@@ -12,6 +12,7 @@ It is what the command line calls. The types are those of the modules below; how
 spacecraft file; arrays with named fields carry the names and units of the CSV files.
 """
 
+from nutdamp.comparison import Comparison as Comparison
 from nutdamp.flight import Flight as Flight
 from nutdamp.flight import Residual as Residual
 from nutdamp.library.calls import compare as compare
@@ -29,7 +30,6 @@ from nutdamp.library.studies import disperse as disperse
 from nutdamp.library.studies import export as export
 from nutdamp.library.studies import trade as trade
 from nutdamp.library.studies import verify as verify
-from nutdamp.planning import Comparison as Comparison
 from nutdamp.planning import Plan as Plan
 from nutdamp.schemes import Options as Options
 from nutdamp.schemes.options import FourPulseOptions as FourPulseOptions

@@ -6,11 +6,12 @@ import warnings
 from collections.abc import Iterable, Sequence
 from os import PathLike
 
-from nutdamp import arguments, planning, schemes
+from nutdamp import arguments, comparison, planning, schemes
 from nutdamp.arguments import shown
+from nutdamp.comparison import Comparison
 from nutdamp.errors import BadRequest, nearest
 from nutdamp.library.craft import expected
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.schemes import Choice, Options, SchemeOptions
 from nutdamp.spacecraft import Spacecraft
 
@@ -29,8 +30,8 @@ def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice =
 
     Default: the classic three and optimal, or those that point where the file has a target axis.
     """
-    chosen = _names(names) or planning.usual(expected(spacecraft))
-    return planning.compare(expected(spacecraft), chosen, _options(options))
+    chosen = _names(names) or comparison.usual(expected(spacecraft))
+    return comparison.compare(expected(spacecraft), chosen, _options(options))
 
 
 def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from os import PathLike
 
 from nutdamp import arguments, dispersion
+from nutdamp.comparison import Comparison
 from nutdamp.dispersion.study import Results
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.files.output import write_whole
@@ -19,7 +20,7 @@ from nutdamp.library.calls import compare
 from nutdamp.library.craft import Source, load
 from nutdamp.library.studies import disperse as fly_cases
 from nutdamp.library.studies import trade
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import UNCONTROLLED, Control, Page
 from nutdamp.presentation.page.formats import form_of

@@ -6,10 +6,11 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import arguments, views
+from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, decide
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.flight import Flight
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation import decisions, verdicts
 from nutdamp.presentation.text import degrees
 from nutdamp.remarks import infeasibility, remarks

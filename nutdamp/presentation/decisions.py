@@ -8,9 +8,9 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, Line
-from nutdamp.planning import Comparison
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import end_table
 from nutdamp.presentation.layout import columns

@@ -11,10 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp import compliance
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import decide
 from nutdamp.flight import Residual
-from nutdamp.planning import NO_NUTATION, Comparison, Plan
+from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.decisions import decision_screen

@@ -10,10 +10,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import compliance, outcome, schemes
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, sentence
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import obstacle

@@ -163,7 +163,7 @@ def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, a
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
 def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str, package: str) -> None:
     """No file is read, and no plan is made: what would make it is not there."""
-    no_plans = "import nutdamp.planning; nutdamp.planning.compare = None"
+    no_plans = "import nutdamp.comparison; nutdamp.comparison.compare = None"
     done = without(package, tmp_path, "report", "missing.yaml", "-o", output, more=no_plans)
     assert done.returncode == 1
     assert "pip install 'nutdamp[plot]'" in done.stderr

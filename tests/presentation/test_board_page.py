@@ -17,8 +17,8 @@ from reference import Motion, coast
 
 import nutdamp
 from nutdamp import flight, guide
+from nutdamp.comparison import compare
 from nutdamp.outcome import spin_phases
-from nutdamp.planning import compare
 from nutdamp.presentation.page import pdf
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import Control

@@ -20,6 +20,7 @@ from matplotlib.text import Annotation
 from samples import slow
 
 from nutdamp import flight, planning
+from nutdamp.comparison import compare
 from nutdamp.errors import BadRequest, MissingExtra
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.flight import Flight
@@ -292,7 +293,7 @@ def test_no_text_is_cut_or_covers_another(name: str, case: str) -> None:
 )
 def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
     body = load_spacecraft(str(path))
-    for plan in planning.compare(body, CLASSIC).plans:
+    for plan in compare(body, CLASSIC).plans:
         if plan.feasible:
             made, track = fly(body, plan.pulses)
             for name in NAMES:

@@ -17,9 +17,9 @@ import pytest
 from markup import parsed
 from process import Run
 
+from nutdamp.comparison import compare
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import compare
 from nutdamp.presentation.page import moving
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html

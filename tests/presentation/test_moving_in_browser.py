@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 from process import Run
 
+from nutdamp.comparison import compare
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import compare
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html
 from nutdamp.schemes import CLASSIC

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from markup import Node, parsed
 
+from nutdamp.comparison import Comparison, compare
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.plan_json import comparison_json
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.library.studies import trade
-from nutdamp.planning import Comparison, compare
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.craft import spacecraft_facts

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from nutdamp.comparison import compare
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.planning import compare
 from nutdamp.presentation.page import pdf
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html

@@ -17,11 +17,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, StepPatch
 
 from nutdamp import dispersion, fronts, planning
+from nutdamp.comparison import Comparison, compare
 from nutdamp.decision import cases_of, decide
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Exact
 from nutdamp.dispersion.study import Results, run
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.dispersion_tables import budget_rows
 from nutdamp.presentation.figures import dispersion as drawing
@@ -170,7 +171,7 @@ def test_nothing_that_varies_is_an_empty_tornado() -> None:
 
 @cache
 def compared() -> Comparison:
-    return planning.compare(BODY, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
+    return compare(BODY, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
 
 
 def column(figure: Figure, name: str) -> Axes:
@@ -249,13 +250,13 @@ def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
 
 
 def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
-    ideal = planning.compare(spinner(), ("one-pulse", "four-pulse"))
+    ideal = compare(spinner(), ("one-pulse", "four-pulse"))
     assert not ideal["four-pulse"].feasible
     figure = figures.schemes_figure(ideal)
     check_layout(figure)
     assert all(set(dots(axes)) == {0} for axes in figure.axes)
     assert [text.get_text() for text, _ in texts(figure)].count("no plan") == 1
-    none = planning.compare(spinner(), ("four-pulse",))
+    none = compare(spinner(), ("four-pulse",))
     check_layout(figures.schemes_figure(none))
 
 

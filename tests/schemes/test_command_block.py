@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from nutdamp import compliance, flight, planning, remarks
 from nutdamp.commands import Block
+from nutdamp.comparison import usual
 from nutdamp.errors import Infeasible
 from nutdamp.outcome import left_by
 from nutdamp.physics import attitude, sun_train
@@ -290,9 +291,9 @@ def test_without_commands_the_scheme_says_which_keys_it_needs() -> None:
 
 def test_it_is_compared_where_the_file_has_commands() -> None:
     body = some_body(1)
-    assert "command-block" in planning.usual(body)
-    assert "command-block" in planning.usual(replace(body, goal=replace(body.goal, axis=None)))
-    assert "command-block" not in planning.usual(replace(body, commands=None))
+    assert "command-block" in usual(body)
+    assert "command-block" in usual(replace(body, goal=replace(body.goal, axis=None)))
+    assert "command-block" not in usual(replace(body, commands=None))
 
 
 def a_turn(**limits: Any) -> Spacecraft:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nutdamp import compliance
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import degrees

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from rich.console import Group
 
 from nutdamp import __version__
+from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, cases_of, decide
 from nutdamp.fronts import Front
-from nutdamp.planning import Comparison, Plan, unrounded
+from nutdamp.planning import Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
 from nutdamp.presentation.end_tables import direction_text, spin_text
 from nutdamp.presentation.page.craft import ends_note, ends_sheet, spacecraft_blocks

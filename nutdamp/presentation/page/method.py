@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator
 
 from nutdamp import flight, guide
+from nutdamp.comparison import Comparison
 from nutdamp.compliance import Part, left_of
 from nutdamp.guide.topic import Formula, Rows, Topic
 from nutdamp.outcome import left_by, tolerated
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation.page.document import Block, Column, Facts, Listing, Points, Prose, Sheet
 from nutdamp.presentation.text import MISSING, degrees, quantity
 from nutdamp.verification import AGREE, Verification

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.fronts import Front
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.page.document import Picture
 from nutdamp.presentation.page.panels import apart

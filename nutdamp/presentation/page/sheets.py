@@ -8,10 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from nutdamp import compliance
+from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.flight import Residual
 from nutdamp.outcome import spin_phases
-from nutdamp.planning import Comparison, Plan
+from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.decisions import COUNT
 from nutdamp.presentation.end_tables import angle_names, angle_texts

@@ -12,8 +12,9 @@ from builders import Outcome, cross, spinner
 from cases_dir import case
 from samples import slow
 
+from nutdamp.comparison import compare
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import compare, plan
+from nutdamp.planning import plan
 from nutdamp.remarks import broken_limits, infeasibility
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.optimal import repair
