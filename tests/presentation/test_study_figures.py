@@ -94,13 +94,74 @@ def test_histograms_reach_the_largest_value() -> None:
         assert axes.get_xlim()[1] >= edges[-1]
 
 
-def test_a_histogram_that_is_cut_says_where_and_how_many_lie_beyond() -> None:
+def test_a_histogram_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
     axes = Figure().subplots()
     drawing._histogram(axes, Exact(values), "nutation left", None)
-    assert "0.01 % of the cases lie beyond, up to 50°" in axes.get_title()
+    assert axes.get_xscale() == "log"
+    assert "log axis" in axes.get_title()
     (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
-    assert stairs.get_data()[1][-1] < 2.1
+    shares, edges, _ = stairs.get_data()
+    assert edges[-1] == pytest.approx(50.0)
+    assert float(np.sum(shares)) == pytest.approx(100.0)
+    assert shares[-1] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("which", ["shift", "target"])
+def test_cases_beyond_go_down_by_steps_to_the_last_case(which: str) -> None:
+    """One of 3,000 lies beyond the last but one, as far as the maximum; the scale is that of the histogram beside."""
+    results = study(which)
+    assert results.values is not None
+    axes = drawn("cases", which).axes
+    outputs = ("nutation", "momentum_shift" if which == "shift" else "axis_error")
+    for histogram, function, output in zip(axes[::2], axes[1::2], outputs, strict=True):
+        values = np.sort(np.degrees(results.values[OUTPUTS.index(output)]))
+        drawn_values, shares = line(function, "cases").T
+        assert function.get_xlim() == histogram.get_xlim()
+        assert drawn_values[-3:] == pytest.approx([values[-2], values[-1], values[-1]], rel=1e-3)
+        assert shares[-3:-1] == pytest.approx([100.0 / len(values)] * 2)
+        assert shares[-1] < function.get_ylim()[0] < shares[-2]
+        for place, beyond in zip(drawn_values[:-1:7], shares[:-1:7], strict=True):
+            assert 100.0 * np.mean(values > place * (1.0 + 1e-9)) == pytest.approx(beyond, abs=100.5 / len(values))
+
+
+STILL = replace(BODY, dispersions=Dispersions(timing=Tolerance("uniform", 1e-15)))
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.01])
+def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
+    """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
+    dispersions = replace(STILL.dispersions or Dispersions(), timing_offset=Tolerance("bias", bias) if bias else None)
+    body = replace(STILL, dispersions=dispersions)
+    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False)
+    results = run(Results(made, 50))
+    figure = figures.dispersion_figure("cases", results, scheme="two-pulse")
+    check_layout(figure)
+    most = results.distribution("nutation")
+    assert most is not None
+    left = math.degrees(most.maximum)
+    expected = f"{left:.4g}°" if left >= 1e-6 else "below 1e-6°"
+    for axes in figure.axes[:2]:
+        assert [text.get_text() for text in axes.texts] == [f"all 50 cases:\n{expected}, required 0.5°"]
+        assert not len(axes.get_xticks())
+        assert not axes.lines
+    assert (left >= 1e-6) == bool(bias)
+
+
+def test_the_tornado_says_what_its_bars_are_of() -> None:
+    for name in ("budget", "overview"):
+        titles = [" ".join(axes.get_title().split()) for axes in drawn(name).axes[-2:]]
+        assert titles == [f"{part}: one sigma of each input alone" for part in ("nutation", "shift of H")]
+        legends = [one for part in (drawn(name), *drawn(name).subfigs) for one in part.legends]
+        assert "bias, not one sigma" in {text.get_text() for one in legends for text in one.get_texts()}
+        for axes in drawn(name).axes[-2:]:  # each can stand alone
+            assert len([text for text in axes.get_yticklabels() if text.get_text()]) == len(axes.patches)
+
+
+def test_the_cloud_says_how_many_of_how_many_cases_it_shows() -> None:
+    for count, words in ((3000, "2,000 of the 3,000 cases"), (500, "the 500 cases")):
+        figure = figures.dispersion_figure("momentum", study("shift", count), scheme="two-pulse")
+        assert words in {text.get_text() for text in figure.legends[0].get_texts()}
 
 
 @pytest.mark.parametrize(("which", "output"), [("shift", "momentum_shift"), ("target", "axis_error")])
@@ -152,6 +213,7 @@ def test_the_tornado_has_the_rows_and_effects_of_the_table() -> None:
             if len(row.inputs) == 1:
                 assert row.name == names[row.inputs[0]]
             assert (bar.get_hatch() == "////") == row.bias
+            assert (bar.get_label() == "bias, not one sigma") == row.bias
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert any(label.startswith("A, ") for label in labels)
     assert sorted(index for row in rows for index in row.inputs) == list(range(len(names)))

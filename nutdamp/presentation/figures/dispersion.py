@@ -27,10 +27,31 @@ if TYPE_CHECKING:
 BINS = 80
 
 TAIL, KNEE = 2.0, 0.999
-"""A histogram ends at the largest value, or where that is more, at TAIL times what KNEE of the cases stay below."""
+"""Where the largest value is more than TAIL times what KNEE of the cases stay below, the axis is logarithmic."""
+
+DECADES = 6.0
+"""Of that axis at most: its first bin holds all that is less."""
+
+STEPS = 100
+"""Cases at the end of a distribution function that have a step each."""
+
+ALIKE = 1e-9
+"""Relative difference up to which the values of all cases are one, but for rounding."""
+
+NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
+"""Degrees below which all cases together are not worth a picture, and how that is written."""
+
+FAR = 4.0
+"""A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
+
+FEW = 4
+"""Rows of a tornado at least: fewer bars are no thicker."""
 
 DOTS = 2_000
 """Cases shown as dots: more would only make the picture heavy."""
+
+DENSE = 0.8
+"""Of a dot: fainter ones are not seen (less than 3:1 on white)."""
 
 
 @style.styled
@@ -74,7 +95,7 @@ def momentum(results: Results) -> Figure:
 
 def budget(results: Results) -> Figure:
     """What each tolerance does to nutation and shift of H, side by side."""
-    figure = style.sheet(7.4, 1.5 + 0.22 * len(budget_rows(results.study)))
+    figure = style.sheet(8.8, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
     _budget(figure, results)
     return figure
 
@@ -96,40 +117,66 @@ def _cases(figure: Figure | SubFigure, results: Results) -> None:
             continue
         name = "nutation left" if part is Part.NUTATION else part.label
         limit = _limit(results, part)
+        required = "" if limit is None else f", required {limit:.4g}°"
+        row[0].set_title(f"{name}: histogram")
+        row[1].set_title(f"{name}: cases beyond")
+        alike = _alike(found)
+        if alike is not None:
+            for axes in row:
+                style.words(axes, f"all {results.done:,} cases:\n{alike}{required}")
+            continue
+        row[1].sharex(row[0])
         _histogram(row[0], found, name, limit)
         _function(row[1], found, name, results)
         reached = math.degrees(float(found.quantiles(np.array([results.probability]))[0]))
         for axes in row:
             _mark(axes, reached, limit, results.probability)
-        required = "" if limit is None else f", required {limit:.4g}°"
         row[1].set_title(f"{exact_percent(results.probability)} within {reached:.4g}°{required}")
     style.legend(figure, list(grid.flat))
 
 
+def _alike(found: Distribution) -> str | None:
+    """What there is to say of cases of which a histogram would show nothing; None where it shows something."""
+    least, most = math.degrees(found.minimum), math.degrees(found.maximum)
+    if most < NOTHING:
+        return f"below {NEXT_TO_NOTHING}"
+    return f"{most:.4g}°" if most - least <= ALIKE * most else None
+
+
 def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) -> None:
-    """To the largest value; a long tail is cut, and said to be."""
-    knee, end = float(found.quantiles(np.array([KNEE]))[0]), found.maximum
-    cut = end > TAIL * knee > 0.0
-    end = TAIL * knee if cut else end
-    edges = np.linspace(found.minimum, max(end, found.minimum * (1.0 + 1e-9) + 1e-12), BINS + 1)
-    counts = found.histogram(np.append(edges, found.maximum) if cut else edges)
-    share = 100.0 * counts / max(counts.sum(), 1.0)
-    axes.stairs(share[:BINS], np.degrees(edges), fill=True, color=MOTION, alpha=0.85, label="cases")
+    """From the smallest to the largest value: on a log axis where few cases lie far beyond the others."""
+    low, high = found.minimum, found.maximum
     title = f"{name}: histogram"
-    if cut:
-        title += f"\n{share[-1]:.2g} % of the cases lie beyond, up to {math.degrees(found.maximum):.4g}°"
-    elif limit is not None and limit > math.degrees(edges[-1]):
+    if high > TAIL * float(found.quantiles(np.array([KNEE]))[0]):
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
+        edges = np.geomspace(max(low, high * 10.0**-DECADES), high, BINS + 1)
+        title += ", log axis"
+    else:
+        edges = np.linspace(low, high, BINS + 1)
+        axes.locator_params(axis="x", nbins=6)
+    counts = found.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
+    shown = np.degrees(edges)
+    axes.stairs(100.0 * counts / max(counts.sum(), 1.0), shown, fill=True, color=MOTION, label="cases")
+    if limit is not None and shown[-1] < limit <= FAR * shown[-1]:
         axes.set_xlim(right=1.04 * limit)
     axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %", title=title)
 
 
 def _function(axes: Axes, found: Distribution, name: str, results: Results) -> None:
     """How many cases lie beyond: on a scale that shows the last per mille as well as the first half."""
-    tail = np.logspace(0.0, -math.log10(max(results.done, 10)), 400)
-    axes.plot(np.degrees(found.quantiles(1.0 - tail)), 100.0 * tail, color=MOTION, linewidth=1.6, label="cases")
+    one = 1.0 / max(results.done, 10)
+    steps = one * np.arange(1, min(results.done, STEPS) + 1)
+    shares = np.sort(np.append(np.geomspace(steps[-1], 1.0, 400), steps[:-1]))[::-1]
+    # Beyond the last case but one lies one case, as far as the last one; beyond that none, below the edge.
+    values = np.degrees(np.append(found.quantiles(1.0 - shares), [found.maximum, found.maximum]))
+    shares = 100.0 * np.append(shares, [one, 0.1 * one])
+    axes.plot(values, shares, color=MOTION, linewidth=1.6, drawstyle="steps-post", label="cases")
     allowed = 100.0 * (1.0 - results.probability)
     axes.axhline(allowed, color=GREY, linewidth=1.0, linestyle=":", label=f"{allowed:.3g} % may lie beyond")
     axes.set_yscale("log")
+    axes.set_ylim(50.0 * one, 150.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %")
     axes.grid(True)
@@ -139,9 +186,8 @@ def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -
     """Where as many cases lie as shall meet the requirement, and the requirement, degrees."""
     share = exact_percent(probability)
     axes.axvline(reached, color=GREY, linewidth=1.0, linestyle="--", label=f"{share} of the cases")
-    if limit is not None:
+    if limit is not None and limit <= axes.get_xlim()[1]:
         axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")
-    axes.locator_params(axis="x", nbins=6)
 
 
 def momentum_cases(results: Results) -> Vector:
@@ -179,6 +225,15 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     body = results.study.model.spacecraft
     aim = compliance.aim(body)
     points, limit = momentum_cases(results), _limit(results, aim)
+    centre = "H(0)" if aim is Part.SHIFT else "the target"
+    sky = geometry.sky_names(results.study.nominal, centre)
+    title = f"Where H ends, about {centre}\n{sky.view}"
+    widest = float(np.hypot(*points.T).max())
+    if widest < NOTHING:
+        axes.set_title(f"Where H ends, about {centre}")
+        required = "" if limit is None else f", required {limit:.4g}°"
+        style.words(axes, f"all {results.done:,} cases:\nwithin {NEXT_TO_NOTHING} of {centre}{required}")
+        return
     around = ellipse(points, results.probability)
     # One path for all dots, as short in a file as can be: strokes of next to no length with round caps.
     few = points[:DOTS]
@@ -186,46 +241,55 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     ends = np.stack([few, few + short], axis=1).reshape(-1, 2)
     dots = Path(ends, [Path.MOVETO, Path.LINETO] * len(few))
     dots.should_simplify = False
-    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", linewidth=1.6, capstyle="round", alpha=0.5))
-    axes.plot([], [], ".", color=MOTION, alpha=0.5, label=f"{len(few):,} of the cases")
+    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", linewidth=1.6, capstyle="round", alpha=DENSE))
+    some = f"{len(few):,} of the {results.done:,} cases" if len(few) < results.done else f"the {results.done:,} cases"
+    axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=some)
     axes.plot(
         *around.T, color=MOMENTUM, linewidth=1.5, label=f"holds {exact_percent(results.probability)} of the cases"
     )
     shown = [points, around]
-    if limit is not None:
+    if limit is not None and limit > FAR * widest:
+        title += f"\nrequired {limit:.4g}°, outside the view"
+    elif limit is not None:
         turn = np.linspace(0.0, 2.0 * math.pi, 121)
         shown.append(limit * np.column_stack([np.cos(turn), np.sin(turn)]))
         axes.plot(*shown[-1].T, color=PULSE, linewidth=1.6, label=f"required: {limit:.4g}°")
-    centre = "H(0)" if aim is Part.SHIFT else "the target"
     axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
     style.square(axes, np.vstack(shown), margin=0.08)
-    sky = geometry.sky_names(results.study.nominal, centre)
-    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Where H ends, about {centre}\n{sky.view}")
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=title)
     style.legend(figure, [axes], 2)
 
 
 def _budget(figure: Figure | SubFigure, results: Results) -> None:
     """Bars as long as the effects are, the largest on top: a tornado."""
     rows = budget_rows(results.study)
-    pair = figure.subplots(1, 2, sharey=True)
+    pair = figure.subplots(1, 2)
     places = -np.arange(len(rows), dtype=float)
+    names = [f"{row.name}, {row.size}" if row.size else row.name for row in rows]
     parts = (Part.NUTATION, compliance.aim(results.study.model.spacecraft))
     for axes, part, colour, index in zip(pair, parts, (MOTION, MOMENTUM), (0, 1), strict=True):
-        effects = np.degrees([row.effects[index] for row in rows])
-        hatches = ["////" if row.bias else "" for row in rows]
-        bars = axes.barh(places, effects, height=0.62, facecolor=colour, edgecolor=INK, linewidth=0.5, alpha=0.85)
-        for bar, hatch in zip(bars, hatches, strict=True):
-            bar.set_hatch(hatch)
-        for place, effect in zip(places, effects, strict=True):
-            axes.annotate(
-                f"{effect:.3g}", (effect, place), (3, 0), textcoords="offset points", va="center", fontsize=style.SMALL
-            )
-        axes.set_xlim(0.0, 1.3 * max(float(effects.max(initial=0.0)), 1e-12))
-        limit = _limit(results, part)
-        if limit is not None and limit < axes.get_xlim()[1]:
-            axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")
         name = "nutation" if part is Part.NUTATION else part.label
-        axes.set(xlabel=f"{name}, deg", title=f"Each input alone: {name}")
+        axes.set_title(f"{name}: one sigma\nof each input alone")
+        effects = np.degrees([row.effects[index] for row in rows])
+        most = float(effects.max(initial=0.0))
+        if most < NOTHING:
+            style.words(axes, f"each input: below {NEXT_TO_NOTHING}" if rows else "no input varies")
+            continue
+        bars = axes.barh(places, effects, height=0.62, facecolor=colour, edgecolor=INK, linewidth=0.5)
+        for bar, row, place, effect in zip(bars, rows, places, effects, strict=True):
+            if row.bias:
+                bar.set(hatch="////", label="bias, not one sigma")
+            text = f"{effect:.3g}" if effect >= NOTHING else "< 1e-6"
+            axes.annotate(text, (effect, place), (3, 0), textcoords="offset points", va="center", fontsize=style.SMALL)
+        limit, right = _limit(results, part), 1.3 * most
+        if limit is not None and limit <= right:
+            right = max(right, 1.05 * limit)
+            axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")
+        axes.set_xlim(0.0, right)
+        middle, half = 0.5 * (1 - len(rows)), 0.5 * max(len(rows), FEW) + 0.1
+        axes.set_ylim(middle - half, middle + half)
+        axes.set_yticks(places, names)
+        axes.set_xlabel(f"{name}, deg")
+        axes.locator_params(axis="x", nbins=5)
         axes.grid(axis="x")
-    pair[0].set_yticks(places, [f"{row.name}, {row.size}" if row.size else row.name for row in rows])
     style.legend(figure, list(pair))

@@ -127,6 +127,12 @@ def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
             axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
 
 
+def words(axes: Axes, text: str) -> None:
+    """Words in a panel that has nothing to show; no ticks, since there is no scale to read."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+    axes.set(xticks=[], yticks=[])
+
+
 def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
     """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
     middle, half = room(points, margin, centre=centre)
