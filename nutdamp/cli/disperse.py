@@ -47,13 +47,6 @@ SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
 
 
-FIXED_TIMES = (
-    "warning: the cases fly the pulses at their planned times; on board each follows its Sun pulse, so that errors of "
-    "spin and inertia count for less than the study says"
-)
-"""What is to be known of a study of command blocks."""
-
-
 @click.command("disperse", cls=PlanningCommand)
 @spacecraft_argument
 @flown_options("Disperse")
@@ -114,8 +107,6 @@ def command(
 
     require_dispersions(body)
     plan = plan_or_read(body, flown, options, remark, quiet=quiet)
-    if plan.pulses.blocks:
-        remark(FIXED_TIMES)
 
     from nutdamp.dispersion import study_of
 

@@ -13,6 +13,12 @@ __all__ = ["SAMPLES", "SEED", "study_of"]
 SAMPLES = 20_000
 """Cases that are flown where nothing else is said."""
 
+BY_SUN_PULSES = (
+    "--impulses flies pulses at planned times, and command blocks are fired from the Sun pulses of each case; leave "
+    "--impulses out, or name another scheme with --scheme"
+)
+"""Why command blocks are not flown by the impulse sum."""
+
 SEED = 1
 """Of their draws, likewise."""
 
@@ -20,10 +26,13 @@ SEED = 1
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED, flown: bool = True) -> Study:
     """The study of ``schedule`` with the dispersions of ``spacecraft``, ``flown`` or by the impulse sum.
 
-    Raises BadRequest for a spacecraft without dispersions.
+    Command blocks are fired in each case from its own Sun pulses, which only real widths do. Raises BadRequest for a
+    spacecraft without dispersions, and for command blocks by the impulse sum.
     """
     if spacecraft.dispersions is None:
         raise BadRequest("the spacecraft has no dispersions")
+    if schedule.blocks and not flown:
+        raise BadRequest(BY_SUN_PULSES)
     model = Model(spacecraft, schedule)
     if not flown:
         return Study(model, seed)

@@ -178,7 +178,8 @@ class Model:
         starts, impulses = [], []
         propellant: Cases | None = 0.0
         for number, one in enumerate(self._actuations, start=1):
-            shift = plus(offset, draws.get(f"timing pulse {number}", 0.0))
+            late = plus(offset, draws.get(f"Sun pulse {number}", 0.0))
+            shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
             start = one.pulse.start
             starts.append(start if _nothing(shift) else _not_before(start + shift))
             factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dispersion import sun_fired
 from nutdamp.dispersion.cases import DispersedCases, Model, Triple, rotated
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dynamics import Dynamics, make_dynamics
@@ -33,19 +34,19 @@ class RealWidths:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
-        parts = (*cases.moments, *cases.omega0, *cases.starts, *(part for pulse in cases.impulses for part in pulse))
-        count = max(np.size(part) for part in parts)
+        count = _count(cases)
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
-        pulses = rigid_cases.Pulses(
-            _whole(cases.starts, count),
-            np.array(self.model.on_times),
-            np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count),
-        )
-        upright = np.zeros((4, count))
-        upright[0] = 1.0  # the true body axes at t = 0 are where everything is seen from
-        dynamics = self._dynamics
-        bodies = rigid_cases.Bodies(moments, dynamics.constant, dynamics.forcing)
-        settled, turned = rigid_cases.fly(bodies, rates, upright, pulses)
+        propellant = cases.propellant
+        if self.model.schedule.blocks:
+            settled, turned, _, seen = self._fired(cases)
+            propellant = None if propellant is None else propellant * self._share(seen)
+        else:
+            pulses = rigid_cases.Pulses(
+                _whole(cases.starts, count),
+                np.array(self.model.on_times),
+                np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count),
+            )
+            settled, turned = rigid_cases.fly(self._bodies(moments), rates, _upright(count), pulses)
         momentum = _triple(moments * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)
@@ -56,9 +57,43 @@ class RealWidths:
             pointed=rotated(after, cases.tilt),
             spin=settled[2],
             spin_change=settled[2] - rates[2],
-            propellant=cases.propellant,
+            propellant=propellant,
             nutation=None if cases.moments[0] is cases.moments[1] else largest_nutation(moments, momentum, sense),
         )
+
+    def timed(self, cases: DispersedCases) -> DispersedCases:
+        """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they are."""
+        if not self.model.schedule.blocks:
+            return cases
+        fired = self._fired(cases)
+        pulses = zip(cases.impulses, fired.seen, strict=True)
+        impulses = tuple(_triple(np.array([part * seen for part in impulse])) for impulse, seen in pulses)
+        return replace(cases, starts=tuple(fired.starts), impulses=impulses)
+
+    def _bodies(self, moments: Array) -> rigid_cases.Bodies:
+        return rigid_cases.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
+
+    def _fired(self, cases: DispersedCases) -> sun_fired.Fired:
+        count = _count(cases)
+        bodies = self._bodies(_whole(cases.moments, count))
+        return sun_fired.fly(self.model, bodies, _whole(cases.omega0, count), _upright(count), cases)
+
+    def _share(self, seen: NDArray[np.bool_]) -> Array:
+        """Share of the propellant that pulses (k, n) take of which only those ``seen`` are fired."""
+        taken = np.array([pulse.propellant for pulse in self.model.schedule], dtype=float)
+        return np.asarray(taken @ seen / taken.sum())
+
+
+def _count(cases: DispersedCases) -> int:
+    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt)
+    return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))
+
+
+def _upright(count: int) -> Array:
+    """Quaternions (4, n) of the true body axes at t = 0, which are where everything is seen from."""
+    upright = np.zeros((4, count))
+    upright[0] = 1.0
+    return upright
 
 
 def largest_nutation(moments: Array, momentum: Triple, sense: float) -> Array:

@@ -120,6 +120,10 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
         yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], requested.timing, 0.0, "s")
     if requested.timing_offset is not None:
         yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), requested.timing_offset, 0.0, "s")
+    sensor = spacecraft.sun_sensor
+    if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
+        for number in pulses:
+            yield Input(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
     if requested.attitude is not None:
         for axis in "xy":
             yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")

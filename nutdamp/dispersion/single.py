@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from nutdamp import flight
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import Draws
+from nutdamp.dispersion.flown import RealWidths
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Spacecraft
@@ -19,12 +20,14 @@ Array = NDArray[np.float64]
 
 def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
-    body, case = model.spacecraft, model.cases(draws)
+    body, case = model.spacecraft, RealWidths(model).timed(model.cases(draws))
     pulses = []
     for planned, start, parts in zip(model.schedule, case.starts, case.impulses, strict=True):
-        impulse = np.array(parts, dtype=float)
+        impulse = np.array(parts, dtype=float).reshape(3)
         torque = None if planned.on_time == 0.0 else impulse / planned.on_time
-        pulses.append(Pulse(float(start) + 0.5 * planned.on_time, planned.on_time, planned.channel, impulse, torque))
+        pulses.append(
+            Pulse(float(np.squeeze(start)) + 0.5 * planned.on_time, planned.on_time, planned.channel, impulse, torque)
+        )
     tilt = np.array([*case.tilt, 0.0], dtype=float)
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])

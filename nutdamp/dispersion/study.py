@@ -21,7 +21,7 @@ from nutdamp.dispersion.cases import Cases, DispersedCases, Model
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
-from nutdamp.dispersion.sensitivity import FirstOrder, first_order, sampled_shares
+from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import (
     EXACT_CASES,
     Distribution,
@@ -87,13 +87,19 @@ class Study:
         return self.fly or self._closed_form
 
     @cached_property
-    def _closed_form(self) -> ClosedForm:
-        return ClosedForm(self.model)
+    def _closed_form(self) -> Fly:
+        form = ClosedForm(self.model)
+        if not self.model.schedule.blocks:
+            return form
+        from nutdamp.dispersion.flown import RealWidths  # closed forms need no integrator
+
+        real = RealWidths(self.model)
+        return lambda cases: form(real.timed(cases))
 
     @cached_property
     def first_order(self) -> FirstOrder:
-        """Sensitivities by the closed form."""
-        return first_order(self.model)
+        """Sensitivities by the closed form; those of blocks fired by Sun pulses by what flies them."""
+        return by_differences(self.model, self.flies) if self.model.schedule.blocks else first_order(self.model)
 
     def source(self) -> Source:
         """Draws for one thread."""
@@ -136,6 +142,8 @@ class Study:
         ]
         parts += [body.requirement, body.goal.spin, body.disturbances, body.dissipation, body.channels, body.steerable]
         parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
+        if schedule.blocks:  # each case fires them from its own Sun pulses
+            parts += [schedule.blocks, body.sun, body.sun_sensor]
         with np.printoptions(precision=17, floatmode="unique"):
             return hashlib.sha256(repr(parts).encode()).hexdigest()
 

@@ -164,9 +164,10 @@ def _budget(results: Results) -> list[RenderableType]:
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
     table.add_row(Text("together", style="dim"), "", *texts)
     count = min(results.done, EARLY)
+    how = "central differences" if study.model.schedule.blocks else "analytic derivatives"
     note = (
         f"Effect of each input alone on the nutation and on the {_budgeted(study)[1][1]}, and its share of their "
-        f"variance: linear by analytic derivatives, cases as the first {count:,} cases show it (first-order Sobol "
+        f"variance: linear by {how}, cases as the first {count:,} cases show it (first-order Sobol "
         "index)."
     )
     return [Text("Tolerance budget", style="bold"), table, Text(note, style="dim"), *_dominating(results)]

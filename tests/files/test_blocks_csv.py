@@ -10,25 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from process import Run
+from spinners import FILE
 
 from nutdamp.errors import FaultyFile
 from nutdamp.files.blocks_csv import HEADER, read_blocks
 from nutdamp.files.spacecraft_file import read_spacecraft
 
-FILE = """
-name: Spinner
-mass: 300 kg
-inertia: {A: 120 kg m^2, C: 180 kg m^2}
-state: {spin: 12 rpm, nutation: 0 deg}
-attitude: {epoch: 1998-01-07T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
-thrusters:
-  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, max_on_time: 2 s}
-sun: epoch
-sun_sensor: {azimuth: 35 deg}
-commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, every: [1, 2]}
-limits: {horizon: 1200 s}
-requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
-"""
 CRAFT = read_spacecraft(FILE, "f.yaml")
 TOP = "channel,first_sun_pulse,delay_s,width_s,count\n"
 GOAL = ("--target", "20deg,82deg")
