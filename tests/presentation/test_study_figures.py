@@ -26,6 +26,9 @@ from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.dispersion_tables import budget_rows
 from nutdamp.presentation.figures import dispersion as drawing
+from nutdamp.presentation.figures import schemes
+from nutdamp.recommendation import Standing
+from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable, Vector
 from nutdamp.tolerances import Dispersions, Tolerance
@@ -241,13 +244,15 @@ def column(figure: Figure, name: str) -> Axes:
     return found
 
 
-def dots(axes: Axes) -> dict[int, tuple[float, str, bool]]:
-    """By row: where the dot stands, its mark, whether it is filled."""
+def dots(axes: Axes) -> dict[str, tuple[float, str, bool]]:
+    """By scheme: where the dot stands, its mark, whether it is filled."""
+    rows = dict(zip(axes.get_yticks(), (text.get_text() for text in axes.get_yticklabels()), strict=True))
     found = {}
     for one in axes.lines:
-        if str(one.get_marker()) in "o<" and len(np.asarray(one.get_xdata())) == 1:
+        if str(one.get_marker()) in "o<xX" and len(np.asarray(one.get_xdata())) == 1:
             x, y = np.asarray(one.get_xydata())[0]
-            found[-int(y)] = float(x), str(one.get_marker()), one.get_markerfacecolor() == one.get_color()
+            scheme = rows[y].partition("\n")[0]
+            found[scheme] = float(x), str(one.get_marker()), one.get_markerfacecolor() == one.get_color()
     return found
 
 
@@ -256,22 +261,77 @@ def test_dots_stand_at_the_numbers_of_the_comparison() -> None:
     check_layout(figure)
     plans = compared().plans
     ends, impulses = dots(column(figure, "end")), dots(column(figure, "impulse"))
-    for row, plan in enumerate(plans):
-        assert ends[row][0] == pytest.approx(plan.end)
-        assert impulses[row][0] == pytest.approx(plan.total_impulse)
-        assert ends[row][2] == (plan is compared().recommended)
+    for plan in plans:
+        assert ends[plan.scheme][0] == pytest.approx(plan.end)
+        assert impulses[plan.scheme][0] == pytest.approx(plan.total_impulse)
+        if plan.meets_requirement:
+            assert ends[plan.scheme][1] == "o"
+            assert ends[plan.scheme][2] == (plan is compared().recommended)
     for name, part in (("nutation", "nutation"), ("shift of H", "momentum_shift")):
         axes = column(figure, name)
         assert axes.get_xscale() == "log"
-        for row, plan in enumerate(plans):
+        for plan in plans:
             left = math.degrees(getattr(plan.flown, part))
-            place, mark, _ = dots(axes)[row]
-            if mark == "<":
-                assert left < place == pytest.approx(axes.get_xlim()[0])
+            place, mark, _ = dots(axes)[plan.scheme]
+            if place == pytest.approx(axes.get_xlim()[0]):
+                assert left < place
+                assert mark in "<xX"
             else:
                 assert place == pytest.approx(left)
             shown = [note.get_text() for note in axes.texts]
             assert (f"{left:.4g}" if left >= 1e-9 else "< 1e-9") in shown
+
+
+@pytest.mark.parametrize("required", [True, False])
+def test_schemes_that_fall_short_are_not_taken_for_the_cheapest(required: bool) -> None:
+    """They stand at the foot under another mark, and say so: half of a schedule takes half of the impulse."""
+    body = BODY if required else replace(BODY, requirement=None)
+    whole = planning.plan(body, "two-pulse")
+    found = Comparison(
+        body, (Plan(body, "half", Schedule(whole.pulses.pulses[:1])), whole, planning.plan(body, "optimal"))
+    )
+    short = {plan.scheme for plan in found.plans if plan.feasible and plan.standing is Standing.MISSES}
+    assert short == {"half"}
+    figure = figures.schemes_figure(found)
+    check_layout(figure)
+    words = "requirement NOT met" if required else "does not damp"
+    for axes in figure.axes:
+        named = [text.get_text() for text in axes.get_yticklabels()]
+        assert {name.partition("\n")[0] for name in named if name.endswith(f"\n{words}")} == short
+        assert named[-1] == f"half\n{words}"
+        assert {scheme for scheme, (_, mark, _) in dots(axes).items() if mark in "xX"} == short
+    assert words in {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+def test_costs_that_are_equal_but_for_rounding_look_equal() -> None:
+    axes = Figure().subplots()
+    for costs in ([2.564, 2.5642, 2.56423], [200.0, 200.0 * (1 + 1e-15)]):
+        schemes._scale(axes, costs, schemes.Quantity("impulse", lambda plan: plan.pulses.total_impulse, str))
+        low, high = axes.get_xlim()
+        assert np.ptp(costs) / (high - low) < 0.01
+        assert 0.0 < low < min(costs) <= max(costs) < high
+
+
+def test_complying_cases_end_at_all_of_them() -> None:
+    axes = Figure().subplots()
+    schemes._scale(axes, [64.0, 99.9, 99.7], schemes._complying({}, 0.997))
+    assert 100.0 < axes.get_xlim()[1] < 105.0
+
+
+@pytest.mark.parametrize(("kilograms", "unit", "shown"), [((1.593, 0.654), "kg", "0.654"), ((0.0128,), "g", "12.8")])
+def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], unit: str, shown: str) -> None:
+    plans = [
+        Plan(
+            BODY,
+            f"trial {number}",
+            Schedule((replace(compared().plans[0].pulses.pulses[0], propellant=spent),)),
+        )
+        for number, spent in enumerate(kilograms)
+    ]
+    figure = figures.schemes_figure(Comparison(BODY, tuple(plans)))
+    axes = column(figure, "propellant")
+    assert axes.get_xlabel() == f"propellant, {unit}"
+    assert shown in {note.get_text() for note in axes.texts}
 
 
 def test_floor_and_requirement_are_lines() -> None:
@@ -306,8 +366,10 @@ def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
     axes = column(figure, "complying cases")
     share = cases["two-pulse"].complying
     assert share is not None
-    assert dots(axes)[1][0] == pytest.approx(100.0 * share)
-    assert set(dots(axes)) == {1, list(compared().plans).index(chosen)}
+    assert dots(axes)["two-pulse"][0] == pytest.approx(100.0 * share)
+    assert set(dots(axes)) == {"two-pulse", chosen.scheme}
+    assert all((mark in "xX") == (share < 0.997) for _, mark, _ in dots(axes).values())
+    assert axes.get_xlim()[1] < 105.0
     assert line(axes, "required")[0, 0] == pytest.approx(99.7)
 
 
@@ -316,8 +378,8 @@ def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
     assert not ideal["four-pulse"].feasible
     figure = figures.schemes_figure(ideal)
     check_layout(figure)
-    assert all(set(dots(axes)) == {0} for axes in figure.axes)
-    assert [text.get_text() for text, _ in texts(figure)].count("no plan") == 1
+    assert all(set(dots(axes)) == {"one-pulse"} for axes in figure.axes)
+    assert [text.get_text() for text, _ in texts(figure)].count("no plan") == len(figure.axes)
     none = compare(spinner(), ("four-pulse",))
     check_layout(figures.schemes_figure(none))
 

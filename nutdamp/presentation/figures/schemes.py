@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,10 +14,10 @@ from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import GREY, INK, MOTION, PAPER, PULSE
+from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import degrees
 from nutdamp.presentation.verdicts import percent
-from nutdamp.recommendation import by_propellant
+from nutdamp.recommendation import Standing, by_propellant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +25,15 @@ if TYPE_CHECKING:
 
 DECADES = 5.0
 """Of a log axis at most: what is less stands at its left edge."""
+
+SPAN = 0.1
+"""Of a linear axis at least, as a part of its largest value: what is equal but for rounding looks equal."""
+
+FAILS: dict[str, Any] = {"color": PULSE, "markersize": 7, "markeredgewidth": 1.6, "linestyle": ""}
+"""Mark of what does not meet the requirement, or does not damp."""
+
+ABREAST = 3
+"""Panels side by side at most."""
 
 
 class Floor(NamedTuple):
@@ -37,8 +46,7 @@ class Floor(NamedTuple):
 class Quantity(NamedTuple):
     """A column: its name, the value of a plan (None: unknown), what stands beside the dot, and the lines.
 
-    ``required``: the bound of the requirement. ``log``: an angle in degrees
-    on a log axis.
+    ``required``: the bound of the requirement. ``log``: an angle in degrees on a log axis. ``most``: no value is more.
     """
 
     name: str
@@ -47,6 +55,7 @@ class Quantity(NamedTuple):
     floor: Floor | None = None
     required: float | None = None
     log: bool = False
+    most: float = math.inf
 
 
 @style.styled
@@ -55,28 +64,40 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     columns = _columns(compared)
     if decided is not None and decided.cases is not None and decided.shares:
         columns.append(_complying(decided.shares, decided.cases.probability))
-    figure = style.sheet(1.75 * len(columns) + 0.4, 1.75 + 0.4 * len(compared.plans))
-    grid = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
-    names = [plan.scheme for plan in compared.plans]
+    plans = sorted(compared.plans, key=_place)
     chosen = compared.recommended if decided is None else decided.plan
-    for axes, column in zip(grid, columns, strict=True):
-        _column(axes, column, compared, chosen)
-    grid[0].set_yticks(-np.arange(len(names)), names)
-    grid[0].set_ylim(-len(names) + 0.45, 0.7)
-    for tick, plan in zip(grid[0].get_yticklabels(), compared.plans, strict=True):
-        tick.set_fontweight("bold" if plan is chosen else "normal")
-    style.legend(figure, list(grid))
+    abreast = min(ABREAST, -(-len(columns) // 2))
+    figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
+    cells = list(figure.subplots(2, abreast).flat)
+    for axes, column in zip(cells, columns, strict=False):
+        _column(axes, column, plans, chosen)
+    for axes in cells[len(columns) :]:
+        axes.remove()
+    style.legend(figure, cells[: len(columns)], 3)
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
+    if chosen is not None and chosen.standing is Standing.MISSES:
+        verdict += f" ({_short(chosen)})"
     figure.suptitle(f"{compared.spacecraft.name}: schemes by real pulse widths\n{verdict}")
     style.settle(figure)
     return figure
+
+
+def _place(plan: Plan) -> int:
+    """Schemes that reach more stand higher, those without a plan at the foot."""
+    return list(Standing).index(plan.standing) if plan.feasible else len(Standing)
+
+
+def _short(plan: Plan) -> str:
+    """What is to be said of a plan that misses what is required of it or of its cases."""
+    return "requirement NOT met" if compliance.required(plan.spacecraft) else "does not damp"
 
 
 def _columns(compared: Comparison) -> list[Quantity]:
     plans = [plan for plan in compared.plans if plan.feasible]
     body, propellant = compared.spacecraft, by_propellant(plans)
     unit = "kg" if propellant else "N m s"
-    scale, proved = 1e3 if propellant else 1.0, []
+    light = propellant and max((plan.pulses.cost_in(unit) for plan in plans), default=0.0) < 1.0
+    scale, proved = 1e3 if light else 1.0, []
     for plan in plans:
         bounds = plan.pulses.bounds
         if bounds is not None and bounds.rigorous is not None and bounds.unit == unit:
@@ -95,7 +116,7 @@ def _columns(compared: Comparison) -> list[Quantity]:
 
     return [
         Quantity(
-            "propellant, g" if propellant else "impulse, N m s", cost, "{:.4g}".format,
+            ("propellant, g" if light else "propellant, kg") if propellant else "impulse, N m s", cost, "{:.4g}".format,
             floor=min(proved, default=None),
         ),
         Quantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
@@ -118,29 +139,34 @@ def _complying(shares: Mapping[str, float], probability: float) -> Quantity:
     def text(value: float) -> str:
         return percent(value / 100.0, probability).removesuffix(" %")
 
-    return Quantity("complying cases, %", share, text, required=100.0 * probability)
+    return Quantity("complying cases, %", share, text, required=100.0 * probability, most=100.0)
 
 
-def _column(axes: Axes, column: Quantity, compared: Comparison, chosen: Plan | None) -> None:
-    values = [column.value(plan) if plan.feasible else None for plan in compared.plans]
+def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | None) -> None:
+    values = [column.value(plan) if plan.feasible else None for plan in plans]
     known = [value for value in values if value is not None]
     floor = None if column.floor is None else column.floor.least
     lines = [line for line in (floor, column.required) if line is not None]
-    low = _scale(axes, [*known, *lines], log=column.log)
-    for row, (plan, value) in enumerate(zip(compared.plans, values, strict=True)):
+    low = _scale(axes, [*known, *lines], column)
+    for row, (plan, value) in enumerate(zip(plans, values, strict=True)):
         axes.axhline(-row, color=GREY, linewidth=0.5, alpha=0.5)
         if value is None:
-            if not plan.feasible and axes.get_subplotspec().is_first_col():  # type: ignore[union-attr]
+            if not plan.feasible:
                 sides = axes.get_yaxis_transform()
                 axes.annotate("no plan", (0.5, -row), xycoords=sides, ha="center", fontsize=style.SMALL)
             continue
-        less = value < low
-        face = MOTION if plan is chosen else PAPER
-        name = "recommended" if plan is chosen else "other schemes"
-        look: dict[str, Any] = {"color": MOTION, "markerfacecolor": face, "markersize": 6, "linestyle": ""}
-        axes.plot(max(value, low), -row, "<" if less else "o", clip_on=False, **look)
-        axes.plot([], [], "o", label=name, **look)
-        style.label(axes, column.text(value), np.array([max(value, low), -row]), INK, role="vital")
+        few = column.most < math.inf and column.required is not None and value < column.required
+        less, place = value < low, np.array([max(value, low), -row])
+        if few or plan.standing is Standing.MISSES:
+            name = ("recommended, " if plan is chosen else "") + _short(plan)
+            axes.plot(*place, "X" if plan is chosen else "x", clip_on=False, **FAILS)
+            axes.plot([], [], "X" if plan is chosen else "x", label=name, **FAILS)
+        else:
+            face = MOTION if plan is chosen else PAPER
+            look: dict[str, Any] = {"color": MOTION, "markerfacecolor": face, "markersize": 6, "linestyle": ""}
+            axes.plot(*place, "<" if less else "o", clip_on=False, **look)
+            axes.plot([], [], "o", label="recommended" if plan is chosen else "other schemes", **look)
+        style.label(axes, column.text(value), place, INK, role="vital")
     if column.floor is not None:
         name = f"least to leave as little as {column.floor.scheme}"
         axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name)
@@ -148,25 +174,38 @@ def _column(axes: Axes, column: Quantity, compared: Comparison, chosen: Plan | N
         axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required")
     axes.set_xlabel(column.name)
     axes.grid(axis="x")
-    axes.tick_params(axis="y", length=0)
+    _name_rows(axes, plans, chosen)
 
 
-def _scale(axes: Axes, values: list[float], *, log: bool) -> float:
+def _name_rows(axes: Axes, plans: Sequence[Plan], chosen: Plan | None) -> None:
+    """Schemes beside their rows; those that fall short say so there."""
+    short = [plan.feasible and plan.standing is Standing.MISSES for plan in plans]
+    names = [plan.scheme + f"\n{_short(plan)}" * fails for plan, fails in zip(plans, short, strict=True)]
+    axes.set_yticks(-np.arange(len(plans)), names)
+    axes.set_ylim(-len(plans) + 0.45, 0.7)
+    axes.tick_params(axis="y", length=0, pad=6)
+    for tick, plan, fails in zip(axes.get_yticklabels(), plans, short, strict=True):
+        tick.set(fontweight="bold" if plan is chosen else "normal", color=FIRED if fails else INK, fontsize=style.SMALL)
+
+
+def _scale(axes: Axes, values: list[float], column: Quantity) -> float:
     """Scale and limits of a column; returns its least value, below which a dot stands at the edge."""
     from matplotlib.ticker import LogLocator
 
-    if not log:
+    if not column.log:
         low, high = min(values, default=0.0), max(values, default=1.0)
-        room = 0.35 * (high - low) or 0.5 * abs(high) or 1.0
-        axes.set_xlim(max(low - room, 0.0), high + room)
-        axes.locator_params(axis="x", nbins=3)
+        span = max(high - low, SPAN * abs(high)) or 1.0
+        low = 0.5 * (low + high - span)
+        axes.set_xlim(max(low - 0.35 * span, 0.0), min(low + 1.35 * span, column.most + 0.06 * span))
+        axes.locator_params(axis="x", nbins=4)
         return -math.inf
     seen = [value for value in values if value > math.degrees(NEGLIGIBLE)]
     high = max(seen, default=1.0)
     low = float(max(min(seen, default=high), high * 10.0**-DECADES) / 10.0)
+    low = 10.0 ** math.floor(math.log10(low))  # a tick
     axes.set_xscale("log")
     axes.set_xlim(low, high * (high / low) ** 0.3)
-    axes.xaxis.set_major_locator(LogLocator(numticks=4))
+    axes.xaxis.set_major_locator(LogLocator(numticks=5))
     axes.xaxis.set_minor_formatter("")
     axes.xaxis.set_major_formatter("{x:g}")
     return low

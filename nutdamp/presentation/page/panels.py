@@ -44,9 +44,8 @@ def _boxes(figure: Figure) -> tuple[str, ...]:
         if columns and box.x0 < columns[-1].x1:
             box = Bbox.union([columns.pop(), box])
         columns.append(box)
-    shared = figure.axes[0].get_shared_y_axes() if figure.axes else None
-    if len(columns) < 2 or any(len(shared.get_siblings(axes)) > 1 for axes in figure.axes if shared is not None):
-        return ()  # of panels that share an axis one has its labels
+    if len(columns) < 2:
+        return ()
     title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
     titles = [] if title is None else [title.get_window_extent(renderer)]
     legends = [legend.get_window_extent(renderer) for legend in figure.legends]

@@ -23,9 +23,9 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     drawn = [
         (
             "motion",
-            "Left: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
-            "Right: the direction of the spin axis in space, with the places of the angular momentum H; "
-            "enlarged beside it where they lie close together.",
+            "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
+            "Axis track: the direction of the spin axis in space, with the places of the angular momentum H; "
+            "where they lie close together, they are enlarged in a panel of their own.",
             "Pole curve in the body and track of the spin axis in space",
         ),
         (
@@ -35,7 +35,7 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         ),
         (
             "history",
-            "Body rates and cone angles over time; bars mark the pulses. Lower right: the nutation on a log axis.",
+            "Body rates and cone angles over time; bars mark the pulses. The nutation is shown on a log axis too.",
             "Body rates and cone angles over time",
         ),
     ]
@@ -48,10 +48,10 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
 
 def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
     """The schemes beside each other; raises MissingExtra."""
-    return Picture(
-        figures.svg(figures.schemes_figure(compared, decided)),
-        "A row for each scheme: what it costs, when it ends, what it leaves. What is less than an axis shows stands at "
-        "its left edge.",
+    return apart(
+        figures.schemes_figure(compared, decided),
+        "A row for each scheme: what it costs, when it ends, what it leaves. A cross marks a scheme that falls short, "
+        "whatever it costs. What is less than an axis shows stands at its left edge.",
         "Dot plots of cost, end, nutation and shift of H by scheme",
     )
 
@@ -70,8 +70,8 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
     drawn = (
         (
             "cases",
-            "How many cases leave how much nutation, and how far H has moved, with what is required. "
-            "Right: the share of cases beyond.",
+            "How many cases leave how much nutation, and how far H has moved, with what is required: "
+            "histograms, and the share of cases beyond each value.",
             "Histograms and distribution functions of nutation and shift of H",
         ),
         (
