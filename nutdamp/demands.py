@@ -41,7 +41,7 @@ class Goal:
 class Limits:
     """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
 
-    ``horizon`` None stands for `Spacecraft.horizon`'s default.
+    ``horizon`` None means `Spacecraft.horizon`'s default.
     """
 
     horizon: float | None = None

@@ -47,7 +47,7 @@ Route = tuple[Vector, ...]
 def schedules(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOptions) -> Iterator[Schedule]:
     """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
 
-    Each comes when it is asked for, as long as there is budget of `work`; routes that the scheme cannot fly are left
+    Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
     out.
     """
     for route in routes(spacecraft):

@@ -162,7 +162,7 @@ class Spacecraft(views.Shown):
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far the truth may be off;
+    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far true values may differ;
     ``object_id`` names it in messages; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep``
     are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
     ``source`` is what it was read from, None once a field is replaced.

@@ -1,4 +1,4 @@
-"""How far the truth may be off what a plan is made for: dispersions, as a spacecraft file gives them, in SI.
+"""How far the true values may differ from what a plan is made for: dispersions, as a spacecraft file gives them, in SI.
 
 The plan knows the estimate; a dispersed truth is the nominal value plus a draw, or times one plus a draw where the
 tolerance is relative.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
 
 STANDARD = "-"
-"""File name that stands for standard input or standard output."""
+"""File name that means standard input or standard output."""
 
 
 def expect_outputs(*read: Input | str | None, **written: str | Sequence[str] | None) -> bool:
@@ -57,7 +57,7 @@ def _path_of(given: Input | str | None) -> str | None:
 def _identity(path: str, standard: int) -> Hashable:
     """What tells one file from all others; None for what is no file, such as a terminal or /dev/null.
 
-    ``standard`` is the descriptor that ``-`` stands for.
+    ``standard`` is the descriptor that ``-`` means.
     """
     try:
         status = os.fstat(standard) if path == STANDARD else Path(path).stat()

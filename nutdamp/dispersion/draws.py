@@ -98,5 +98,5 @@ def _bad_rows(good: NDArray[np.bool_] | bool, count: int) -> NDArray[np.intp]:
 
 
 def _number(name: str) -> int:
-    """A number of 64 bits that stands for a name, the same everywhere."""
+    """A number of 64 bits for a name, the same everywhere."""
     return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")

@@ -1,7 +1,7 @@
 """The closed form over many cases: impulse sum Magnus 1970 (17) with exact attitude arcs, structure of arrays.
 
 Between pulses a symmetric body is free, and two facts make the arcs cheap. Seen in the frame that turns with the
-nutation, by the phase aα with α = ∫ω3 dt, the angular momentum stands still: its transverse part is
+nutation, by the phase aα with α = ∫ω3 dt, the angular momentum does not move: its transverse part is
 AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A)
 R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; no angle is taken before the end. Energy
 dissipation draws H away from axis 3 in that frame, along an arc that `energy_sink` knows.

@@ -118,7 +118,7 @@ class Sketch:
 
 
 def _middles() -> Array:
-    """The value that stands for each bin of a sketch."""
+    """The value that represents each bin of a sketch."""
     low = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)
     sizes = low * (1.0 + 0.5 ** (SHARPNESS + 1))
     sizes[0] = 0.0

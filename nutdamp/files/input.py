@@ -8,7 +8,7 @@ from pathlib import Path
 from nutdamp.errors import CannotRead, Fault, FaultyFile
 
 STDIN = "-"
-"""File name that stands for standard input."""
+"""File name that means standard input."""
 
 
 def read_bytes(path: str, most: int = -1) -> bytes:

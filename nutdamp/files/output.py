@@ -21,7 +21,7 @@ if sys.platform != "win32":
     import fcntl
 
 STDOUT = "-"
-"""File name that stands for standard output."""
+"""File name that means standard output."""
 
 PREFIX, SUFFIX = ".nutdamp-", ".part"
 """How the names of temporary files begin and end."""

@@ -66,7 +66,7 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
 def settings_within(values: Mapping[str, object]) -> tuple[Setting, ...]:
     """The settings in nested mappings, such as ``{"limits": {"horizon": "300 s"}}``; raises BadRequest.
 
-    A mapping stands for its keys, so that those beside them in the file keep their values.
+    A mapping is replaced key by key, so that those beside them in the file keep their values.
     """
     return tuple(_within(values, ()))
 

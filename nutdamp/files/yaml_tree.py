@@ -253,7 +253,7 @@ class _Builder:
             raise self.fatal(place, f"more than {MAX_NODES} values (aliases unfolded)", path[:1])
 
     def alias(self, event: yaml.AliasEvent, path: KeyPath) -> Node:
-        """The value that an alias stands for."""
+        """The value that an alias refers to."""
         name = str(event.anchor)
         node = self.anchors.get(name)
         if node is not None:

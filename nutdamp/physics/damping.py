@@ -21,7 +21,7 @@ def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
     """Two pulses that leave no nutation and H where it was, exact at every angle.
 
     J1 = C|ω3|(tan θ - tan(θ/2)) halves the nutation angle, so that H jumps onto the cone's half-angle; after half an
-    inertial turn at that angle, Δt = π A cos(θ/2)/(C|ω3|), the spin axis stands where H was, and
+    inertial turn at that angle, Δt = π A cos(θ/2)/(C|ω3|), the spin axis is where H was, and
     J2 = C|ω3| tan(θ/2) brings H back there. J1 + J2 = A|ω|: no more than one pulse, Magnus 1970 (21).
 
     ``omega`` is |ω|, ``spin`` ω3 (rad/s).

@@ -87,7 +87,7 @@ def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> Course
 
 
 def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> Course:
-    """``x`` is the ``exponent`` κt within ±`FOR_EVER`; from there on θ stands still."""
+    """``x`` is the ``exponent`` κt within ±`FOR_EVER`; from there on θ is constant."""
     growing, squared = of.exp(x), cosine * cosine
     size = of.sqrt(squared + sine_squared * growing * growing)
     grown = of.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)

@@ -109,7 +109,7 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
 
 
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
-    """How far the truth may be off, and which tolerances touch nothing that can fire."""
+    """How far the true values may differ from the file's, and which tolerances touch nothing that can fire."""
     from nutdamp.dispersion.inputs import reachable  # few files have dispersions
     from nutdamp.presentation.dispersion_tables import size_text, unused_table
 

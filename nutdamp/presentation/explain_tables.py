@@ -46,7 +46,7 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 
 def equations_screen() -> RenderableType:
-    """Every numbered equation: its subject, where it stands in the code, what differs from the print."""
+    """Every numbered equation: its subject, where it is in the code, what differs from the print."""
     from nutdamp.guide.equation import EQUATIONS
 
     rows = [(one.number, "\n".join([f"{one.subject}: {one.place}", *one.remarks])) for one in EQUATIONS]

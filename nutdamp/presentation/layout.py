@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 NARROW = 60
-"""Characters below which a table stands as one block a row."""
+"""Characters below which a table becomes one block a row."""
 
 GAP = 2
 """Characters between two columns."""

@@ -58,7 +58,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
     if not inertia.symmetric:
         first, second, _ = inertia.moments
-        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on a symmetric body alike")
+        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
     table.add_row("spin", spin_text(spacecraft.spin))
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"

@@ -1,4 +1,4 @@
-"""Verdicts in words: which plan is recommended and why, what is not met, what stands in the way, how many cases comply.
+"""Verdicts in words: which plan is recommended and why, what is not met, what prevents it, how many cases comply.
 
 The floors below give data; all sentences about them are here, so that every screen and page says the same.
 """
@@ -30,7 +30,7 @@ VERDICT = {True: "met", False: "NOT met", None: MISSING}
 
 
 def no_plan(plan: Plan) -> str:
-    """What stands in the column of a scheme that has no plan."""
+    """What is printed in the column of a scheme that has no plan."""
     if plan.failure is None:
         without = schemes.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
         return "no thrusters" if without else "infeasible"
@@ -106,7 +106,7 @@ def _those(body: Spacecraft, *, plural: bool = True) -> str:
 
 
 def warnings(compared: Comparison) -> tuple[str, ...]:
-    """What the recommended plan does not reach, and what stands in the way; nothing for one that complies."""
+    """What the recommended plan does not reach, and what prevents it; nothing for one that complies."""
     found = compared.recommendation
     if found.plan is None or found.standing is Standing.COMPLIES:
         return ()
@@ -158,7 +158,7 @@ def shortfall(plan: Plan, bound: Bound) -> str:
 
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
-    """What stands in the way of less, in sentences; what cures it first."""
+    """What prevents a smaller residual, in sentences; what cures it first."""
     body = plan.spacecraft
     parts = {bound.part for bound in plan.shortfalls}
     if body.disturbances and not plan.options.with_disturbances:

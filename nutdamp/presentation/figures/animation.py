@@ -119,7 +119,7 @@ def film(
 
 
 def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
-    """One palette for all frames: the colours are few, and what stands still stays the same to the pixel.
+    """One palette for all frames: the colours are few, and what does not move stays the same to the pixel.
 
     A frame is only what changed since the one before, by GIF89a: what did not is transparent in it.
     """
@@ -214,7 +214,7 @@ class Scene:
         self._lay_out()
 
     def _lay_out(self) -> None:
-        """Everything that stands still, and room for what moves."""
+        """Everything that does not move, and room for what moves."""
         figure, flight = self.figure, self.flight
         grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
@@ -270,7 +270,7 @@ class Scene:
         self.title.set_text(self.caption(now))
 
     def caption(self, now: float) -> str:
-        """What stands above the frame: name, time, and what fires or just did."""
+        """What is written above the frame: name, time, and what fires or just did."""
         firing = [
             f"   {'firing' if now <= pulse.end else 'fired'} {number}: {pulse.channel}"
             for number, pulse in enumerate(self.flight.schedule, start=1)
@@ -283,7 +283,7 @@ class Scene:
         return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
 
     def pixels(self) -> NDArray[np.uint8]:
-        """The frame as it is, (height, width, 3): what changes is drawn over what stands still."""
+        """The frame as it is, (height, width, 3): what changes is drawn over what does not move."""
         self.canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
         for artist in sorted([*self._changing, self.title], key=lambda one: one.get_zorder()):
             artist.draw(self.canvas.get_renderer())  # type: ignore[no-untyped-call]

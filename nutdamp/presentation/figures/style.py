@@ -147,7 +147,7 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str 
     """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
 
     ``label`` goes anywhere around its point and may be left out; ``number`` stays where it is put, along the edge of a
-    panel; ``vital`` is never left out; ``bar`` stands above the bar of a firing, and reads ``short`` where not all of
+    panel; ``vital`` is never left out; ``bar`` is above the bar of a firing, and reads ``short`` where not all of
     them have room.
     """
     note = axes.annotate(

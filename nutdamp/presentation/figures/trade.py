@@ -73,7 +73,7 @@ def trade_figure(spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | 
 
 
 def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], scale: float) -> None:
-    """Step lines and marks; a point that another front has too stands around that one's mark, hollow and larger."""
+    """Step lines and marks; a point that another front has too is drawn around that one's mark, hollow and larger."""
     shown: list[tuple[float, float, list[int]]] = []
     covered: list[tuple[float, float]] = []
     for front, (colour, mark, line) in zip(found, LOOKS * math.ceil(len(found) / len(LOOKS)), strict=False):

@@ -1,4 +1,4 @@
 """The report of a plan as one page: HTML, Markdown or PDF.
 
-`content` says what stands on it, in the pieces of `document`; `html` and `markdown` give them a form, `pdf` prints.
+`content` says what is on it, in the pieces of `document`; `html` and `markdown` give them a form, `pdf` prints.
 """

@@ -1,4 +1,4 @@
-"""What stands on the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
+"""The contents of the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
 
 from __future__ import annotations
 

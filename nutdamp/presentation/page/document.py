@@ -82,7 +82,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """Text as it stands in a file or on a command line; ``language`` as Markdown names it."""
+    """Text as it is in a file or on a command line; ``language`` as Markdown names it."""
 
     title: str
     text: str
@@ -93,7 +93,7 @@ Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing
 
 
 class Section(NamedTuple):
-    """A heading with what stands under it; ``name`` is where links lead to."""
+    """A heading with what comes under it; ``name`` is where links lead to."""
 
     name: str
     title: str
@@ -142,7 +142,7 @@ class Page:
 
     @property
     def footer(self) -> str:
-        """What stands at the foot of each sheet of paper, beside its number."""
+        """What is printed at the foot of each sheet of paper, beside its number."""
         document, issue, date = self.control.document, self.control.issue, self.control.date
         return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
 

@@ -73,7 +73,7 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """What stands still in the view, and what moves as the JSON ``data``; ``command``: what writes the same rows."""
+    """What does not move in the view, and what moves as the JSON ``data``; ``command``: what writes the same rows."""
 
     panels: tuple[Panel, ...]
     strip: Strip

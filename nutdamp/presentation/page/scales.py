@@ -1,4 +1,4 @@
-"""What stands still around the moving view: square panels and the strip over time, with their scales."""
+"""What does not move around the moving view: square panels and the strip over time, with their scales."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class _Lattice:
             changes = self.tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
             alone = missing[:, None] + changes
             pairs = np.linalg.norm(alone[:, :, None] + changes[:, None, :], axis=0)
-            # Two steps of one pulse might leave its room; on the diagonal stands the single step.
+            # Two steps of one pulse might leave its room; on the diagonal is the single step.
             pairs[pulse[:, None] == pulse[None, :]] = np.inf
             np.fill_diagonal(pairs, np.linalg.norm(alone, axis=0))
             one, two = divmod(int(np.argmin(pairs)), len(pulse))
