@@ -336,11 +336,7 @@ def _place(
         return None
     needed = (grown * halves.first * factor, grown * halves.second * factor)
     on_times = [_nearest(spacecraft, channel, impulse) for channel, impulse in zip((one, two), needed, strict=True)]
-    short = 0.0
-    for channel, impulse, on_time in zip((one, two), needed, on_times, strict=True):
-        reached = abs(channel.transverse) * on_time
-        reached *= abs(rates.width_factor(a, spin, channel.axial / spacecraft.inertia.C, on_time))
-        short += abs(impulse - reached) / (spacecraft.least_impulse * factor)
+    short = sum(_missing(spacecraft, *each) for each in zip((one, two), needed, on_times, strict=True)) / factor
     if short >= 1.0:
         return None
     first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
@@ -359,6 +355,13 @@ def _place(
             return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
         first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
+
+
+def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
+    """What a pulse of ``on_time`` s is off the effective impulse ``needed`` N m s, over all that the nutation needs."""
+    rate = channel.axial / spacecraft.inertia.C
+    width = rates.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
+    return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
 
 
 def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:

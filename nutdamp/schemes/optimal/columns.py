@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.spacecraft import Vector
+from nutdamp.spacecraft import Channel, Vector
 
 
 class Columns(NamedTuple):
@@ -38,3 +40,30 @@ class Columns(NamedTuple):
 def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
     """Columns that belong to no burn."""
     return Columns(channel, t, width, np.full(len(t), -1))
+
+
+@dataclass(frozen=True, slots=True)
+class Burn:
+    """Neighbouring slots of one channel taken together: centre and on-time in s."""
+
+    channel: Channel
+    t: float
+    on_time: float
+
+    @property
+    def impulse(self) -> float:
+        """Torque times on-time, N m s."""
+        return self.on_time * float(np.linalg.norm(self.channel.torque))
+
+
+def burns(channels: Sequence[Channel], columns: Columns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
+    """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
+    found: list[Burn] = []
+    for index in np.flatnonzero(np.bincount(columns.channel)).tolist():
+        mine = np.flatnonzero(columns.channel == index)
+        mine = mine[np.argsort(columns.t[mine], kind="stable")]
+        cut = (np.diff(columns.t[mine]) > apart) | (np.diff(columns.burn[mine]) != 0)
+        for group in np.split(mine, np.flatnonzero(cut) + 1):
+            total = float(on_times[group].sum())
+            found.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+    return tuple(sorted(found, key=lambda burn: burn.t))

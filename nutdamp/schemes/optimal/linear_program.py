@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nutdamp import work
 from nutdamp.limits import Windows
 from nutdamp.schemes.optimal import lp_solver
-from nutdamp.schemes.optimal.columns import Columns, alone
+from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns
 from nutdamp.schemes.optimal.reach import supplies
 from nutdamp.schemes.optimal.residual_equations import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
@@ -65,20 +65,6 @@ TINIEST = 1e-6
 
 SOME = 1e-12
 """Share of what is needed below which an on-time is rounding."""
-
-
-@dataclass(frozen=True, slots=True)
-class Burn:
-    """Neighbouring slots of one channel taken together: centre and on-time in s."""
-
-    channel: Channel
-    t: float
-    on_time: float
-
-    @property
-    def impulse(self) -> float:
-        """Torque times on-time, N m s."""
-        return self.on_time * float(np.linalg.norm(self.channel.torque))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +167,7 @@ class Program:
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
-            self._burns(chosen.of(used), on_times),
+            burns(self.channels, chosen.of(used), on_times, 1.01 * self.width),
             float(self.costs[chosen.channel[used]] @ on_times),
             self._unmet(found),
             self._off_by(free[2 * len(nothing) :]),
@@ -364,18 +350,6 @@ class Program:
         t = times[every, inner] + aside * 0.25 * self.width
         good = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best]) > PEAK
         return alone(channel[good], t[good], np.zeros(int(good.sum())))
-
-    def _burns(self, columns: Columns, on_times: Vector) -> tuple[Burn, ...]:
-        """Neighbouring columns of a channel as one burn about their common centre."""
-        burns: list[Burn] = []
-        for index in np.flatnonzero(np.bincount(columns.channel)):
-            mine = np.flatnonzero(columns.channel == index)
-            mine = mine[np.argsort(columns.t[mine], kind="stable")]
-            apart = (np.diff(columns.t[mine]) > 1.01 * self.width) | (np.diff(columns.burn[mine]) != 0)
-            for group in np.split(mine, np.flatnonzero(apart) + 1):
-                total = float(on_times[group].sum())
-                burns.append(Burn(self.channels[index], float(on_times[group] @ columns.t[group]) / total, total))
-        return tuple(sorted(burns, key=lambda burn: burn.t))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:
         """Forbid the slots of a channel (of all channels) that lie within ``start`` to ``end`` s."""

@@ -12,7 +12,8 @@ import numpy as np
 from nutdamp import work
 from nutdamp.limits import Windows
 from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
-from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
+from nutdamp.schemes.optimal.columns import Burn
+from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.spacecraft import Channel, Spacecraft
 
 UNMET = 1e-7

@@ -23,11 +23,12 @@ from nutdamp.flight import Flight
 from nutdamp.limits import keeps_limits
 from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
-from nutdamp.schemes.optimal.descent import Task
-from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
+from nutdamp.schemes.optimal.columns import Burn
+from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, Problem
 from nutdamp.schemes.optimal.refine import refine
 from nutdamp.schemes.optimal.repair import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
+from nutdamp.schemes.optimal.sequences import Task
 from nutdamp.schemes.options import OptimalOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.spacecraft import Spacecraft
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from nutdamp.limits import free_windows
 from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes.optimal.descent import Descent, Sequences, Task
+from nutdamp.schemes.optimal.descent import Descent
+from nutdamp.schemes.optimal.sequences import Sequences, Task
 from nutdamp.spacecraft import Vector
 
 STARTS = 512

@@ -18,7 +18,8 @@ from nutdamp.planning import plan
 from nutdamp.remarks import broken_limits, infeasibility
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.optimal import repair
-from nutdamp.schemes.optimal.linear_program import Burn, Program
+from nutdamp.schemes.optimal.columns import Burn
+from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.schemes.optimal.problem import Problem
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits

@@ -19,8 +19,9 @@ from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal import starting_points
-from nutdamp.schemes.optimal.descent import Descent, Task
+from nutdamp.schemes.optimal.descent import Descent
 from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.schemes.optimal.sequences import Task
 from nutdamp.spacecraft import Goal, Limits, Spacecraft
 
 TEN_NANODEGREE = math.radians(1e-8)
