@@ -10,11 +10,13 @@ from nutdamp.errors import BadRequest, Unsuitable
 if TYPE_CHECKING:
     from nutdamp.planning import Plan
 
-FORMATS = ("apm", "aem", "stk", "basilisk", "json")
-"""Formats by name; the first two are CCSDS messages in either of two notations."""
+FORMATS = ("apm", "aem", "aem-spin", "stk", "basilisk", "json")
+"""Formats by name."""
 
-MESSAGES = ("apm", "aem")
-TRACKS = ("aem", "stk")
+MESSAGES = ("apm", "aem", "aem-spin")
+"""CCSDS messages, in either of two notations."""
+
+TRACKS = ("aem", "aem-spin", "stk")
 
 
 def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
@@ -24,7 +26,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     format needs what the spacecraft file does not give, or cannot hold what the plan has.
     """
     if xml and form not in MESSAGES:
-        raise BadRequest(f"{form} has no XML notation; {' and '.join(MESSAGES)} have")
+        raise BadRequest(f"{form} has no XML notation; {', '.join(MESSAGES)} have")
     if until is not None and form not in TRACKS:
         raise BadRequest(f"an end belongs to a track ({' or '.join(TRACKS)}); {form} is none")
     if form == "json":
@@ -59,11 +61,13 @@ def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
     from nutdamp.files.ccsds.aem import aem
     from nutdamp.files.ccsds.apm import apm
     from nutdamp.files.ccsds.kvn import to_kvn
+    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, SPIN_NUTATION_MOM
     from nutdamp.files.ccsds.xml import to_xml
 
     created = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
     if form == "apm":
         message = apm(plan, place, created)
     else:
-        message = aem(plan, flight.flown(body, plan.pulses, end), end, place, created)
+        kind = QUATERNION_ANGVEL if form == "aem" else SPIN_NUTATION_MOM
+        message = aem(plan, flight.flown(body, plan.pulses, end), end, place, created, kind)
     return to_xml(message) if xml else to_kvn(message)

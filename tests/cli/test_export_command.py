@@ -215,7 +215,7 @@ def test_import_statuses(run: Run, dated: Path) -> None:
         (("body.yaml", "apm"), "the format is an option: nutdamp export body.yaml --format apm"),
         (("AEM", "my body.yaml"), "the format is an option: nutdamp export 'my body.yaml' --format aem"),
         (("stk",), "the format is an option: nutdamp export --format stk"),
-        ((), "name the format: --format apm, aem, stk, basilisk or json"),
+        ((), "name the format: --format apm, aem, aem-spin, stk, basilisk or json"),
         (("body.yaml", "other.yaml"), "got unexpected extra argument (other.yaml)"),
         (("body.yaml", "--format", "apm", "x", "y"), "got unexpected extra arguments (x y)"),
     ],

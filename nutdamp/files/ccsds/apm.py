@@ -5,8 +5,6 @@ Everything is given in the axes of the spacecraft file, which the message calls 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from nutdamp import __version__
@@ -17,6 +15,7 @@ from nutdamp.files.ccsds.message import (
     APM_METADATA,
     BODY_FRAME,
     HEADER,
+    MOMENTUM,
     Block,
     Keyword,
     Message,
@@ -24,17 +23,14 @@ from nutdamp.files.ccsds.message import (
     block,
     label,
 )
+from nutdamp.files.ccsds.spin import spin_values, spinning
 from nutdamp.files.frames import Reference
-from nutdamp.physics import attitude, cones
 from nutdamp.planning import Plan
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
 ORIGINATOR = "NUTDAMP"
-
-AXIS = 1e-12
-"""Tilt in rad up to which the symmetry axis counts as the third axis of the file."""
 
 Values = dict[str, str | float]
 
@@ -45,10 +41,10 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     Raises BadRequest for an ideal impulse, which has no duration and so no manoeuvre block.
     """
     body = plan.spacecraft
-    spinning = body.inertia.symmetric and math.hypot(*body.inertia.axes[:2, 2]) <= AXIS
-    state = block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *unsaid(body), *_spinless(spinning))
+    spins = spinning(body.inertia)
+    state = block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *unsaid(body), *_spinless(spins))
     blocks = [state, *_motion(body, reference.frame)]
-    if spinning:
+    if spins:
         blocks.append(_block("SPIN", {**_frames(reference.frame), **_spin(body)}))
     blocks.append(_block("INERTIA", _inertia(body)))
     blocks += [
@@ -85,8 +81,8 @@ def unsaid(body: Spacecraft) -> list[str]:
     return found
 
 
-def _spinless(spinning: bool) -> list[str]:
-    if spinning:
+def _spinless(spins: bool) -> list[str]:
+    if spins:
         return []
     return ["No SPIN block: the body is not symmetric about its third axis, as the model of that block is."]
 
@@ -115,30 +111,10 @@ def angular_velocity(rates: Vector) -> dict[str, float]:
 
 
 def _spin(body: Spacecraft) -> Values:
-    """Spin and nutation by annex F5: Euler angles Z-X-Z of the body, and H in its axes.
-
-    The third body axis turns about H at |H|/A, and the body about that axis at ω3 less its share of that turn, a ω3
-    for a symmetric body (Poinsot). A body that spins backwards has its third axis at more than 90 deg from H.
-    """
-    inertia = body.inertia
-    rates, quaternion = inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    axes = cleaned(attitude.matrix(quaternion))
-    right_ascension = math.atan2(axes[1, 2], axes[0, 2])
-    declination = math.atan2(axes[2, 2], math.hypot(axes[0, 2], axes[1, 2]))
-    # The first axis after the first two turns is the node; the angle from it to body axis 1 is the third.
-    node = cleaned([-math.sin(right_ascension), math.cos(right_ascension), 0.0])
-    momentum = inertia.tensor @ rates
-    transverse = math.hypot(momentum[0], momentum[1])
-    phase = math.atan2(-momentum[1], momentum[0]) if transverse > 0.0 else 0.0
-    return {
-        "SPIN_ALPHA": math.degrees(attitude.full_turn(right_ascension)),
-        "SPIN_DELTA": math.degrees(declination),
-        "SPIN_ANGLE": math.degrees(math.atan2(-node @ axes[:, 1], node @ axes[:, 0])),
-        "SPIN_ANGLE_VEL": math.degrees(inertia.a * rates[2]),
-        "NUTATION": math.degrees(math.atan2(transverse, momentum[2])),
-        "NUTATION_PER": cones.inertial_period(inertia.A, inertia.C, body.transverse_rate, body.spin),
-        "NUTATION_PHASE": math.degrees(phase),
-    }
+    """Spin and nutation at t = 0."""
+    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    found = spin_values(body.inertia, rates[None], quaternion[None])
+    return {name: float(value[0]) for name, value in found.items() if name not in MOMENTUM}
 
 
 def _inertia(body: Spacecraft) -> Values:

@@ -16,7 +16,7 @@ from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.checked import Checked, unit_length
 from nutdamp.files.ccsds.kvn import from_kvn
-from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, VERSION, Block, Keyword
+from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, MOMENTUM, VERSION, Block, Keyword
 from nutdamp.files.ccsds.xml import from_xml, is_xml
 from nutdamp.files.frames import FRAMES
 from nutdamp.files.input import read_limited, utf8_text
@@ -36,7 +36,6 @@ _VERSION = "CCSDS_APM_VERS"
 _OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
 _BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
-_MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +248,7 @@ class _Reader:
         if block is None or self._endpoints(block, reversible=False) is None:
             return quaternion, rates
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
-        nutating, with_momentum = block.has(_NUTATION), block.has(_MOMENTUM)
+        nutating, with_momentum = block.has(_NUTATION), block.has(MOMENTUM)
         if nutating and with_momentum:
             block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
         if angles is None:
@@ -265,7 +264,7 @@ class _Reader:
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
             rate += 2.0 * math.pi / values[1] * momentum
-        elif with_momentum and (values := block.numbers(*_MOMENTUM)) is not None:
+        elif with_momentum and (values := block.numbers(*MOMENTUM)) is not None:
             right, up, about_momentum = map(math.radians, values)
             momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
             rate += about_momentum * (attitude.matrix(turn).T @ momentum)

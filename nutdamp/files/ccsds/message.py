@@ -51,6 +51,13 @@ _FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
 _QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
 _ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
+_SPIN = (
+    *_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"),
+    *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
+)
+MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
+"""Keywords that say where H is, and how fast the spin axis turns about it."""
+
 HEADER = (
     *_text("CLASSIFICATION", required=False),
     *_text("CREATION_DATE", "ORIGINATOR"),
@@ -86,12 +93,11 @@ APM_BLOCKS: dict[str, Layout] = {
         "spin",
         (
             *_FRAMES,
-            *_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"),
-            *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
+            *_SPIN,
             *_numbers("NUTATION", unit="deg", required=False),
             *_numbers("NUTATION_PER", unit="s", required=False),
-            *_numbers("NUTATION_PHASE", "MOMENTUM_ALPHA", "MOMENTUM_DELTA", unit="deg", required=False),
-            *_numbers("NUTATION_VEL", unit="deg/s", required=False),
+            *_numbers("NUTATION_PHASE", *MOMENTUM[:2], unit="deg", required=False),
+            *_numbers(MOMENTUM[2], unit="deg/s", required=False),
         ),
     ),
     "INERTIA": Layout(
@@ -117,8 +123,19 @@ AEM_METADATA = _text(
 )
 """What is written of table 4-3."""
 
-AEM_RECORD = (*_text("EPOCH"), *_QUATERNION, *_numbers(*_ANGVEL, unit="deg/s", tag="angVel"))
-"""A data line of ATTITUDE_TYPE QUATERNION/ANGVEL."""
+QUATERNION_ANGVEL, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN/NUTATION_MOM"
+"""Values of ATTITUDE_TYPE."""
+
+AEM_RECORDS = {
+    QUATERNION_ANGVEL: Layout(
+        "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*_ANGVEL, unit="deg/s", tag="angVel"))
+    ),
+    SPIN_NUTATION_MOM: Layout(
+        "spinNutationMom",
+        (*_text("EPOCH"), *_SPIN, *_numbers(*MOMENTUM[:2], unit="deg"), *_numbers(MOMENTUM[2], unit="deg/s")),
+    ),
+}
+"""A data line of each ATTITUDE_TYPE (table 4-4)."""
 
 
 class Entry(NamedTuple):
@@ -142,11 +159,12 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Metadata and the data that they describe: blocks (APM) or records (AEM)."""
+    """Metadata and the data that they describe: blocks (APM), or records of the layout ``record`` (AEM)."""
 
     metadata: Block
     blocks: tuple[Block, ...] = ()
     records: tuple[tuple[str, ...], ...] = ()
+    record: Layout | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from xml.parsers import expat
 
 from nutdamp.errors import Fault
-from nutdamp.files.ccsds.message import AEM_RECORD, APM_BLOCKS, VERSION, Block, Entry, Keyword, Message
+from nutdamp.files.ccsds.message import APM_BLOCKS, VERSION, Block, Entry, Keyword, Message
 
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
 
@@ -47,9 +47,10 @@ def to_xml(message: Message) -> str:
             else:
                 _fill(SubElement(data, layout.tag), block, layout.keywords)
         for record in segment.records:
-            state = SubElement(SubElement(data, "attitudeState"), "quaternionAngVel")
-            entries = (Entry(row.name, value, row.unit) for row, value in zip(AEM_RECORD, record, strict=True))
-            _entries(state, entries, AEM_RECORD)
+            assert segment.record is not None
+            tag, rows = segment.record
+            entries = (Entry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
+            _entries(SubElement(SubElement(data, "attitudeState"), tag), entries, rows)
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 

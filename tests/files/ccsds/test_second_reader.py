@@ -28,7 +28,7 @@ def reader() -> Any:
 
 def parsed(reader: Any, case: str, form: str, notation: str) -> Any:
     text = export_text(messages.planned(case), form, xml=notation == "xml")
-    message = getattr(reader, form.capitalize()).from_str(text, notation)
+    message = getattr(reader, form[:3].capitalize()).from_str(text, notation)
     message.validate()
     return message
 
@@ -49,9 +49,12 @@ def test_parameters(reader: Any, case: str, notation: str) -> None:
 
 @CASES
 @NOTATIONS
-def test_history(reader: Any, case: str, notation: str) -> None:
-    text = export_text(messages.planned(case), "aem")
-    segments = parsed(reader, case, "aem", notation).segments
+@pytest.mark.parametrize("form", ["aem", "aem-spin"])
+def test_history(reader: Any, case: str, notation: str, form: str) -> None:
+    if form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric:
+        return
+    text = export_text(messages.planned(case), form)
+    segments = parsed(reader, case, form, notation).segments
     assert len(segments) == text.count("META_START")
     rows = len(re.findall(r"^[0-9]{4}-\S+ ", text, re.MULTILINE))
     assert sum(len(segment.data.attitude_states) for segment in segments) == rows
