@@ -133,6 +133,18 @@ class Attitude:
     frame: str | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Orbit:
+    """Where the spacecraft is at t = 0 and how it moves: (3,) m and (3,) m/s from ``center``, in the attitude's frame.
+
+    Nothing is computed from it: messages to flight dynamics carry it.
+    """
+
+    position: Vector
+    velocity: Vector
+    center: str = "EARTH"
+
+
 @dataclass(frozen=True, slots=True)
 class SpinState:
     """The motion at one moment, for the closed forms.
@@ -163,9 +175,9 @@ class Spacecraft(views.Shown):
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
     which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far true values may differ;
-    ``object_id`` names it in messages; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep``
-    are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
-    ``source`` is what it was read from, None once a field is replaced.
+    ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun,
+    where it is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of
+    ``sun_sensor`` may hold; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -182,6 +194,7 @@ class Spacecraft(views.Shown):
     goal: Goal = field(default_factory=Goal)
     dispersions: Dispersions | None = None
     object_id: str | None = None
+    orbit: Orbit | None = None
     sun: Vector | None = None
     keep: tuple[Keep, ...] = ()
     sun_sensor: SunSensor | None = None

@@ -46,6 +46,7 @@ KINDS: dict[str, Kind] = {
     "inertia": Kind("a moment of inertia", {"kg m^2": 1.0}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
     "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
+    "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3}),
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }

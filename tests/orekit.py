@@ -15,6 +15,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+MU = 3.986004415e14
+"""m³/s²; of the Earth."""
+
 LEAP_SECONDS = """
 1972 JAN 1 10, 1972 JUL 1 11, 1973 JAN 1 12, 1974 JAN 1 13, 1975 JAN 1 14, 1976 JAN 1 15, 1977 JAN 1 16,
 1978 JAN 1 17, 1979 JAN 1 18, 1980 JAN 1 19, 1981 JUL 1 20, 1982 JUL 1 21, 1983 JUL 1 22, 1985 JUL 1 23,
@@ -65,14 +68,28 @@ def tai_utc() -> str:
 
 
 def parse(kind: str, text: str) -> Any:
-    """The message in a text, KVN or XML: Orekit's Apm or Aem."""
+    """The message in a text, KVN or XML: Orekit's Apm, Aem or Opm."""
     source = java("org.orekit.data.DataSource")
     builder = java("org.orekit.files.ccsds.ndm.ParserBuilder")()
     stream = java("java.io.ByteArrayInputStream")(text.encode())
-    parser = builder.buildApmParser() if kind == "apm" else builder.buildAemParser()
+    if kind == "opm":  # it asks for its centre and the mu of that, and neither ephemerides nor gravity are at hand
+        builder = builder.withMu(MU)
+        _earth()
+    parser = getattr(builder, f"build{kind.capitalize()}Parser")()
     proxy = import_module("jpype").JProxy
     opener = proxy("org.orekit.data.DataSource$StreamOpener", dict={"openOnce": lambda: stream})
     return parser.parseMessage(source(f"message.{kind}", opener))
+
+
+@cache
+def _earth() -> None:
+    """The Earth as a body by name only: its motion is in files that are no part of the package."""
+    proxy = import_module("jpype").JProxy
+    names = {"getName": lambda: "Earth", "getGM": lambda: MU}
+    body = proxy("org.orekit.bodies.CelestialBody", dict=names)
+    loader = proxy("org.orekit.bodies.CelestialBodyLoader", dict={"loadCelestialBody": lambda _: body})
+    bodies = java("org.orekit.data.DataContext").getDefault().getCelestialBodies()
+    bodies.addCelestialBodyLoader("Earth", loader)
 
 
 def date(text: str) -> Any:

@@ -23,7 +23,7 @@ from nutdamp.cli.common import (
 from nutdamp.cli.parameters import FILE, Named, Quantity
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
-from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
+from nutdamp.files.exchange import FORMATS, MESSAGES, export_text, lacking
 from nutdamp.schemes import PLANNED, Options
 
 
@@ -33,13 +33,18 @@ from nutdamp.schemes import PLANNED, Options
     "--format",
     "form",
     type=Named(FORMATS),
-    help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS); stk: the same as .a; basilisk: a "
-    "script that flies the schedule; json: as `plan --json`.",
+    help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS) as quaternions, aem-spin: as spin, "
+    "nutation and momentum; opm: velocity change of each pulse (CCSDS); stk: attitude history as .a; spin-table: CSV, "
+    "one row a spin; basilisk: a script that flies the schedule; json: as `plan --json`.",
 )
-@click.option("--xml", is_flag=True, help="apm, aem: XML instead of keyword = value; also where FILE ends in .xml.")
+@click.option("--xml", is_flag=True, help="CCSDS: XML instead of keyword = value; also where FILE ends in .xml.")
 @flown_options("Export")
 @goal_options
-@click.option("--until", type=Quantity("time"), help="aem, stk: end; default last pulse + one inertial period.")
+@click.option(
+    "--until",
+    type=Quantity("time"),
+    help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
+)
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
 @quiet_option
 @click.pass_context
@@ -57,8 +62,8 @@ def command(
 ) -> None:
     """Write a schedule in a format that other tools read.
 
-    apm, aem and stk need attitude.epoch and attitude.frame in the spacecraft file. Vectors are in the axes of that
-    file.
+    The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
+    for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
     form = _format(form, spacecraft, ctx.args)
     if until is not None and until <= 0.0:
@@ -70,6 +75,9 @@ def command(
     plan = plan_or_read(body, flown, options, remark, quiet=quiet)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
+    missing = lacking(plan, form)
+    if missing is not None:
+        remark(f"warning: {missing}")
     if output != "-":
         remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
     if plan.meets_requirement is False and (flown.scheme is None or flown.scheme in PLANNED):

@@ -10,13 +10,13 @@ from nutdamp.errors import BadRequest, Unsuitable
 if TYPE_CHECKING:
     from nutdamp.planning import Plan
 
-FORMATS = ("apm", "aem", "aem-spin", "stk", "basilisk", "json")
+FORMATS = ("apm", "aem", "aem-spin", "opm", "stk", "spin-table", "basilisk", "json")
 """Formats by name."""
 
-MESSAGES = ("apm", "aem", "aem-spin")
+MESSAGES = ("apm", "aem", "aem-spin", "opm")
 """CCSDS messages, in either of two notations."""
 
-TRACKS = ("aem", "aem-spin", "stk")
+TRACKS = ("aem", "aem-spin", "stk", "spin-table")
 
 
 def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
@@ -28,7 +28,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     if xml and form not in MESSAGES:
         raise BadRequest(f"{form} has no XML notation; {', '.join(MESSAGES)} have")
     if until is not None and form not in TRACKS:
-        raise BadRequest(f"an end belongs to a track ({' or '.join(TRACKS)}); {form} is none")
+        raise BadRequest(f"an end belongs to a track ({', '.join(TRACKS)}); {form} is none")
     if form == "json":
         from nutdamp.comparison import Comparison
         from nutdamp.files.output import json_text
@@ -39,7 +39,18 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
         from nutdamp.files.basilisk_script import basilisk_script
 
         return basilisk_script(plan)
+    if form == "spin-table":
+        from nutdamp.files.spin_table import spin_table
+
+        return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
     return _with_epoch(plan, form, xml, until)
+
+
+def lacking(plan: Plan, form: str) -> str | None:
+    """What the format ``form`` needs to be complete and the spacecraft file does not give; None where it is."""
+    if form != "opm" or plan.spacecraft.orbit is not None:
+        return None
+    return "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, and no whole message"
 
 
 def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
@@ -62,11 +73,14 @@ def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
     from nutdamp.files.ccsds.apm import apm
     from nutdamp.files.ccsds.kvn import to_kvn
     from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, SPIN_NUTATION_MOM
+    from nutdamp.files.ccsds.opm import opm
     from nutdamp.files.ccsds.xml import to_xml
 
     created = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
     if form == "apm":
         message = apm(plan, place, created)
+    elif form == "opm":
+        message = opm(plan, place, created)
     else:
         kind = QUATERNION_ANGVEL if form == "aem" else SPIN_NUTATION_MOM
         message = aem(plan, flight.flown(body, plan.pulses, end), end, place, created, kind)

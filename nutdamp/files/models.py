@@ -39,7 +39,7 @@ from nutdamp.files.quantities import (
     Torques,
     Window,
 )
-from nutdamp.files.sky_models import CommandsSection, KeepSection, SunSensorSection
+from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
 
 
 def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
@@ -294,6 +294,11 @@ class SpacecraftFile(Section):
         default=None,
         description="International designator, such as 1998-001A, for messages to flight dynamics.",
         examples=["1998-001A"],
+    )
+    orbit: OrbitSection | None = Field(
+        default=None,
+        description="Position and velocity at t = 0, for messages to flight dynamics.",
+        examples=[{"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]}],
     )
     thrusters: list[ThrusterSection] = Field(
         default=[],

@@ -15,6 +15,9 @@ from nutdamp.units import KINDS
 FAR = 50.0
 """m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm."""
 
+NEAR, SLOW = 1e6, 50.0
+"""m, m/s; no orbit about a planet is as near to its centre or as slow, and most tables count in km."""
+
 FAST = 100.0
 """rad/s; no spacecraft spins faster."""
 
@@ -43,6 +46,7 @@ def doubts(root: Node) -> Iterator[Finding]:
         value = _bare(facts, path)
         if value is not None and abs(value) > FAR:
             yield _doubt(path, value, "length", "mm")
+    yield from _orbit(facts)
     yield from _rates(facts)
     yield from _firings(facts)
 
@@ -95,6 +99,18 @@ def _lengths(facts: Facts) -> Iterator[KeyPath]:
         for axis, _ in facts.children("thrusters", index, "position"):
             yield ("thrusters", index, "position", axis)
     yield ("steerable", "lever_arm")
+
+
+def _orbit(facts: Facts) -> Iterator[Finding]:
+    """Positions nearer to the centre, and velocities smaller, than any orbit has."""
+    for key, kind, least, meant in (("position", "length", NEAR, "km"), ("velocity", "speed", SLOW, "km/s")):
+        given = facts.vector(kind, 3, "orbit", key)
+        if given is None or not 0.0 < math.hypot(*given) < least:
+            continue
+        path = ("orbit", key, int(abs(given).argmax()))
+        value = _bare(facts, path)
+        if value is not None:
+            yield _doubt(path, value, kind, meant)
 
 
 def _rates(facts: Facts) -> Iterator[Finding]:

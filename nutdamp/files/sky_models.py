@@ -7,7 +7,26 @@ from typing import Annotated
 from pydantic import Discriminator, Field, Tag
 
 from nutdamp.files.fields import RIGHT_ANGLE, TAGS, OrWord, Section, list_or_mapping
-from nutdamp.files.quantities import Angle, Apart, Count, Declination, InTheSky, Name, PositiveTime, Time
+from nutdamp.files.quantities import (
+    Angle,
+    Apart,
+    Count,
+    Declination,
+    InTheSky,
+    Name,
+    Position,
+    PositiveTime,
+    Time,
+    Velocity,
+)
+
+
+class OrbitSection(Section):
+    """Where the spacecraft is at t = 0, at attitude.epoch and in attitude.frame; for messages to flight dynamics."""
+
+    position: Position = Field(description="Position from the center, m.", examples=[["7000 km", 0, 0]])
+    velocity: Velocity = Field(description="Velocity, m/s.", examples=[[0, "7.5 km/s", 0]])
+    center: Name = Field(default="EARTH", description="Body at the origin; default EARTH.", examples=["EARTH"])
 
 
 class SunSensorSection(Section):

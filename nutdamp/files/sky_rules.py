@@ -12,6 +12,7 @@ from nutdamp.epoch import Epoch
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.yaml_tree import KeyPath
 from nutdamp.physics import attitude
+from nutdamp.units import shown
 
 Vector = NDArray[np.float64]
 
@@ -22,10 +23,11 @@ NO_ATTITUDE = "needs attitude, which says where the body points at t = 0"
 
 
 def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
-    """Everything wrong with ``sun``, ``keep`` and ``commands``.
+    """Everything wrong with ``orbit``, ``sun``, ``keep`` and ``commands``.
 
     ``axis`` (3,) is the axis in the body about which it spins at ``spin`` rad/s, or None where that cannot be read.
     """
+    yield from _orbit(facts)
     yield from _sun(facts)
     yield from _command_blocks(facts, spin, axis)
     for index, _ in facts.children("keep"):
@@ -70,6 +72,21 @@ def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
             f"it sees from {max(low, 0.0):.4g} to {min(high, 180.0):.4g} deg"
         )
         yield Finding(("sun_sensor",), problem, True)
+
+
+def _orbit(facts: Facts) -> Iterator[Finding]:
+    if not facts.has("orbit"):
+        return
+    missing = [key for key in ("epoch", "frame") if not facts.has("attitude", key)]
+    if missing:
+        names = " and ".join(f"attitude.{key}" for key in missing)
+        yield Finding(("orbit",), f"needs {names}: the moment of the position and the axes that it is in", True)
+    position = facts.vector("length", 3, "orbit", "position")
+    if position is not None and not position.any():
+        yield Finding(("orbit", "position"), "is the centre itself; expected the position of the spacecraft from it")
+    center = facts.text("orbit", "center")
+    if center is not None and not (center.strip() and center.isascii() and center.isprintable()):
+        yield Finding(("orbit", "center"), f"{shown(center)} is no name of a body; expected one such as EARTH")
 
 
 def _sun(facts: Facts) -> Iterator[Finding]:

@@ -27,7 +27,7 @@ from nutdamp.files.models import (
 )
 from nutdamp.files.rules import disturbance_kind, symmetric
 from nutdamp.files.settings import Setting
-from nutdamp.files.sky_models import CommandsSection, KeepSection, SunSensorSection
+from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
 from nutdamp.files.thruster_rules import CANCELLED, force_vector
 from nutdamp.files.yaml_tree import read_text
 from nutdamp.physics import attitude, sun
@@ -41,6 +41,7 @@ from nutdamp.spacecraft import (
     Inertia,
     Keep,
     Limits,
+    Orbit,
     Requirement,
     Spacecraft,
     Steerable,
@@ -90,6 +91,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
+        orbit=_orbit(contents.orbit),
     )
     sunward = _sun(contents)
     return replace(
@@ -173,6 +175,12 @@ def _attitude(section: AttitudeSection | None) -> Attitude | None:
         return None
     quaternion = np.array(section.quaternion) / math.hypot(*section.quaternion)
     return Attitude(quaternion, section.epoch, section.frame)
+
+
+def _orbit(section: OrbitSection | None) -> Orbit | None:
+    if section is None:
+        return None
+    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
 
 
 def _steerable(section: SteerableSection | None) -> Steerable | None:

@@ -124,9 +124,9 @@ def verify(plan: Plan) -> Verified:
 
 
 def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float | None = None) -> None:  # noqa: A002 - as --format
-    """Write what ``nutdamp export`` writes: apm, aem, stk, basilisk or json; messages as XML where the name says .xml.
+    """Write what ``nutdamp export`` writes in one of its formats; CCSDS messages as XML where the name says .xml.
 
-    ``until``: end of an aem or stk track, s. Raises Infeasible, BadRequest or CannotWrite.
+    ``until``: end of a history or spin table, s. Raises Infeasible, BadRequest or CannotWrite.
     """
     from nutdamp.files.exchange import FORMATS, MESSAGES, export_text
     from nutdamp.files.output import write_whole

@@ -85,7 +85,7 @@ def test_without_epoch_and_frame_the_lines_to_add_are_shown(run: Run, tmp_path: 
 @pytest.mark.parametrize("epoch", ["9999-12-31T23:59:59Z", "9999-12-31T23:59:59.5Z"])
 def test_dates_after_the_year_9999_are_refused_and_planned_without(run: Run, tmp_path: Path, epoch: str) -> None:
     (tmp_path / "late.yaml").write_text(DATED.replace("2026-03-01T12:00:00Z", epoch))
-    for form in ("apm", "aem", "stk"):
+    for form in ("apm", "aem", "aem-spin", "opm", "stk"):
         done = run("export", "late.yaml", "--format", form, "--scheme", "two-pulse")
         assert (done.returncode, done.stdout) == (2, "")
         assert "late.yaml:5:19: attitude.epoch: " in done.stderr
@@ -157,6 +157,38 @@ def test_an_ideal_impulse_asks_for_a_torque(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("dated")
+def test_an_orbit_makes_an_opm_whole_and_without_one_it_is_a_part(run: Run, tmp_path: Path) -> None:
+    file = str(Path(__file__).parents[2] / "configs" / "communications-spinner.yaml")
+    part = run("export", file, "--format", "opm", "--scheme", "four-pulse")
+    assert part.returncode == 0
+    assert "warning: the spacecraft file has no orbit" in part.stderr
+    assert "\nCOMMENT Only the part with the manoeuvres" in part.stdout
+    orbit = ("--set", "orbit={position: [42164 km, 0, 0], velocity: [0, 3.0747 km/s, 0]}")
+    whole = run("export", file, *orbit, "--format", "opm", "--scheme", "four-pulse", "-o", "whole.xml")
+    assert (whole.returncode, "no orbit" in whole.stderr) == (0, False)
+    text = (tmp_path / "whole.xml").read_text()
+    assert '<X units="km">42164.0</X>' in text
+    assert text.count("<maneuverParameters>") == part.stdout.count("MAN_EPOCH_IGNITION") > 0
+    massless = run("export", "dated.yaml", "--format", "opm", "--scheme", "one-pulse", "-o", "none.opm")
+    assert massless.returncode == 2
+    assert "add the key mass" in massless.stderr
+    assert not (tmp_path / "none.opm").exists()
+    lost = run("export", "--set", orbit[1], "--format", "spin-table", "--scheme", "none")
+    assert lost.returncode == 2
+    assert "orbit: needs attitude.epoch and attitude.frame" in lost.stderr
+
+
+def test_a_spin_table_needs_no_epoch_and_goes_on_as_requested(run: Run) -> None:
+    done = run("export", "--format", "spin-table", "--scheme", "two-pulse", "--until", "9 s")
+    assert done.returncode == 0
+    rows = pulses(done.stdout)
+    assert [row["spin"] for row in rows] == ["1", "2", "3", "4", "5"]
+    assert sum(int(row["pulses"]) for row in rows) == 2
+    assert run("export", "--format", "spin-table", "--scheme", "none", "--xml").returncode == 2
+    assert run("export", "--format", "spin-table", "--scheme", "none", "--until", "1e9 s").returncode == 2
+
+
+@pytest.mark.usefixtures("dated")
 def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
     run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "there.apm")
     run("import", "apm", "there.apm", "-o", "back.yaml", "--schedule", "back.csv")
@@ -215,7 +247,7 @@ def test_import_statuses(run: Run, dated: Path) -> None:
         (("body.yaml", "apm"), "the format is an option: nutdamp export body.yaml --format apm"),
         (("AEM", "my body.yaml"), "the format is an option: nutdamp export 'my body.yaml' --format aem"),
         (("stk",), "the format is an option: nutdamp export --format stk"),
-        ((), "name the format: --format apm, aem, aem-spin, stk, basilisk or json"),
+        ((), "name the format: --format apm, aem, aem-spin, opm, stk, spin-table, basilisk or json"),
         (("body.yaml", "other.yaml"), "got unexpected extra argument (other.yaml)"),
         (("body.yaml", "--format", "apm", "x", "y"), "got unexpected extra arguments (x y)"),
     ],

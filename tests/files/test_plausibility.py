@@ -15,6 +15,7 @@ from nutdamp.files.settings import parse_setting
 from nutdamp.files.spacecraft_file import read_spacecraft
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+DATED = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: GCRF}\n"
 THRUSTER = "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, min_on_time: {}}}]\n"
 
 
@@ -55,6 +56,14 @@ def doubts_of(text: str) -> list[str]:
         (
             BASE + "steerable: {torque: 3, lever_arm: 800}\n",
             "f.yaml:4:35: steerable.lever_arm: warning: 800 is read as 800 m; write 800 mm",
+        ),
+        (
+            BASE + DATED + "orbit: {position: [0, 7000, 0], velocity: [0, 0, 7500]}\n",
+            "f.yaml:5:23: orbit.position[1]: warning: 7000 is read as 7000 m; write 7000 km if that is meant",
+        ),
+        (
+            BASE + DATED + "orbit: {position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}\n",
+            "f.yaml:5:53: orbit.velocity[2]: warning: -7.5 is read as -7.5 m/s; write -7.5 km/s if that is meant",
         ),
         (
             BASE + "requirement: {nutation: 0.5}\n",

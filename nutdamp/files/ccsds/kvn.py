@@ -1,11 +1,11 @@
-"""Keyword = value notation, CCSDS 504.0-B-2 section 6: messages as plain text."""
+"""Keyword = value notation, CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7 alike): messages as plain text."""
 
 from __future__ import annotations
 
 import re
 
 from nutdamp.errors import Fault
-from nutdamp.files.ccsds.message import VERSION, Block, Entry, Message
+from nutdamp.files.ccsds.message import APM_BLOCKS, Block, Entry, Message
 
 _PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
 _WORD = re.compile(r"[A-Z0-9_]+")
@@ -14,16 +14,16 @@ _LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
 
 def to_kvn(message: Message) -> str:
     """The text of a message."""
-    lines = [f"CCSDS_{message.kind}_VERS = {VERSION}", *_block(message.header)]
+    lines = [f"CCSDS_{message.kind}_VERS = {message.version}", *_block(message.header)]
     for segment in message.segments:
         metadata = _block(segment.metadata)
-        if message.kind == "APM":
-            lines += ["", *metadata]
-        else:
+        if message.kind == "AEM":
             lines += ["", "META_START", *metadata, "META_STOP"]
+        else:
+            lines += ["", *metadata]
         for block in segment.blocks:
-            inside = _block(block)
-            lines += ["", f"{block.name}_START", *inside, f"{block.name}_STOP"] if block.name else ["", *inside]
+            inside, named = _block(block), block.name in APM_BLOCKS
+            lines += ["", f"{block.name}_START", *inside, f"{block.name}_STOP"] if named else ["", *inside]
         if segment.records:
             lines += ["", "DATA_START", *(" ".join(record) for record in segment.records), "DATA_STOP"]
     return "\n".join(lines) + "\n"

@@ -1,6 +1,7 @@
-"""What an attitude data message holds, whatever its notation: blocks of keywords, and the tables that rule them.
+"""What a message on attitude or orbit holds, whatever its notation: blocks of keywords, and the tables that rule them.
 
-The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML).
+The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
+502.0-B-3: 3-1 to 3-3 (OPM).
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ from decimal import Decimal
 from typing import NamedTuple
 
 VERSION = "2.0"
-"""Version of both messages in issue 2 of the standard. Version 1 has other keywords."""
+"""Version of APM and AEM in issue 2 of their standard. Version 1 has other keywords."""
+
+OPM_VERSION = "3.0"
+"""Version of the OPM in issue 3 of its standard."""
 
 BODY_FRAME = "SC_BODY_1"
 
@@ -117,6 +121,27 @@ APM_BLOCKS: dict[str, Layout] = {
 }
 """The blocks of an APM's data, in their order."""
 
+OPM_METADATA = _text("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
+
+OPM_BLOCKS: dict[str, Layout] = {
+    "STATE": Layout(
+        "stateVector",
+        (*_text("EPOCH"), *_numbers("X", "Y", "Z", unit="km"), *_numbers("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")),
+    ),
+    "SPACECRAFT": Layout("spacecraftParameters", _numbers("MASS", unit="kg", required=False)),
+    "MANEUVER": Layout(
+        "maneuverParameters",
+        (
+            *_text("MAN_EPOCH_IGNITION"),
+            *_numbers("MAN_DURATION", unit="s"),
+            *_numbers("MAN_DELTA_MASS", unit="kg"),
+            *_text("MAN_REF_FRAME"),
+            *_numbers("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
+        ),
+    ),
+}
+"""What is written of the blocks of an OPM, in their order; their names are not in the message."""
+
 AEM_METADATA = _text(
     *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
     *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
@@ -169,11 +194,16 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A whole message; ``kind`` is APM or AEM."""
+    """A whole message; ``kind`` is APM, AEM or OPM."""
 
     kind: str
     header: Block
     segments: tuple[Segment, ...]
+
+    @property
+    def version(self) -> str:
+        """Of the form that it has."""
+        return OPM_VERSION if self.kind == "OPM" else VERSION
 
 
 def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> Block:

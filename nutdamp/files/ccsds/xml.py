@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from xml.parsers import expat
 
 from nutdamp.errors import Fault
-from nutdamp.files.ccsds.message import APM_BLOCKS, VERSION, Block, Entry, Keyword, Message
+from nutdamp.files.ccsds.message import APM_BLOCKS, OPM_BLOCKS, Block, Entry, Keyword, Message
 
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
 
@@ -33,7 +33,7 @@ def to_xml(message: Message) -> str:
     """The text of a message."""
     # Namespace and attributes are written as the standard prints them.
     root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, "id": f"CCSDS_{message.kind}_VERS"})
-    root.set("version", VERSION)
+    root.set("version", message.version)
     _fill(SubElement(root, "header"), message.header)
     body = SubElement(root, "body")
     for segment in message.segments:
@@ -41,7 +41,7 @@ def to_xml(message: Message) -> str:
         _fill(SubElement(place, "metadata"), segment.metadata)
         data = SubElement(place, "data")
         for block in segment.blocks:
-            layout = APM_BLOCKS.get(block.name)
+            layout = {**APM_BLOCKS, **OPM_BLOCKS}.get(block.name)
             if layout is None:
                 _fill(data, block)
             else:
