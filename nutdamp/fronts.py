@@ -10,44 +10,46 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import work
-from nutdamp.planning import Plan, plan
+from nutdamp.compliance import Part
+from nutdamp.planning import Plan, compare, plan, usual
+from nutdamp.recommendation import SAME_COST, by_propellant
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Bounds
-from nutdamp.schemes.options import OptimalOptions
+from nutdamp.schemes.optimal.problem import LEFT
+from nutdamp.schemes.options import OptimalOptions, Options
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
-
-SAVES = 1e-3
-"""Share of the cost that a later end must save to count as another point."""
 
 EVERYWHERE = math.inf
 """Shift of H allowed that requires nothing."""
 
 
 class Point(NamedTuple):
-    """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within."""
+    """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within.
+
+    Its cost is counted in ``unit`` (kg or N m s), for all points alike.
+    """
 
     plan: Plan
     horizon: float
+    unit: str
 
     @property
     def cost(self) -> float:
-        """What the schedule costs, in the unit of its bounds."""
-        return self.plan.pulses.cost_in(self.bounds.unit)
+        """What the schedule costs, in its unit."""
+        return self.plan.pulses.cost_in(self.unit)
 
     @property
     def bounds(self) -> Bounds:
-        """What other schedules within the same horizon must cost."""
-        bounds = self.plan.pulses.bounds
-        assert bounds is not None
-        return bounds
+        """What other schedules within the same horizon must cost; of another scheme than optimal not known."""
+        return self.plan.pulses.bounds or Bounds(None, None, self.unit, self.horizon)
 
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Schedules none of which is both later and dearer than another; H may end ``shift`` rad off its target.
+    """Schedules of which none is beaten in end and cost at once; H may end ``shift`` rad off its target.
 
-    ``why`` says why there is none.
+    ``why`` says why there is none, or, beside points of other schemes, none of optimal.
     """
 
     shift: float
@@ -66,22 +68,59 @@ def fronts(
     """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    A schedule that keeps a smaller shift counts for the larger ones too, where none beats it. ``progress`` is called
-    with how many of the count × len(shifts) searches are done.
+    Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds
+    none, those of the other schemes count that comply but for where H ends. ``progress`` is called with how many of the
+    count × len(shifts) searches are done.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = _of_unknown_propellant(spacecraft)
-    made: list[Front] = []
     ordered = sorted(set(shifts))
+    found: list[tuple[float, Plan, float]] = []
+    why: dict[float, str] = {}
     with work.budget("the fronts", work.FRONTS) as spent:
         searches = _Searches(count * len(ordered), spent, progress)
-        for shift in ordered:
-            front = _front(spacecraft, _allowing(options, shift), count, shift, searches)
-            points = (*front.points, *(point for other in made for point in other.points))
-            made.append(Front(shift, _undominated(points), None if points else front.why))
-            searches.done = count * len(made)
-    return tuple(made)
+        for number, shift in enumerate(ordered, start=1):
+            made = _searched(spacecraft, _allowing(options, shift), count, searches)
+            if isinstance(made, str):
+                why[shift] = made
+            else:
+                found += [(shift, *one) for one in made]
+            searches.done = count * number
+    others = _others(spacecraft, options) if why else []
+    unit = "N m s" if options.least == "impulse" else _unit([*(one for _, one, _ in found), *others])
+    result: list[Front] = []
+    for shift in ordered:
+        points = [Point(one, horizon, unit) for kept, one, horizon in found if kept <= shift or _keeps(one, shift)]
+        if not points:
+            points = [Point(one, spacecraft.horizon, unit) for one in others if _keeps(one, shift)]
+        kept = undominated(points, result[-1].points if result else ())
+        result.append(Front(shift, kept, why.get(shift) if _by_others(kept) else None))
+    return tuple(result)
+
+
+def _unit(plans: Sequence[Plan]) -> str:
+    """The one in which the costs of all of them, and their bounds, are known."""
+    bounds = [one.pulses.bounds for one in plans if one.pulses.bounds is not None]
+    return "kg" if by_propellant(plans) and all(one.unit == "kg" for one in bounds) else "N m s"
+
+
+def _by_others(points: Sequence[Point]) -> bool:
+    """Whether no point is of the scheme optimal."""
+    return all(point.plan.scheme != OPTIMAL.name for point in points)
+
+
+def _keeps(one: Plan, shift: float) -> bool:
+    """Whether H ends no farther from its target than ``shift`` rad."""
+    return one.flight.residual.axis_error <= shift + LEFT
+
+
+def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
+    """What the other schemes of the usual comparison plan, where that complies but for where H ends."""
+    names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
+    plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances))
+    ends = {Part.SHIFT, Part.DISTANCE}
+    return [one for one in plans if len(one.pulses) and {bound.part for bound in one.shortfalls} <= ends]
 
 
 def _of_unknown_propellant(spacecraft: Spacecraft) -> Spacecraft:
@@ -96,8 +135,8 @@ def _of_unknown_propellant(spacecraft: Spacecraft) -> Spacecraft:
 class _Searches:
     """The searches of all fronts, within their ``budget``.
 
-    The fastest schedule of each, without which there is no front, may cost what a scheme may; of what that leaves, all
-    searches to come have equal shares.
+    The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may; of
+    what they leave, all searches to come have equal shares.
     """
 
     count: int
@@ -119,27 +158,41 @@ def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
     return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
 
 
-def _front(spacecraft: Spacecraft, options: OptimalOptions, count: int, shift: float, searches: _Searches) -> Front:
-    """The fastest schedule, then horizons from its end to that of the file, evenly by their ratios."""
-    fastest = searches(spacecraft, replace(options, least="time"))
-    if fastest.schedule is None or fastest.schedule.bounds is None:
-        return Front(shift, (), infeasibility(fastest) or "there is nothing to do")
-    points = [Point(fastest, spacecraft.horizon)]
+def _searched(
+    spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
+) -> list[tuple[Plan, float]] | str:
+    """The schedule of the whole horizon, the fastest, and those of horizons between, evenly by their ratios.
+
+    Each with its horizon, s; or why there is none.
+    """
+    whole = searches(spacecraft, options)
+    if whole.schedule is None or whole.schedule.bounds is None:
+        return infeasibility(whole) or "there is nothing to do"
+    found = [(whole, spacecraft.horizon)]
+    fastest = searches(spacecraft, replace(options, least="time")) if count > 1 else whole
+    if fastest.schedule is None or not len(fastest.schedule):
+        return found
+    found.append((fastest, spacecraft.horizon))
     begin, end = spacecraft.limits.earliest, fastest.pulses.end
-    for share in np.linspace(0.0, 1.0, count)[1:]:
+    for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        found = searches(body, options)
-        if found.schedule is not None and found.schedule.bounds is not None:
-            points.append(Point(found, horizon))
-    return Front(shift, tuple(points))
+        made = searches(body, options)
+        if made.schedule is not None and made.schedule.bounds is not None:
+            found.append((made, horizon))
+    return found
 
 
-def _undominated(points: Sequence[Point]) -> tuple[Point, ...]:
-    """In the order of their ends, those that cost clearly less than all that end before."""
+def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
+    """In the order of their ends, those that cost less than all that end no later, by `SAME_COST` or more.
+
+    Those of a ``stricter`` front count where they cost less at all: what allows more is nowhere dearer.
+    """
+    given = {id(point.plan) for point in stricter}
     kept: list[Point] = []
     for point in sorted(points, key=lambda one: (one.plan.pulses.end, one.cost)):
-        if not kept or point.cost < kept[-1].cost * (1.0 - SAVES):
+        saved = 0.0 if id(point.plan) in given else SAME_COST
+        if not kept or point.cost < kept[-1].cost * (1.0 - saved):
             kept.append(point)
     return tuple(kept)
 

@@ -79,8 +79,8 @@ def command(
 ) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
-    Each front is of the scheme optimal and holds no schedule that another beats in both. SPACECRAFT and FILE are as
-    for `nutdamp plan`.
+    Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
+    in both. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")

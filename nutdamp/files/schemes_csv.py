@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
-from nutdamp.files.output import csv_text, number
+from nutdamp.files.output import csv_text, number, truth
 from nutdamp.files.plan_json import plan_json
 from nutdamp.planning import Plan
 
@@ -45,9 +45,9 @@ def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
     }
     return {
         "scheme": plan.scheme,
-        "feasible": _word(plan.feasible),
-        "recommended": _word(recommended),
-        "meets_requirement": _word(plan.meets_requirement),
+        "feasible": truth(plan.feasible),
+        "recommended": truth(recommended),
+        "meets_requirement": truth(plan.meets_requirement),
         "met_fraction": share,
         "pulses": len(plan.pulses),
         **{key: data[key] for key in ("end_s", "total_impulse_Nms", "least_impulse_Nms", "propellant_kg")},
@@ -61,10 +61,6 @@ def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
 
 
 _CELESTIAL = ("right_ascension_deg", "declination_deg")
-
-
-def _word(truth: bool | None) -> str:
-    return {True: "true", False: "false", None: ""}[truth]
 
 
 def schemes_csv(compared: Comparison, decided: Decision | None) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nutdamp import __version__
-from nutdamp.files.output import csv_text, number
+from nutdamp.files.output import csv_text, number, truth
 from nutdamp.files.plan_json import plan_json, spacecraft_json
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.fronts import Front, Point, numbered
@@ -26,6 +26,8 @@ HEADER = (
     "nutation_deg",
     "momentum_shift_deg",
     "axis_error_deg",
+    "scheme",
+    "meets_requirement",
 )
 
 
@@ -44,8 +46,10 @@ def _row(index: int, front: Front, point: Point) -> list[str]:
         number(plan.pulses.propellant),
         number(plan.pulses.total_impulse),
         number(point.bounds.first_order),
-        point.bounds.unit,
+        point.unit,
         *(number(math.degrees(angle)) for angle in (left.nutation, left.momentum_shift, left.axis_error)),
+        plan.scheme,
+        truth(plan.meets_requirement),
     ]
 
 

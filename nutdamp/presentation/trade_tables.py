@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.fronts import Front, numbered
+from nutdamp.fronts import Front, Point, numbered
 from nutdamp.presentation.layout import columns
-from nutdamp.presentation.plan_tables import header
+from nutdamp.presentation.plan_tables import NOT, header
 from nutdamp.presentation.text import degrees, mass, moment, quantity
+from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
 
@@ -23,26 +24,59 @@ def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableTy
 def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[RenderableType]:
     """The table of each front under its name."""
     parts: list[RenderableType] = []
+    pointing, by_others = spacecraft.goal.axis is not None, schemes_of(found) != [OPTIMAL.name]
     for front in found:
-        parts += [Text(), Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold")]
-        if not front.points:
-            parts.append(Text(f"none: {front.why}"))
-            continue
-        table = columns("point", "ends at", "cost", "first-order least", "pulses", "shift of H", "saves")
-        dearest = front.points[0].cost
-        for index, owner, point in numbered(found):
-            if owner is front:
-                unit = point.bounds.unit
-                cost, least = (
-                    mass(value) if unit == "kg" else quantity(value, unit)
-                    for value in (point.cost, point.bounds.first_order)
-                )
-                plan, saved = point.plan, 100.0 * (1.0 - point.cost / dearest)
-                shift = degrees(plan.flight.residual.momentum_shift)
-                cells = moment(plan.pulses.end), cost, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
-                table.add_row(str(index), *cells)
-        parts.append(table)
+        parts += [Text(), Text(front_name(front, pointing=pointing), style="bold")]
+        if front.why is not None:
+            parts.append(Text(_without_optimal(front)))
+        if front.points:
+            parts.append(_table(found, front, by_others=by_others))
+    if any(fails(point) for _, _, point in numbered(found)):
+        parts += [Text(), Text(f"{NOT} does not meet the requirement")]
     return parts
+
+
+def fails(point: Point) -> bool:
+    """Whether it does not meet the requirement of the file."""
+    return point.plan.meets_requirement is False
+
+
+def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
+    """A row for each point; ``by_others``: with its scheme."""
+    names = ("ends at", "cost", "first-order least", "pulses", "shift of H", "saves")
+    table = columns("point", *names, *("scheme",) * by_others, text=("scheme",))
+    dearest = front.points[0].cost
+    for index, owner, point in numbered(found):
+        if owner is front:
+            cost, least = (
+                mass(value) if point.unit == "kg" else quantity(value, point.unit)
+                for value in (point.cost, point.bounds.first_order)
+            )
+            plan, saved = point.plan, 100.0 * (1.0 - point.cost / dearest)
+            shift = degrees(plan.flight.residual.momentum_shift)
+            cells = moment(plan.pulses.end), cost, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
+            table.add_row(f"{index} {NOT}" if fails(point) else str(index), *cells, *[plan.scheme] * by_others)
+    return table
+
+
+def _without_optimal(front: Front) -> str:
+    """Why a front has no points, or none of the scheme optimal."""
+    return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
+
+
+def missing(spacecraft: Spacecraft, found: Sequence[Front]) -> list[str]:
+    """What a picture of the fronts does not show, and why: a sentence for each reason."""
+    pointing = spacecraft.goal.axis is not None
+    fronts: dict[str, list[str]] = {}
+    for one in found:
+        if one.why is not None:
+            fronts.setdefault(_without_optimal(one), []).append(front_name(one, pointing=pointing))
+    return [f"{', '.join(names)} \N{EN DASH} {reason}" for reason, names in fronts.items()]
+
+
+def schemes_of(found: Sequence[Front]) -> list[str]:
+    """Schemes of all points, by name; optimal where there are none."""
+    return sorted({point.plan.scheme for _, _, point in numbered(found)}) or [OPTIMAL.name]
 
 
 def front_name(front: Front, *, pointing: bool) -> str:

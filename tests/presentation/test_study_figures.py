@@ -30,7 +30,7 @@ from nutdamp.presentation.figures import schemes
 from nutdamp.recommendation import Standing
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable, Vector
+from nutdamp.spacecraft import Limits, Requirement, Steerable, Vector
 from nutdamp.tolerances import Dispersions, Tolerance
 
 REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
@@ -417,8 +417,49 @@ def test_the_recommended_plan_is_marked_among_the_trade() -> None:
     assert line(axes, f"recommended: {chosen.scheme}")[0] == pytest.approx([chosen.end, chosen.total_impulse])
 
 
-def test_a_trade_without_points_says_so() -> None:
-    body: Spacecraft = spinner()
-    figure = figures.trade_figure(body, (fronts.Front(0.0, (), "no channel"),))
+def test_a_trade_without_points_says_why_and_draws_no_axes() -> None:
+    figure = figures.trade_figure(spinner(), (fronts.Front(0.0, (), "no channel"),))
     check_layout(figure)
-    assert any("no schedule was found" in note.get_text() for note in figure.axes[0].texts)
+    assert not figure.axes
+    assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
+
+
+def test_a_front_that_is_missing_is_named_above_the_others() -> None:
+    (strict, free) = traded()
+    missing = fronts.Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
+    figure = figures.trade_figure(BODY, (missing, free))
+    check_layout(figure)
+    said = " ".join(figure.axes[0].get_title(loc="left").split())
+    assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
+    assert not any("none" in text.get_text() for text, _ in texts(figures.trade_figure(BODY, (strict, free))))
+
+
+def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
+    body = replace(BODY, requirement=Requirement(momentum_shift=math.radians(0.05)))
+    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))
+    failing = {
+        (point.plan.end, point.cost) for _, _, point in fronts.numbered(found) if point.plan.meets_requirement is False
+    }
+    assert failing
+    figure = figures.trade_figure(body, found)
+    check_layout(figure)
+    crossed = line(figure.axes[0], "does not meet the requirement")
+    assert {(end, cost) for end, cost in crossed.tolist()} == failing
+
+
+def test_points_close_together_keep_numbers_that_can_be_read() -> None:
+    """Thirty schedules of which each costs a little less, a little later."""
+    (strict, _) = traded()
+    point = strict.points[0]
+    assert point.plan.schedule is not None
+    close = []
+    for step in range(30):
+        pulses = tuple(
+            replace(one, t=one.t + 0.006 * step, impulse=one.impulse * (1.0 - 0.0022 * step))
+            for one in point.plan.schedule
+        )
+        made = replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))
+        close.append(point._replace(plan=made))
+    figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
+    check_layout(figure)
+    assert {str(count) for count in range(1, 31)} <= {text.get_text() for text, _ in texts(figure)}

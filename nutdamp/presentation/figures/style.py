@@ -172,11 +172,19 @@ _AROUND = [
     for step in (7.0, 11.0, 16.0)
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1), (1.3, 0), (-1.3, 0), (0, 1.3), (0, -1.3))
 ]
+_FAR = [
+    (step * math.cos(turn), step * math.sin(turn))
+    for step in (24.0, 34.0, 46.0)
+    for turn in np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
+]
 _OFFSETS = {
-    "_vital": _AROUND,
+    "_vital": [*_AROUND, *_FAR],
     "_label": _AROUND[:16],
     "_number": [(0.0, 3.0)],
 }
+FAR = 15.0
+"""Points from which a line leads from a label to its point."""
+
 _COVERED = {"_vital": np.inf, "_label": 12.0, "_number": np.inf}
 """Points of curves, 4 pixels apart, that a label may cover."""
 
@@ -195,6 +203,7 @@ def settle(figure: Figure) -> None:
         window, points = axes.get_window_extent(), figure.dpi / 72.0
         for note in notes:
             _settle(note, taken, curves, window, points)
+            _lead(axes, note, points)
         bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
         if bars:
             _settle_bars(bars, window, points)
@@ -251,6 +260,15 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
         return
     note.set_position(best[0])
     taken.append(best[1])
+
+
+def _lead(axes: Axes, note: Annotation, points: float) -> None:
+    """A thin line from a label that stands far from its point."""
+    box, (x, y) = note.get_window_extent(), axes.transData.transform(note.xy)
+    aside, above = max(box.x0 - x, x - box.x1, 0.0), max(box.y0 - y, y - box.y1, 0.0)
+    if note.get_visible() and math.hypot(aside, above) > FAR * points:
+        look = {"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 3.0}
+        axes.annotate("", note.xy, note.get_position(), textcoords="offset points", arrowprops=look)
 
 
 def thickness(path: Vector, turns: float | None = None) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from nutdamp.fronts import Front, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
-from nutdamp.presentation.trade_tables import front_name
+from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
@@ -25,51 +26,64 @@ LOOKS = ((MOTION, "o", "-"), (PULSE, "s", (0, (5, 1.5))), (MOMENTUM, "^", (0, (5
 ALIKE = (0.02, 0.002)
 """Relative differences in end and in cost of points that are drawn as one."""
 
+WIDTH = 110
+"""Characters of a line above the picture."""
+
+FEWEST = 3
+"""Ticks of a decade's 1, 2 and 5 below which the axis of time has others."""
+
+
+REACH = 1.03
+"""How far beyond the horizon the axis of time goes: marks at its end are drawn whole."""
+
 
 @style.styled
 def trade_figure(spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | None = None) -> Figure:
     """End of the last pulse against propellant (impulse where that is unknown), numbered as in the table.
 
-    ``chosen``: a plan to be marked among them.
+    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason.
     """
-    from matplotlib.ticker import LogLocator
-
     figure = style.sheet(7.4, 4.8)
+    names = ", ".join(schemes_of(found))
+    figure.suptitle(f"{spacecraft.name}: what time costs, by {names}, flown by real pulse widths")
+    reasons = "\n".join(fill(reason, WIDTH) for reason in missing(spacecraft, found))
+    points = [point for _, _, point in numbered(found)]
+    if not points:
+        figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
+        return figure
     axes = figure.subplots()
-    bounds = [point.bounds for _, _, point in numbered(found)]
-    unit = bounds[0].unit if bounds else "N m s"
-    scale = 1e3 if unit == "kg" else 1.0
+    axes.set_title(reasons, loc="left", fontsize=style.SMALL, fontweight="normal")
     axes.set_xscale("log")
+    scale = 1e3 if points[0].unit == "kg" else 1.0
     _draw_fronts(axes, spacecraft, found, scale)
-    if bounds:
-        proved = [bound.rigorous for bound in bounds]
-        if None not in proved:
-            least = min(scale * value for value in proved if value is not None)
-            axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
-        if chosen is not None and len(chosen.pulses):
-            place = chosen.pulses.end, scale * chosen.pulses.cost_in(unit)
-            look: dict[str, Any] = {
-                "color": INK,
-                "markersize": 13,
-                "markerfacecolor": "none",
-                "linestyle": "",
-                "zorder": 4,
-            }
-            axes.plot(*place, "*", label=f"recommended: {chosen.scheme}", **look)
-        axes.set_xlim(right=spacecraft.horizon)
-        axes.margins(y=0.12)
-    else:
-        axes.text(0.5, 0.5, "no schedule was found", transform=axes.transAxes, ha="center", va="center")
+    proved = [point.bounds.rigorous for point in points]
+    if None not in proved:
+        least = min(scale * value for value in proved if value is not None)
+        axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
+    if chosen is not None and len(chosen.pulses):
+        place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
+        look: dict[str, Any] = {"color": INK, "markersize": 13, "markerfacecolor": "none", "linestyle": "", "zorder": 4}
+        axes.plot(*place, "*", label=f"recommended: {chosen.scheme}", **look)
+    axes.set_xlim(right=REACH * spacecraft.horizon)
+    axes.margins(y=0.12)
     axes.set_xlabel("end of the last pulse, s")
-    axes.set_ylabel("propellant, g" if unit == "kg" else "impulse, N m s")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.set_ylabel("propellant, g" if scale > 1.0 else "impulse, N m s")
+    _graduate(axes)
+    style.legend(figure, [axes], 3)
+    style.settle(figure)
+    return figure
+
+
+def _graduate(axes: Axes) -> None:
+    """Ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    low, high = axes.get_xlim()
+    few = sum(low <= value <= high for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)) < FEWEST
+    axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
     axes.grid(True, which="both")
-    style.legend(figure, [axes], 3)
-    figure.suptitle(f"{spacecraft.name}: what time costs, by the scheme optimal, flown by real pulse widths")
-    style.settle(figure)
-    return figure
 
 
 def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], scale: float) -> None:
@@ -100,6 +114,10 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
                     axes.plot(end, cost, mark, color=colour, markersize=10, markerfacecolor="none", zorder=3)
         if alone:
             axes.plot(*np.transpose(alone), mark, color=colour, markersize=5, zorder=3.5)
+    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(found) if fails(point)]
+    if failing:
+        cross: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
+        axes.plot(*np.transpose(failing), "x", label="does not meet the requirement", **cross)
     if covered:
         ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)

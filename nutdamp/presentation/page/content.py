@@ -155,8 +155,9 @@ def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) 
 
 def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:
     """What an earlier end costs, as ``trade`` has it."""
-    tables = blocks_of("Schedules of the scheme optimal", Group(*front_parts(compared.spacecraft, traded)))
-    pictures = (trade_picture_of(compared, traded),) if pictured else ()
+    tables = blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
+    drawn = pictured and any(front.points for front in traded)
+    pictures = (trade_picture_of(compared, traded),) if drawn else ()
     return Section("trade", "Time against cost", (*tables, *pictures))
 
 

@@ -60,7 +60,7 @@ def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
     """What time costs, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
     return Picture(
         figures.svg(figures.trade_figure(compared.spacecraft, found, compared.recommended)),
-        "What an earlier end costs: each mark is a schedule of the scheme optimal, numbered along each front.",
+        "What an earlier end costs: each mark is a schedule, numbered along each front.",
         "Cost of schedules over the end of the last pulse",
     )
 
