@@ -448,12 +448,12 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
 
 
 def test_points_close_together_keep_numbers_that_can_be_read() -> None:
-    """Thirty schedules of which each costs a little less, a little later."""
+    """Eighty schedules of which each costs a little less, a little later."""
     (strict, _) = traded()
     point = strict.points[0]
     assert point.plan.schedule is not None
     close = []
-    for step in range(30):
+    for step in range(80):
         pulses = tuple(
             replace(one, t=one.t + 0.006 * step, impulse=one.impulse * (1.0 - 0.0022 * step))
             for one in point.plan.schedule
@@ -462,4 +462,4 @@ def test_points_close_together_keep_numbers_that_can_be_read() -> None:
         close.append(point._replace(plan=made))
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
     check_layout(figure)
-    assert {str(count) for count in range(1, 31)} <= {text.get_text() for text, _ in texts(figure)}
+    assert {str(count) for count in range(1, 81)} <= {text.get_text() for text, _ in texts(figure)}
