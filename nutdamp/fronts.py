@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import work
+from nutdamp.comparison import compare, usual
 from nutdamp.compliance import Part
-from nutdamp.planning import Plan, compare, plan, usual
+from nutdamp.planning import Plan, plan
 from nutdamp.recommendation import SAME_COST, by_propellant
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Bounds
