@@ -64,16 +64,10 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     for keep in body.watched:
         nearness = axis @ keep.direction
         looked = np.concatenate([_peaks(times, nearness), _peaks(times, -nearness)])
-        angles = attitude.angle_between(_axis(flown, looked), keep.direction)
+        angles = attitude.angle_between(flown.axis(looked), keep.direction)
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
         found.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
     return tuple(found)
-
-
-def _axis(flown: Flight, times: Vector) -> Vector:
-    """The spin axis (n, 3) at ``times`` (n,) s."""
-    _, quaternions = flown.motion(times)
-    return attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, flown.spacecraft.spin)]))
 
 
 def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:

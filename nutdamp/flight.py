@@ -145,6 +145,10 @@ class Flight(Tabled):
             body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
         return body, quaternion
 
+    def axis(self, times: Vector) -> Vector:
+        """Spin axis, inertial unit vectors (n, 3), at ``times`` (n,) s."""
+        return attitude.rotate(self.motion(times)[1], np.array([0.0, 0.0, self._sense]))
+
     @property
     def shown_to(self) -> float:
         """End of the rows, s."""

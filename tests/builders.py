@@ -217,3 +217,13 @@ def said(*plans: Plan) -> str:
 def warned(*plans: Plan) -> str:
     """What is warned of."""
     return " ".join(verdicts.warnings(Comparison(plans[0].spacecraft, plans)))
+
+
+INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
+HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
+BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
+POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))
+"""A target 0.2 rad = 11.46° from H at t = 0."""
+
+COUNTS = 0.05
+"""Degrees that count as damped: 1 % of the 5° of `judged` plans."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from builders import chosen, cross, judged, said, spinner, warned
+from builders import BOTH, COUNTS, HALF_A_DEGREE, INFEASIBLE, POINTING, chosen, cross, judged, said, spinner, warned
 from cases_dir import case
 
 from nutdamp import planning, schemes
@@ -18,17 +17,6 @@ from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing, recommend
 from nutdamp.remarks import infeasibility
 from nutdamp.spacecraft import Goal, Requirement
-
-INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
-HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
-BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
-POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))
-"""A target 0.2 rad = 11.46° from H at t = 0."""
-
-COUNTS = 0.05
-"""Degrees that count as damped: 1 % of the 5° of these plans."""
-NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
-
 
 # --- which plan -----------------------------------------------------------------------------------------------------
 
@@ -193,7 +181,8 @@ def test_where_a_propellant_is_not_known_the_impulse_decides() -> None:
 
 @pytest.mark.parametrize("degrees", [8, 60])
 def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -> None:
-    body = read_spacecraft(NOTHING_DAMPS.replace("8 deg", f"{degrees} deg"), "nothing-damps.yaml")
+    text = case("nothing-damps.yaml").read_text(encoding="utf-8").replace("8 deg", f"{degrees} deg")
+    body = read_spacecraft(text, "nothing-damps.yaml")
     compared = compare(body, schemes.CLASSIC)
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
     assert compared.recommended is not None

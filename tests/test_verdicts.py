@@ -8,8 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference
-from builders import aimed, channel, cross, judged, off_target, said, spinner, warned
-from cases_dir import case
+from builders import (
+    BOTH,
+    HALF_A_DEGREE,
+    INFEASIBLE,
+    POINTING,
+    aimed,
+    channel,
+    cross,
+    judged,
+    off_target,
+    said,
+    spinner,
+    warned,
+)
 
 from nutdamp import compliance, planning, schemes
 from nutdamp.comparison import compare
@@ -21,17 +33,6 @@ from nutdamp.recommendation import Standing
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Disturbance, Goal, Inertia, Limits, Requirement
-
-INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
-HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
-BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
-POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))
-"""A target 0.2 rad = 11.46° from H at t = 0."""
-
-COUNTS = 0.05
-"""Degrees that count as damped: 1 % of the 5° of these plans."""
-NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
-
 
 # --- the words ------------------------------------------------------------------------------------------------------
 

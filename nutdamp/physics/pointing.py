@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, sun_train
 
 Array = NDArray[np.float64]
 
@@ -141,9 +141,8 @@ def square_to(vector: Array) -> Array:
 def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, float]:
     """Unit vector (3,) square to H = ``momentum`` (3,) in which H is to go to ``target`` (3,), and the way, rad.
 
-    Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle χ to the direction
-    of the Sun: tan χ = Δλ/Δψ with ψ = ln tan(γ/2), γ the angle from the Sun and λ the longitude about it; the
-    way is Δγ/cos χ. Raises Infeasible where an axis points to the Sun or away from it.
+    Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle to the direction
+    of the Sun (`sun_train.rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
     """
     here = momentum / float(np.linalg.norm(momentum))
     if sun is None:
@@ -155,13 +154,10 @@ def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, fl
     if min(*gammas, *(math.pi - gamma for gamma in gammas)) < 1e-6:
         raise Infeasible("the spin axis points to the Sun or away from it, at t = 0 or on the target: it has no phase")
     dark = np.cross(sun, here)  # along growing longitude
-    bright = np.cross(here, dark)
+    away = np.cross(dark, here)
     longitude = math.atan2(
         float(target @ dark) / math.sin(gammas[0]), float(target @ np.cross(dark, sun)) / math.sin(gammas[0])
     )
-    heights = [math.log(math.tan(0.5 * gamma)) for gamma in gammas]
-    chi = math.atan2(longitude, heights[0] - heights[1])
-    away = gammas[0] - gammas[1]
-    way = away / math.cos(chi) if abs(math.cos(chi)) > 1e-6 else math.sin(gammas[0]) * abs(longitude)
-    direction = math.cos(chi) * bright / np.linalg.norm(bright) + math.sin(chi) * dark / np.linalg.norm(dark)
-    return np.asarray(direction), abs(way)
+    heading, way = sun_train.rhumb_course(gammas[0], gammas[1], longitude)
+    direction = math.cos(heading) * away / np.linalg.norm(away) + math.sin(heading) * dark / np.linalg.norm(dark)
+    return np.asarray(direction), float(way)

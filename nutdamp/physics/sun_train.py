@@ -44,6 +44,18 @@ def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> RhumbEnd:
     return RhumbEnd(end, aside * per_longitude, aside * per_turn)
 
 
+def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]:
+    """The rhumb line to ``goal_angle`` from the Sun, ``ahead`` in longitude: heading χ as in `rhumb_end`, and length.
+
+    tan χ = Δλ/Δψ with ψ = ln tan(γ/2); the length is Δγ/cos χ, and sin γ |Δλ| along a parallel.
+    """
+    rise = np.log(np.tan(0.5 * goal_angle)) - np.log(np.tan(0.5 * sun_angle))
+    heading = np.arctan2(ahead, rise)
+    parallel = np.abs(np.cos(heading)) < 1e-6
+    along = (goal_angle - sun_angle) / np.where(parallel, 1.0, np.cos(heading))
+    return heading, np.abs(np.where(parallel, np.sin(sun_angle) * ahead, along))
+
+
 def phasor_sum(count: Any, step: Any) -> Any:
     """Σ e^{i k ``step``} over k = 0 … ``count`` - 1: e^{i(N-1)ψ/2} sin(Nψ/2)/sin(ψ/2); N where ψ is a whole turn."""
     half = 0.5 * step

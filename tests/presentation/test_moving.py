@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases_dir import case
 from markup import parsed
 from process import Run
 
@@ -30,13 +31,7 @@ from nutdamp.schemes import CLASSIC
 PAGE = Path(moving.__file__).parent
 CONFIGS = Path(__file__).parents[2] / "configs"
 
-TARGET = """name: Far
-inertia: {A: 120, C: 80}
-state: {spin: 30 rpm, nutation: 5 deg}
-attitude: {quaternion: [0.8, 0.4, 0.3, 0.2], frame: EME2000, epoch: 2026-03-01T12:00:00.25Z}
-goal: {right_ascension: 20 deg, declination: -30 deg}
-requirement: {momentum_shift: 4 deg}
-"""
+TARGET = case("far-target.yaml").read_text(encoding="utf-8")
 THREE = """name: Three moments
 inertia: {tensor: [[120, 3, 0], [3, 100, 0], [0, 0, 60]]}
 state: {spin: 6 rpm, nutation: 20 deg}
@@ -232,7 +227,7 @@ def test_the_target_is_a_mark_and_a_circle() -> None:
     assert (named["name"], named["kind"]) == ("target", "target")
     assert named["circles"] == [{"radius": pytest.approx(math.radians(4)), "kind": "target"}]
     x, y, z = named["axis"]
-    assert math.degrees(math.atan2(y, x)) == pytest.approx(20, abs=1e-3)
+    assert math.degrees(math.atan2(y, x)) == pytest.approx(-90, abs=1e-3)
     assert math.degrees(math.asin(z)) == pytest.approx(-30, abs=1e-3)
     assert data["target"] is not None
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases_dir import case
 from process import Run
 
 from nutdamp.comparison import compare
@@ -28,13 +29,7 @@ pytestmark = pytest.mark.browser
 CONFIGS = Path(__file__).parents[2] / "configs"
 LEAP = (CONFIGS / "single-thruster.yaml").read_text(encoding="utf-8")
 EXAMPLE = example_text()
-TARGET = """name: Far
-inertia: {A: 120, C: 80}
-state: {spin: 30 rpm, nutation: 5 deg}
-attitude: {quaternion: [0.8, 0.4, 0.3, 0.2], frame: EME2000, epoch: 2026-03-01T12:00:00Z}
-goal: {right_ascension: 270 deg, declination: -30 deg}
-requirement: {momentum_shift: 4 deg}
-"""
+TARGET = case("far-target.yaml").read_text(encoding="utf-8")
 
 Browse = Callable[..., Any]
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.flight import Flight
-from nutdamp.physics import attitude
 from nutdamp.presentation.check_tables import channel_table, disturbance_table
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
@@ -100,7 +99,7 @@ def ends_sheet(flown: Flight) -> Sheet:
     start, state = body.momentum, flown.settled
     end = np.asarray(state.rates * np.asarray(body.inertia.moments))
     size = float(np.linalg.norm(start))
-    directions = ("spin axis", _axis(body), final.axis), ("H", start / size, final.momentum)
+    directions = ("spin axis", flown.axis(np.zeros(1))[0], final.axis), ("H", start / size, final.momentum)
     rows: list[tuple[str, ...]] = []
     for what, before, after in directions:
         for which, name in enumerate(angle_names(body)):
@@ -116,11 +115,6 @@ def ends_sheet(flown: Flight) -> Sheet:
     else:
         heads = (*heads, Column("target"))
     return Sheet("Where it points", heads, tuple(rows), sortable=False, stacked=True)
-
-
-def _axis(body: Spacecraft) -> Vector:
-    """Spin axis at t = 0, inertial unit vector (3,)."""
-    return attitude.rotate(body.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
 
 
 def ends_note(flown: Flight) -> Prose:

@@ -108,12 +108,7 @@ class BlockModel:
         goal_angle = math.atan2(math.hypot(self.goal[0], self.goal[1]), self.goal[2])
         goal_longitude = math.atan2(self.goal[1], self.goal[0])
         ahead = (goal_longitude - state.longitude + math.pi) % (2.0 * math.pi) - math.pi
-        change = goal_angle - state.sun_angle
-        rise = np.log(np.tan(0.5 * goal_angle)) - np.log(np.tan(0.5 * state.sun_angle))
-        heading = np.arctan2(ahead, rise)
-        short = np.abs(np.cos(heading)) < 1e-6
-        along = change / np.where(short, 1.0, np.cos(heading))
-        return heading, np.abs(np.where(short, np.sin(state.sun_angle) * ahead, along))
+        return sun_train.rhumb_course(state.sun_angle, goal_angle, ahead)
 
     def after(self, state: State, channel: Channel, trial: Trial) -> State:
         """The motion after blocks of a ``channel`` from ``state``."""

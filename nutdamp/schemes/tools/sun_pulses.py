@@ -64,9 +64,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
         if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
     found = found[(found >= 0.0) & (found <= until)]
-    _, quaternions = flown.motion(found)
-    axis = attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
-    for time, angle in zip(found.tolist(), attitude.angle_between(axis, body.sun).tolist(), strict=True):
+    for time, angle in zip(found.tolist(), attitude.angle_between(flown.axis(found), body.sun).tolist(), strict=True):
         if not sensor.sees(angle):
             raise Infeasible(
                 f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the spin axis: "
