@@ -79,12 +79,18 @@ def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """The first cone that an axis on the target breaks, at no time; None where there is none, or no target."""
     if spacecraft.goal.axis is None:
         return None
-    for keep in spacecraft.keep:
-        angle = float(attitude.angle_between(spacecraft.goal.axis, keep.direction))
-        one = Aspect(keep, angle, math.inf, angle, math.inf)
-        if not one.kept:
-            return one
-    return None
+    found = (_seen(spacecraft.goal.axis, keep, math.inf) for keep in spacecraft.keep)
+    return next((one for one in found if not one.kept), None)
+
+
+def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
+    """Each direction that the spacecraft watches, from the spin axis at t = 0."""
+    return tuple(_seen(spacecraft.axis, keep, 0.0) for keep in spacecraft.watched)
+
+
+def _seen(axis: Vector, keep: Keep, time: float) -> Aspect:
+    angle = float(attitude.angle_between(axis, keep.direction))
+    return Aspect(keep, angle, time, angle, time)
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:

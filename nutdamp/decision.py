@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp import compliance
+from nutdamp import aspect, compliance
+from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
-from nutdamp.compliance import Bound, Part
-from nutdamp.flight import Final
+from nutdamp.compliance import Bound, Held, Part
+from nutdamp.flight import Final, Flight
+from nutdamp.outcome import left_by
 from nutdamp.planning import Plan
 
 if TYPE_CHECKING:  # few decisions rest on dispersed cases
@@ -75,17 +78,49 @@ class Line:
 class Decision:
     """The plan to decide on, the parts of its requirement, and how it fares in dispersed ``cases``, None if not flown.
 
-    ``shares``: of every scheme that was dispersed, by name, the share of cases that comply.
+    ``shares``: of every scheme that was dispersed, by name, the share of cases that comply. ``seen``: the flight of the
+    plan through its real widths as it has come by a certain time, None for that to the end of the last pulse.
     """
 
     plan: Plan
     cases: Cases | None = None
     shares: Mapping[str, float] = field(default_factory=dict)
+    seen: Flight | None = None
+
+    @property
+    def flight(self) -> Flight:
+        """What is judged."""
+        return self.plan.flight if self.seen is None else self.seen
 
     @property
     def lines(self) -> tuple[Line, ...]:
         """The parts that are required, and those for which it is said what counts as damped or reached."""
-        return tuple(self._line(one.bound, one.left) for one in self.plan.held)
+        return tuple(self._line(one.bound, one.left) for one in self._held)
+
+    @property
+    def _held(self) -> tuple[Held, ...]:
+        return self.plan.held if self.seen is None else compliance.held(self.plan.spacecraft, left_by(self.seen))
+
+    @cached_property
+    def aspects(self) -> tuple[Aspect, ...]:
+        """How near the spin axis comes to each direction that is watched, with nominal values."""
+        return self.plan.aspects if self.seen is None else aspect.aspects(self.seen, self.seen.until)
+
+    @property
+    def strays(self) -> tuple[Aspect, ...]:
+        """Those of the `aspects` that break a cone."""
+        return tuple(one for one in self.aspects if not one.kept)
+
+    @property
+    def damped(self) -> bool:
+        """Whether all of `lines` is kept with nominal values, what is not required as well."""
+        return all(one.met for one in self._held)
+
+    @property
+    def nominal(self) -> bool | None:
+        """Whether what is required at the end is met with nominal values; None where nothing is."""
+        required = [one.met for one in self._held if one.bound.required]
+        return all(required) if required else None
 
     def _line(self, bound: Bound, nominal: float) -> Line:
         kept, cases = nominal <= bound.most, self.cases
@@ -101,9 +136,13 @@ class Decision:
 
     @property
     def met(self) -> bool | None:
-        """Whether the requirement is met, with nominal values and in enough cases; None where nothing is required."""
-        nominal = self.plan.meets_requirement
-        return nominal if not nominal or self.cases is None else self.cases.met
+        """Whether the requirement is met, with nominal values and in enough cases; None where nothing is required.
+
+        It is not where the spin axis breaks a cone on the way.
+        """
+        if self.strays:
+            return False
+        return self.nominal if not self.nominal or self.cases is None else self.cases.met
 
     @property
     def undispersed(self) -> bool:
@@ -122,7 +161,7 @@ class Decision:
     @property
     def final(self) -> Final:
         """Where spin axis and H end, and the spin."""
-        return self.plan.flight.final
+        return self.flight.final
 
 
 def decide(compared: Comparison, cases: Mapping[str, Cases] | None = None) -> Decision | None:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.commands import Commands
 from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, channel_pulse, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -163,6 +164,12 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
         return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
 
     return [channel for channel in spacecraft.channels if (channel.damps or axial) and has_on_time(channel)]
+
+
+def commandable_widths(commands: Commands, channel: Channel) -> Vector:
+    """Widths (n,) s that a command block of a channel may have."""
+    widths = commands.widths
+    return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
 
 
 def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:

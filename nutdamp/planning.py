@@ -186,6 +186,11 @@ class Plan(views.Tabled):
         return aspect.aspects(self.flight)
 
     @property
+    def kept(self) -> bool | None:
+        """Whether the spin axis keeps its cones, flown; None where the file names none."""
+        return all(one.kept for one in self.aspects) if self.spacecraft.keep else None
+
+    @property
     def hindrance(self) -> Hindrance:
         """What keeps the plan from leaving less nutation."""
         left = self.flight.residual.nutation

@@ -81,6 +81,11 @@ class Judged(Protocol):
         ...
 
     @property
+    def kept(self) -> bool | None:
+        """Whether the spin axis keeps its cones; None where there are none."""
+        ...
+
+    @property
     def severity(self) -> float:
         """See `nutdamp.compliance.severity`."""
         ...
@@ -110,13 +115,15 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
     """The plan to fly.
 
     Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
-    is none, that with least nutation left (least distance from a target axis where that is more).
+    is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
+    reach as much differ in whether the spin axis keeps its cones, those that do count alone.
     """
     feasible = [one for one in plans if one.flown is not None]
     if not feasible:
         return Recommendation()
     standing = next(one for one in Standing if any(plan.standing is one for plan in feasible))
     those = [one for one in feasible if one.standing is standing]
+    those = [one for one in those if one.kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
         notable = _steadier(best, those), _simpler(best, those)

@@ -35,7 +35,7 @@ def remarks(plan: Plan) -> tuple[str, ...]:
 
 def _cones(plan: Plan) -> Iterator[str]:
     """Cones that a plan without a target does not keep: it is not its task to."""
-    yield from (f"warning: {_strays(one)}" for one in plan.aspects if not one.kept)
+    yield from (f"warning: {strays(one)}" for one in plan.aspects if not one.kept)
 
 
 def infeasibility(plan: Plan) -> str:
@@ -48,15 +48,15 @@ def _infeasibility(plan: Plan) -> str:
     if plan.breach is not None:
         return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
     if plan.astray is not None and math.isinf(plan.astray.least_at):
-        return _strays(plan.astray)
+        return strays(plan.astray)
     if plan.astray is not None:
-        return f"{_strays(plan.astray)}; no way round it was found within the limits"
+        return f"{strays(plan.astray)}; no way round it was found within the limits"
     if plan.worse is not None:
         return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
     return plan.refusal or ""
 
 
-def _strays(found: Aspect) -> str:
+def strays(found: Aspect) -> str:
     """How the spin axis breaks a cone."""
     keep = found.keep
     angle, at, bound = (

@@ -280,6 +280,11 @@ class Spacecraft(views.Shown):
             quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
         return SpinState(omega, spin, quaternion)
 
+    @property
+    def axis(self) -> Vector:
+        """Spin axis at t = 0, inertial unit vector (3,)."""
+        return attitude.rotate(self.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, self.spin)]))
+
     @cached_property
     def momentum(self) -> Vector:
         """Angular momentum at t = 0 in the inertial frame, (3,) N m s."""

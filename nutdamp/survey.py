@@ -6,8 +6,12 @@ import cmath
 import math
 from dataclasses import dataclass
 
-from nutdamp.limits import longest_useful, shortest_on_time
-from nutdamp.physics import cones, damping, forced, rates, stability
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.limits import commandable_widths, longest_useful, shortest_on_time, usable
+from nutdamp.physics import cones, damping, forced, rates, stability, sun_train
+from nutdamp.schemes.tools import sun_pulses
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 
 
@@ -22,6 +26,54 @@ class ChannelSteps:
     channel: Channel
     smallest: float
     largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class SunClock:
+    """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
+
+    ``first`` is None where there is none, and ``refusal`` then says why.
+    """
+
+    turn: float
+    first: float | None
+    refusal: str = ""
+
+
+def sun_clock(spacecraft: Spacecraft) -> SunClock | None:
+    """When Sun pulses come; None where the file says nothing of Sun and sensor."""
+    if spacecraft.sun is None or spacecraft.sun_sensor is None:
+        return None
+    turn = sun_pulses.spin_turn(spacecraft)
+    try:
+        return SunClock(turn, sun_pulses.Clock(spacecraft).time_of(1))
+    except Infeasible as reason:
+        return SunClock(turn, None, str(reason))
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """By how much one pulse of a command block turns H at the spin of t = 0: least and most, rad, of which width, s."""
+
+    channel: Channel
+    smallest: float
+    smallest_width: float
+    largest: float
+    largest_width: float
+
+
+def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
+    """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
+    found, commands, spin = [], spacecraft.commands, spacecraft.spin
+    for channel in () if commands is None else usable(spacecraft):
+        assert commands is not None
+        widths = commandable_widths(commands, channel)
+        if len(widths):
+            each = sun_train.turned_by(spacecraft.inertia.C * abs(spin), abs(channel.transverse), widths, spin)
+            least, most = int(np.argmin(each)), int(np.argmax(each))
+            ends = (float(value[at]) for at in (least, most) for value in (each, widths))
+            found.append(Turns(channel, *ends))
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,9 @@ from nutdamp.decision import Cases, Decision, cases_of, decide
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results
 from nutdamp.dispersion.study import run as fly
-from nutdamp.presentation import decisions
+from nutdamp.presentation import decisions, verdicts
 from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Goal, Requirement
+from nutdamp.spacecraft import Goal, Keep, Requirement, Spacecraft
 
 
 @cache
@@ -88,7 +88,7 @@ def test_without_cases_it_says_that_none_were_flown() -> None:
 
 @pytest.mark.parametrize(
     ("target", "said"),
-    [(None, "the plan damps the nutation"), (10.0, "the plan reaches the target")],
+    [(None, "nutation is damped"), (10.0, "target is reached")],
 )
 def test_where_nothing_is_required_the_verdict_does_not_say_met(target: float | None, said: str) -> None:
     body = replace(nutdamp.example(), requirement=None, dispersions=None)
@@ -96,7 +96,7 @@ def test_where_nothing_is_required_the_verdict_does_not_say_met(target: float | 
     decided = decide(compare(body, ["two-pulse" if target is None else "optimal"]))
     assert decided is not None
     assert decided.met is None
-    assert decisions.verdict(decided) == f"nothing is required; with nominal values {said}"
+    assert decisions.verdict(decided) == f"nothing is required at the end; with nominal values the {said}"
     assert {line.bound.required for line in decided.lines} == {False}
 
 
@@ -117,6 +117,95 @@ def test_schemes_that_comply_more_often_are_named() -> None:
     said = "more cases comply with two-pulse (85.6 %) than with four-pulse (71.4 %)."
     assert decisions.better(decided) == said
     assert decisions.better(Decision(example()["two-pulse"], counted(0.856, 0.9, 0.1), shares)) == ""
+
+
+def watched(least: float, body: Spacecraft | None = None) -> Spacecraft:
+    """A body whose spin axis must stay ``least`` degrees from a star that is 20° from H."""
+    body = body or nutdamp.example()
+    return replace(body, keep=(Keep("star", body.direction_in_n(math.radians(20.0), 1.0), math.radians(least)),))
+
+
+def test_a_cone_that_is_broken_is_not_met_whatever_is_left() -> None:
+    kept, broken = (decide(compare(watched(least), CLASSIC)) for least in (10.0, 16.0))
+    assert kept is not None
+    assert broken is not None
+    assert (kept.met, broken.met) == (True, False)
+    assert decisions.verdict(kept) == "met with nominal values; dispersed cases were not flown"
+    (found,) = broken.strays
+    assert math.degrees(found.least) < 16.0
+    said = decisions.verdict(broken)
+    assert said.startswith(f"NOT met: the spin axis comes to {math.degrees(found.least):.4g}° from star")
+    assert said.endswith("(min = 16°); otherwise met with nominal values; dispersed cases were not flown")
+    rows = [[str(cell) for cell in column.cells] for column in decisions.decision_table(broken).columns]
+    assert [column[-1] for column in rows] == [
+        "axis from star",
+        "≥ 16 deg",
+        f"{math.degrees(found.least):.4g} deg",
+        f"{math.degrees(found.least) - 16.0:.4g} deg",
+        "NOT kept",
+    ]
+    nothing_required = Decision(replace(broken.plan, spacecraft=replace(watched(16.0), requirement=None)))
+    assert nothing_required.met is False
+
+
+def test_the_warning_names_the_plans_that_keep_the_cones() -> None:
+    """One-pulse leaves the axis where it no longer passes the star, but shifts H by more than is required."""
+    star = nutdamp.example().direction_in_n(math.radians(8.0), math.radians(210.0))
+    body = replace(nutdamp.example(), keep=(Keep("star", star, math.radians(5.2)),))
+    compared = compare(body, CLASSIC)
+    assert [plan.kept for plan in compared] == [True, False, False]
+    (warning,) = verdicts.warnings(compared)
+    assert warning.startswith("The spin axis comes to 5.0")
+    assert warning.endswith("from star at 1.79 s (min = 5.2°); one-pulse keeps all cones.")
+    assert verdicts.warnings(compare(body, ["one-pulse"]))[0].startswith("one-pulse does not meet the requirement.")
+    assert verdicts.reason(compared) == "least propellant of the 2 plans that meet the requirement"
+
+
+FILE = """
+name: Watched
+inertia: {A: 80 kg m^2, C: 120 kg m^2}
+state: {spin: 30 rpm, nutation: 2 deg}
+attitude: {epoch: 2026-03-20T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+steerable: {torque: 20 N m}
+requirement: {nutation: 0.1 deg}
+sun: epoch
+keep: [{name: star, direction: [10 deg, 86 deg], min: 3.5 deg, max: 30 deg}]
+"""
+
+
+def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: Path) -> None:
+    done = run("plan", "-q", "-", "--scheme", "two-pulse", "--json", "plan.json", stdin=FILE, columns=200)
+    assert done.returncode == 4
+    assert "axis from star  ≥ 3.5 deg" in done.stdout
+    assert "NOT kept" in done.stdout
+    found = json.loads((tmp_path / "plan.json").read_text("utf-8"))
+    assert found["decision"]["met"] is False
+    assert [one["kept"] for one in found["decision"]["aspects"]] == [False, True]
+    assert any("from star" in warning for warning in found["warnings"])
+    (verdict,) = (line for line in done.stdout.splitlines() if line.startswith("Requirement: "))
+    assert verdict == f"Requirement: {found['decision']['verdict']}."
+
+    page = run("report", "-q", "-", "--scheme", "two-pulse", "-o", "page.md", stdin=FILE)
+    assert page.returncode == 4
+    text = (tmp_path / "page.md").read_text("utf-8")
+    assert "requirement: **NOT met: the spin axis comes to" in text
+    assert "axis from star: **1.956" in text
+    assert "(at least 3.5 deg and at most 30 deg: NOT kept)" in text
+    assert "| Sun | 8" in text.replace("**", "")
+
+
+def test_simulate_says_whether_the_requirement_is_met(run: Run, tmp_path: Path) -> None:
+    done = run("simulate", "-q", "-", "--scheme", "two-pulse", "--json", "a.json", stdin=FILE, columns=200)
+    assert done.returncode == 0
+    found = json.loads((tmp_path / "a.json").read_text("utf-8"))["decision"]
+    assert f"\nRequirement: {found['verdict']}.\n" in done.stdout
+    assert found["verdict"].startswith("NOT met: the spin axis comes to")
+    early = run("simulate", "-q", "-", "--scheme", "two-pulse", "--until", "1ms", "--json", "-", stdin=FILE)
+    decided = json.loads(early.stdout)["decision"]
+    assert decided["verdict"] == "NOT met with nominal values"  # so soon the axis has not come near the star
+    assert decided["requirement"][0]["nominal_deg"] == pytest.approx(2.0, abs=0.1)
+    free = run("simulate", "-q", "--scheme", "none", "--set", "requirement.nutation=6 deg", "--set", "keep=[]")
+    assert "Requirement: met with nominal values; dispersed cases were not flown." in free.stdout
 
 
 def test_nothing_feasible_leaves_nothing_to_decide() -> None:

@@ -6,7 +6,20 @@ import math
 from dataclasses import replace
 
 import pytest
-from builders import BOTH, COUNTS, HALF_A_DEGREE, INFEASIBLE, POINTING, chosen, cross, judged, said, spinner, warned
+from builders import (
+    BOTH,
+    COUNTS,
+    HALF_A_DEGREE,
+    INFEASIBLE,
+    POINTING,
+    Judged,
+    chosen,
+    cross,
+    judged,
+    said,
+    spinner,
+    warned,
+)
 from cases_dir import case
 
 from nutdamp import planning, schemes
@@ -39,6 +52,27 @@ def test_of_those_that_damp_the_least_propellant() -> None:
     assert chosen(judged("thrifty", 0.99 * COUNTS, propellant=0.1), clean) == "thrifty"
     assert chosen(judged("thrifty", 1.01 * COUNTS, propellant=0.1), clean) == "clean"
     assert chosen(judged("thrifty", 4.9, propellant=0.001), clean) == "clean"
+
+
+class Straying(Judged):
+    """A plan with which the spin axis breaks a cone."""
+
+    @property
+    def kept(self) -> bool | None:
+        return False
+
+
+def test_of_plans_that_do_as_much_those_count_that_keep_the_cones() -> None:
+    def straying(name: str, nutation: float, propellant: float) -> Plan:
+        made = judged(name, nutation, propellant=propellant)
+        assert isinstance(made, Judged)
+        return Straying(made.spacecraft, name, made.schedule, ended=made.ended)
+
+    damps = judged("damps", 0.0, propellant=0.2)
+    found = recommend([straying("thrifty", 0.0, 0.1), damps])
+    assert (found.plan, found.count) == (damps, 1)
+    assert chosen(straying("thrifty", 0.0, 0.1), judged("keeps", 3.0, propellant=0.2)) == "thrifty"
+    assert chosen(straying("thrifty", 0.0, 0.1), straying("dear", 0.0, 0.2)) == "thrifty"
 
 
 def test_below_a_thousandth_of_a_degree_it_counts_as_damped_whatever_the_initial_nutation() -> None:

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import reference
 from process import Run
 
 from nutdamp import flight, survey
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics import forced
+from nutdamp.physics import attitude, forced
 from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes.tools import sun_pulses
 from nutdamp.spacecraft import Disturbance
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
@@ -119,3 +121,57 @@ def test_check_shows_disturbances(run: Run, tmp_path: Path) -> None:
     found = json.loads((tmp_path / "d.json").read_text())["files"][0]["disturbances"]
     assert found[0]["precession_rad_s"] > 0.0
     assert found[2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
+
+
+SUNNY = """
+name: Spinner
+inertia: {A: 80 kg m^2, C: 120 kg m^2}
+state: {spin: -30 rpm, nutation: 2 deg}
+attitude: {quaternion: [1, 0, 0, 0]}
+thrusters: [{name: T1, torque: [8, 0, 0], max_on_time: 900 ms}]
+sun: [40 deg, 20 deg]
+sun_sensor: {azimuth: 35 deg}
+commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, max: 1.8 s}, every: [1, 2]}
+keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
+"""
+
+
+def test_sun_pulses_are_those_of_the_motion() -> None:
+    """The first is a root of the Sun's azimuth in the body by the reference integrator; on average they are a turn."""
+    body = read_spacecraft(SUNNY, "sunny.yaml")
+    clock = survey.sun_clock(body)
+    assert clock is not None
+    assert clock.first is not None
+    assert body.sun is not None
+    start = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
+    (then,) = reference.coast(body.inertia.moments, start, np.zeros(3), np.array([clock.first]))
+    seen = then.rotation.T @ body.sun
+    assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
+    times = sun_pulses.sun_pulses(flight.flown(body, Schedule(), 900.0), 900.0)
+    assert (times[-1] - times[0]) / (len(times) - 1) == pytest.approx(clock.turn, rel=1e-3)
+    assert survey.sun_clock(EXAMPLE) is None
+
+
+def test_the_turn_by_one_pulse_is_what_a_flight_from_rest_does() -> None:
+    body = replace(read_spacecraft(SUNNY, "sunny.yaml"), omega0=np.array([0.0, 0.0, -math.pi]))
+    (turn,) = survey.turns(body)
+    assert [turn.smallest_width, turn.largest_width] == pytest.approx([0.02, 0.9])
+    for width, angle in ((turn.smallest_width, turn.smallest), (turn.largest_width, turn.largest)):
+        flown = flight.flown(body, Schedule((channel_pulse(body.channels[0], 1.0, width),))).residual
+        assert angle == pytest.approx(flown.momentum_shift, rel=2e-2)
+    assert survey.turns(EXAMPLE) == ()
+
+
+def test_check_shows_sun_cones_and_commands(run: Run) -> None:
+    shown = " ".join(run("check", "-", stdin=SUNNY, columns=200).stdout.split())
+    assert "axis from pole 176 deg at t = 0 (at least 2 deg)" in shown
+    assert "axis from Sun 110 deg at t = 0" in shown
+    assert "Sun pulses one every" in shown
+    assert "delay in steps of 2 ms = 0.36 deg of spin, up to 1.9 s = 342 deg" in shown
+    assert "up to 255 pulses, one every 1 or 2 spins" in shown
+    (file,) = json.loads(run("check", "-", "--json", "-", stdin=SUNNY).stdout)["files"]
+    assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
+    assert [one["name"] for one in file["aspects"]] == ["pole", "Sun"]
+    blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
+    shown = " ".join(run("check", "-", stdin=blind, columns=200).stdout.split())
+    assert "the Sun sensor does not see the Sun at" in shown

@@ -65,6 +65,8 @@ def command(
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
     for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
+    from nutdamp.decision import Decision
+
     form = _format(form, spacecraft, ctx.args)
     if until is not None and until <= 0.0:
         raise click.BadParameter("expected a time after t = 0", param_hint="--until")
@@ -80,7 +82,7 @@ def command(
         remark(f"warning: {missing}")
     if output != "-":
         remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
-    if plan.meets_requirement is False and (flown.scheme is None or flown.scheme in PLANNED):
+    if Decision(plan).met is False and (flown.scheme is None or flown.scheme in PLANNED):
         remark(f"{plan.scheme} does not meet the requirement")
         sys.exit(REQUIREMENT_MISSED)
 

@@ -163,7 +163,7 @@ def command(
         sys.exit(INTERNAL)
     if chosen is None:
         sys.exit(INFEASIBLE)
-    if chosen.meets_requirement is False or (made.dispersed and made.dispersed.meets_requirement is False):
+    if made.met is False:
         sys.exit(REQUIREMENT_MISSED)
 
 

@@ -92,6 +92,7 @@ def command(
     expect_places(csv, json, plot)
 
     from nutdamp import flight
+    from nutdamp.decision import Decision
     from nutdamp.outcome import seen_at
     from nutdamp.presentation.geometry import shown_until
     from nutdamp.track import extremes
@@ -106,7 +107,7 @@ def command(
     ends = tuple(seen_at(one, end) for one in flights)
     moving, chosen = flights[real], replace(ends[real], scheme=plan.scheme)
     pictured = shown_until(body, pulses) if until is None else until
-    found = extremes(moving.pieces(samples, end))
+    found, decided = extremes(moving.pieces(samples, end)), Decision(plan, seen=ends[1])
     track = moving.sampled(min(samples, PICTURED), pictured) if plot is not None or drawn else None
 
     def rows() -> Callable[[IO[bytes]], None]:
@@ -116,8 +117,9 @@ def command(
 
     def data() -> dict[str, Any]:
         from nutdamp.files.simulation_json import simulation_json
+        from nutdamp.presentation.decisions import verdict
 
-        return simulation_json(chosen, found, *ends, scheme=plan.scheme, real=real)
+        return simulation_json(chosen, found, ends[0], decided, verdict(decided), real=real)
 
     def picture() -> bytes:
         from nutdamp.presentation import figures
@@ -130,7 +132,7 @@ def command(
         from nutdamp.presentation.simulate_tables import simulation_screen
 
         how = f"{plan.scheme}, propagated by the {chosen.model}"
-        return simulation_screen(chosen, found, *ends, how=how, pulses=len(pulses))
+        return simulation_screen(chosen, found, ends[0], decided, how=how)
 
     def drawing() -> RenderableType:
         from nutdamp.presentation.terminal import motion_drawing

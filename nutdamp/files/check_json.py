@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from nutdamp import __version__, survey
+from nutdamp.aspect import at_start
 from nutdamp.errors import CannotRead, Fault, FaultyFile, printable
-from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.plan_json import aspects_json, spacecraft_json
 from nutdamp.spacecraft import Spacecraft
 
 
@@ -73,6 +74,8 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
             for steps in survey.channel_steps(spacecraft)
         ],
         "spin_axis": _spin_axis_json(spacecraft),
+        **aspects_json(at_start(spacecraft)),
+        "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": [
             {
                 "name": found.disturbance.name or None,
@@ -105,6 +108,31 @@ def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "nutation_rate_despun_rad_s": found.rates.despun,
         "nutation_rate_inertial_rad_s": found.rates.inertial,
         "dissipation_growth_1_s": spacecraft.growth,
+    }
+
+
+def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
+    """When Sun pulses come, and what command blocks can do by them; None without Sun or sensor in the file."""
+    clock, commands = survey.sun_clock(spacecraft), spacecraft.commands
+    if clock is None:
+        return None
+    spin = math.degrees(abs(spacecraft.spin))
+    return {
+        "period_s": clock.turn,
+        "first_s": clock.first,
+        "why": clock.refusal or None,
+        "delay_step_deg": None if commands is None else spin * commands.delay_step,
+        "delay_max_deg": None if commands is None else spin * commands.delay_max,
+        "channels": [
+            {
+                "name": one.channel.name,
+                "smallest_turn_deg": math.degrees(one.smallest),
+                "smallest_turn_width_s": one.smallest_width,
+                "largest_turn_deg": math.degrees(one.largest),
+                "largest_turn_width_s": one.largest_width,
+            }
+            for one in survey.turns(spacecraft)
+        ],
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from nutdamp.compliance import Part
 from nutdamp.decision import Decision, Line
-from nutdamp.files.plan_json import final_json
+from nutdamp.files.plan_json import aspects_json, final_json
 
 
 def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
@@ -15,7 +15,7 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
 
     ``cases`` is null where none were flown; ``better``: other schemes with which more cases comply.
     """
-    plan, cases = decision.plan, decision.cases
+    plan, cases, pulses = decision.plan, decision.cases, decision.flight.schedule
     return {
         "scheme": plan.scheme,
         "met": decision.met,
@@ -31,10 +31,11 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
             "met": cases.met,
         },
         "better": [{"scheme": name, "met_fraction": share} for name, share in decision.better],
-        "final": final_json(plan.flight),
-        "propellant_kg": plan.propellant,
-        "total_impulse_Nms": plan.total_impulse,
-        "end_s": plan.end,
+        "final": final_json(decision.flight),
+        **aspects_json(decision.aspects),
+        "propellant_kg": pulses.propellant,
+        "total_impulse_Nms": pulses.total_impulse,
+        "end_s": pulses.end,
     }
 
 

@@ -43,8 +43,13 @@ class Report:
         return self.page.verdict
 
     @property
+    def met(self) -> bool | None:
+        """Whether the requirement is met; None where nothing is required, and without a feasible plan."""
+        return self.page.met
+
+    @property
     def good(self) -> bool:
-        """Whether nothing is missed."""
+        """Whether nothing is missed, what is not required either."""
         return self.page.good
 
 

@@ -56,6 +56,13 @@ def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]
     return heading, np.abs(np.where(parallel, np.sin(sun_angle) * ahead, along))
 
 
+def turned_by(momentum: Any, torque: float, width: Any, spin: Any) -> Any:
+    """By how much a pulse of a ``torque`` (N m) fixed in the body turns H of size ``momentum``, rad: its mean over the
+    ``width`` s, in which the body turns at ``spin`` rad/s.
+    """
+    return torque * width * np.sinc(0.5 * spin * width / np.pi) / momentum
+
+
 def phasor_sum(count: Any, step: Any) -> Any:
     """Σ e^{i k ``step``} over k = 0 … ``count`` - 1: e^{i(N-1)ψ/2} sin(Nψ/2)/sin(ψ/2); N where ψ is a whole turn."""
     half = 0.5 * step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -12,15 +12,20 @@ from rich.text import Text
 from nutdamp import survey
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
-from nutdamp.presentation.text import degrees, duration, quantity, vector
-from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.presentation.text import degrees, duration, moment, quantity, vector
+from nutdamp.spacecraft import Channel, Spacecraft, SunSensor
+from nutdamp.words import listed
 
 
 def check_screen(spacecraft: Spacecraft) -> RenderableType:
     """Everything that ``check`` shows of one valid file."""
-    parts: list[RenderableType] = [header(spacecraft, _spin_axis(spacecraft))]
+    more = (*_spin_axis(spacecraft), *_sun_pulses(spacecraft))
+    parts: list[RenderableType] = [header(spacecraft, more)]
     if spacecraft.channels:
         parts += [Text(), channel_table(spacecraft)]
+    turns = survey.turns(spacecraft)
+    if turns:
+        parts += [Text(), turns_table(turns)]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -40,6 +45,42 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
+
+
+def _sun_pulses(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    """When Sun pulses come, and how finely blocks are timed by them."""
+    clock, sensor, commands = survey.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
+    if clock is None or sensor is None:
+        return
+    yield "Sun sensor", f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {_view(sensor)}"
+    first = clock.refusal if clock.first is None else f"the first at {moment(clock.first)}"
+    yield "Sun pulses", f"one every {duration(clock.turn)} on average; {first}"
+    if commands is not None:
+        spin = abs(spacecraft.spin)
+        step, longest = (
+            f"{duration(time)} = {degrees(spin * time)}" for time in (commands.delay_step, commands.delay_max)
+        )
+        yield "delay", f"in steps of {step} of spin, up to {longest}"
+        every = listed([str(one) for one in commands.every], "or")
+        yield "block", f"up to {commands.max_count} pulses, one every {'spin' if every == '1' else f'{every} spins'}"
+
+
+def _view(sensor: SunSensor) -> str:
+    """From which angle to the spin axis to which it sees the Sun."""
+    low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
+    return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
+
+
+def turns_table(found: Iterable[survey.Turns]) -> Table:
+    """By how much one pulse of a command block turns H."""
+    table = columns(
+        "command blocks\n", "least turn of H\ndeg", "by a pulse of\n", "largest turn\ndeg", "by a pulse of\n"
+    )
+    for one in found:
+        ends = ((one.smallest, one.smallest_width), (one.largest, one.largest_width))
+        cells = [text for turn, width in ends for text in (degrees(turn).removesuffix(" deg"), duration(width))]
+        table.add_row(one.channel.name, *cells)
+    return table
 
 
 def disturbance_table(spacecraft: Spacecraft) -> Table:

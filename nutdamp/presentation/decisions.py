@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.aspect import SLACK, Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, Line
@@ -15,8 +17,11 @@ from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import end_table
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.text import MISSING, degrees, mass, moment, most, quantity
-from nutdamp.recommendation import Standing
+from nutdamp.remarks import strays
 from nutdamp.words import listed
+
+KEPT = {True: "kept", False: "NOT kept"}
+"""What is said of a cone about a direction that the spin axis has to keep."""
 
 COUNT = "cases that comply"
 """What the row of the decision and the column of the comparison are called that count dispersed cases."""
@@ -24,23 +29,22 @@ COUNT = "cases that comply"
 
 def verdict(decision: Decision) -> str:
     """Whether the requirement is met, in words that leave no doubt for what."""
-    plan, cases = decision.plan, decision.cases
-    nominal = plan.meets_requirement
+    broken, end = list(map(strays, decision.strays)), _at_end(decision)
+    return f"NOT met: {' and '.join(broken)}; otherwise {end}" if broken else end
+
+
+def _at_end(decision: Decision) -> str:
+    """What is said of the end, whatever the spin axis keeps on the way."""
+    cases, nominal = decision.cases, decision.nominal
     if nominal is None:
-        done = plan.standing is Standing.COMPLIES
-        what = "damps the nutation" if plan.spacecraft.goal.axis is None else "reaches the target"
-        return f"nothing is required; with nominal values the plan {what if done else 'does NOT ' + _bare(what)}"
+        what = "nutation is damped" if decision.plan.spacecraft.goal.axis is None else "target is reached"
+        what = what if decision.damped else what.replace(" is ", " is NOT ")
+        return f"nothing is required at the end; with nominal values the {what}"
     if cases is not None and cases.complying is not None:
         counted = verdicts.cases_verdict(cases.complying, cases.probability)
         return counted if nominal else f"NOT met with nominal values; {counted}"
     said = f"{'met' if nominal else 'NOT met'} with nominal values"
     return f"{said}; dispersed cases were not flown" if decision.undispersed else said
-
-
-def _bare(verb: str) -> str:
-    """The infinitive of "damps the nutation" or "reaches the target"."""
-    first, _, rest = verb.partition(" ")
-    return f"{first.removesuffix('es' if first == 'reaches' else 's')} {rest}"
 
 
 def better(decision: Decision) -> str:
@@ -63,12 +67,26 @@ def decision_table(decision: Decision) -> Table:
         dispersed = [] if cases is None else [_size(line.bound, line.dispersed)]
         cells = (_limit(line.bound), _size(line.bound, line.nominal), *dispersed, _size(line.bound, line.margin))
         table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
+    for one in decision.aspects:
+        for limit, angle, left in _cones(one):
+            kept, none = left >= -SLACK, [""] * (cases is not None)
+            said = coloured(KEPT[kept], kept)
+            table.add_row(f"axis from {one.keep.name}", limit, degrees(angle), *none, degrees(left), said)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} %"
         said = coloured(verdicts.VERDICT[cases.met], cases.met)
         table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
     return table
+
+
+def _cones(one: Aspect) -> Iterator[tuple[str, float, float]]:
+    """Each bound of a cone, the angle that comes nearest to it, and by how much it keeps it, rad."""
+    keep = one.keep
+    if keep.least > 0.0:
+        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
+    if keep.most < math.pi:
+        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest
 
 
 def coloured(text: str, met: bool | None) -> Text:
@@ -95,7 +113,7 @@ def _met(line: Line) -> str:
 
 def cost(decision: Decision) -> Iterator[tuple[str, str]]:
     """What the plan takes, and when it ends: names and values."""
-    pulses = decision.plan.pulses
+    pulses = decision.flight.schedule
     count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
     if pulses.propellant is None:
         yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')} in {count}"
@@ -106,7 +124,7 @@ def cost(decision: Decision) -> Iterator[tuple[str, str]]:
 
 def end_facts(decision: Decision) -> Table:
     """Where the spin axis and H end, the spin, what it costs and when it ends."""
-    table = end_table(decision.plan.flight)
+    table = end_table(decision.flight, decision.aspects)
     for name, value in cost(decision):
         table.add_row(name, value)
     return table

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp import compliance
+from nutdamp.aspect import aspects
 from nutdamp.compliance import Part
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
@@ -45,7 +46,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
-        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal)]
+        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
     parts += [Text(), *_requirement(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]

@@ -7,10 +7,12 @@ from collections.abc import Iterable
 
 from rich.table import Table
 
-from nutdamp.aspect import Aspect, aspects
+from nutdamp.aspect import Aspect
+from nutdamp.demands import Keep
 from nutdamp.flight import Flight
+from nutdamp.physics import attitude
 from nutdamp.presentation.layout import facts
-from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
+from nutdamp.presentation.text import degrees, longitude, moment, most, pointing, quantity
 from nutdamp.spacecraft import Spacecraft, Vector
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
@@ -34,13 +36,24 @@ def direction_text(body: Spacecraft, direction: Vector) -> str:
     return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
 
 
+def target_text(body: Spacecraft, direction: Vector) -> str:
+    """The target axis beside an inertial direction (3,) that was to come there, and the angle between them."""
+    if body.goal.axis is None:
+        return ""
+    off = float(attitude.angle_between(direction, body.goal.axis))
+    return f"target: {direction_text(body, body.goal.axis)}; {degrees(off)} off"
+
+
 def spin_text(spin: float) -> str:
     """A spin rate given in rad/s, in rpm too."""
     return f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})"
 
 
-def end_table(flown: Flight) -> Table:
-    """Spin axis and angular momentum after the last pulse, beside the target, and what the body does from then on."""
+def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
+    """Spin axis and angular momentum after the last pulse, beside the target, and what the body does from then on.
+
+    ``watched``: how near the axis came to directions in space.
+    """
     body, final = flown.spacecraft, flown.final
     table = facts()
     table.add_row("spin axis ends at", direction_text(body, final.axis))
@@ -52,7 +65,7 @@ def end_table(flown: Flight) -> Table:
     if lasting:
         end = moment(flown.schedule.end)
         table.add_row("", f"as the last pulse ends, at {end}; changed further by {' and '.join(lasting)}")
-    add_aspects(table, aspects(flown))
+    add_aspects(table, watched)
     if body.attitude is None:
         table.add_row("", FRAME_N)
     elif body.attitude.frame is not None:
@@ -64,9 +77,14 @@ def add_aspects(table: Table, found: Iterable[Aspect]) -> None:
     """How near the spin axis comes to each direction that is watched, and what it is to keep; ✗ where it does not."""
     for one in found:
         keep = one.keep
-        least = f"at least {degrees(keep.least)}" if keep.least > 0.0 else ""
-        most = f"at most {degrees(keep.most)}" if keep.most < math.pi else ""
-        bounds = " and ".join(filter(None, (least, most)))
-        mark = "" if one.kept else "✗ "
+        mark, bounds = "" if one.kept else "✗ ", bounds_text(keep)
         near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (one[1:3], one[3:5]))
-        table.add_row(f"axis from {keep.name}", f"{mark}{near} to {far}" + (f" ({bounds})" if bounds else ""))
+        seen = f"{near} to {far}" if one.largest_at > 0.0 or one.least_at > 0.0 else f"{degrees(one.least)} at t = 0"
+        table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
+
+
+def bounds_text(keep: Keep) -> str:
+    """What the spin axis has to keep to a direction; empty where it is only watched."""
+    least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
+    largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
+    return " and ".join(filter(None, (least, largest)))

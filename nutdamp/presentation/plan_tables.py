@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp import compliance
+from nutdamp.aspect import at_start
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import decide
@@ -19,7 +20,7 @@ from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.decisions import decision_screen
-from nutdamp.presentation.end_tables import angle_names, angle_texts, direction_text, spin_text
+from nutdamp.presentation.end_tables import add_aspects, angle_names, angle_texts, direction_text, spin_text
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, steering
 from nutdamp.remarks import said
@@ -68,20 +69,21 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
     if spacecraft.dissipation is not None:
         table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
-    beyond = _beyond_floors(spacecraft)
+    beyond = beyond_floors(spacecraft)
     floor = f"no least impulse with {beyond}" if beyond else "no schedule needs less"
     name = "impulse" if beyond else "least impulse"
     table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:
-        turning = quantity(_turning(spacecraft), "N m s")
+        turn = quantity(_turning(spacecraft), "N m s")
         least = "" if beyond else ", the least to turn H"
         table.add_row("target", direction_text(spacecraft, spacecraft.goal.axis))
-        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turning}{least}")
+        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turn}{least}")
     if spacecraft.goal.spin is not None:
         table.add_row("final spin", spin_text(spacecraft.goal.spin))
     table.add_row("actuators", _actuators(spacecraft))
     for line, text in enumerate(_requirement(spacecraft)):
         table.add_row("" if line else "requirement", text)
+    add_aspects(table, at_start(spacecraft))
     for name, value in more:
         table.add_row(name, value)
     return table
@@ -106,7 +108,7 @@ def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
     return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
-def _beyond_floors(spacecraft: Spacecraft) -> str:
+def beyond_floors(spacecraft: Spacecraft) -> str:
     """What the floors A|ω0| and C|ω3|β do not hold with, in words; empty where they hold."""
     found = [
         *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
@@ -150,16 +152,13 @@ SHORT_NAMES = ("RA", "dec")
 
 def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
     """What the comparison shows of each feasible plan."""
-    least = compared.spacecraft.least_impulse
-
-    def ratio(plan: Plan) -> str:
-        return f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING
-
+    (least, ratio), *others = ratios(compared.spacecraft)
     rows: list[tuple[str, Cell]] = [
         ("pulses", lambda plan: str(len(plan.pulses))),
         ("ends at", lambda plan: moment(plan.pulses.end)),
         ("impulse", lambda plan: quantity(plan.pulses.total_impulse, "N m s")),
-        ("  × A|ω0|" if _beyond_floors(compared.spacecraft) else "  × least impulse", ratio),
+        (f"  {least}" if beyond_floors(compared.spacecraft) else "  × least impulse", ratio),
+        *((f"  {name}", cell) for name, cell in others),
         ("propellant", lambda plan: mass(plan.pulses.propellant)),
         ("by impulses (17):", lambda _: ""),
         ("  nutation left", lambda plan: _angle(plan.residual, "nutation")),
@@ -179,10 +178,6 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
     goal = compared.spacecraft.goal
     if goal.axis is not None:
         rows.insert(-1, ("  off the target", lambda plan: _angle(plan.flown, "axis_error")))
-        turning = _turning(compared.spacecraft)
-        rows.insert(
-            4, ("  × C|ω3|β", lambda plan: f"{plan.pulses.total_impulse / turning:.4f}" if turning else MISSING)
-        )
     if goal.spin is not None:
         rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
     if any(plan.delta_v is not None for plan in compared.plans):
@@ -191,6 +186,17 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         rows.append(("requirement:", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
         rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
     return rows
+
+
+def ratios(body: Spacecraft) -> Iterator[tuple[str, Cell]]:
+    """The impulse of a plan over A|ω0|, and with a target over C|ω3|β."""
+
+    def ratio(whole: float) -> Cell:
+        return lambda plan: f"{plan.pulses.total_impulse / whole:.4f}" if whole > 0.0 else MISSING
+
+    yield "× A|ω0|", ratio(body.least_impulse)
+    if body.goal.axis is not None:
+        yield "× C|ω3|β", ratio(_turning(body))
 
 
 def _part(bound: Bound) -> tuple[str, Cell]:

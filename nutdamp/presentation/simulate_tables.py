@@ -7,8 +7,10 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.aspect import aspects
+from nutdamp.decision import Decision
 from nutdamp.flight import Flight
 from nutdamp.presentation.block_tables import blocks_screen
+from nutdamp.presentation.decisions import decision_table, requirement
 from nutdamp.presentation.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import channel_text, header
@@ -18,12 +20,13 @@ from nutdamp.track import Extremes
 
 
 def simulation_screen(
-    flight: Flight, found: Extremes, impulses: Flight, flown: Flight, *, how: str, pulses: int
+    flight: Flight, found: Extremes, impulses: Flight, decided: Decision, *, how: str
 ) -> RenderableType:
-    """Everything that ``simulate`` shows; ``how`` names what was propagated: a schedule of so many ``pulses``.
+    """Everything that ``simulate`` shows; ``how`` names what was propagated.
 
-    All three flights as `outcome.seen_at` the end of the track; ``flight`` is one of the others.
+    All flights as `outcome.seen_at` the end of the track; ``flight`` is that by ``impulses``, or that ``decided`` on.
     """
+    flown, pulses = decided.flight, len(decided.plan.pulses)
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule) < pulses:
         begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
@@ -36,6 +39,7 @@ def simulation_screen(
     if flight.spacecraft.attitude is None:
         parts.append(Text(f"{FRAME_N}.", style="dim"))
     parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
+    parts += [Text(), *requirement(decided), decision_table(decided)]
     parts += [Text(), _extremes(found, flight)]
     return Group(*parts)
 

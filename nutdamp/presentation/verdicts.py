@@ -17,7 +17,7 @@ from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Plan
 from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, sentence
 from nutdamp.recommendation import Ground, Standing
-from nutdamp.remarks import obstacle
+from nutdamp.remarks import obstacle, strays
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.words import listed
@@ -63,15 +63,17 @@ def reason(compared: Comparison) -> str:
         return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}"
     if found.ground is Ground.ONLY:
         return _only(compared)
+    cones = " and keep the cones" * bool(found.plan.kept)
     cost = "propellant" if found.by_propellant else "impulse"
     if found.standing is Standing.COMPLIES:
-        among = f"of the {found.count} plans that {_those(body)}"
+        among = f"of the {found.count} plans that {_those(body)}{cones}"
         return {
             Ground.SHIFT: f"least {cost} {among}, within 0.1 %; of these least shift of H",
             Ground.END: f"least {cost} {among}, within 0.1 %; of these it ends first",
         }.get(found.ground or Ground.COST, f"least {cost} {among}")
     meeting = found.standing is Standing.MEETS
-    among = f"of the {found.count} {'plans that meet the requirement' if meeting else 'feasible plans'}"
+    those = f"plans that meet the requirement{cones}" if meeting else f"feasible plans{cones.replace(' and', ' that')}"
+    among = f"of the {found.count} {those}"
     least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
     if found.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
@@ -93,7 +95,9 @@ def _only(compared: Comparison) -> str:
     }[found.standing or Standing.MISSES]
     if len(compared.plans) == 1:
         return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
-    return f"the only plan that {verdict}" if verdict else "the only feasible plan"
+    cones = "keeps the cones" if found.plan is not None and found.plan.kept else ""
+    said = " and ".join(filter(None, (verdict, cones)))
+    return f"the only {'' if verdict else 'feasible '}plan{f' that {said}' * bool(said)}"
 
 
 def _those(body: Spacecraft, *, plural: bool = True) -> str:
@@ -106,11 +110,28 @@ def _those(body: Spacecraft, *, plural: bool = True) -> str:
 
 
 def warnings(compared: Comparison) -> tuple[str, ...]:
-    """What the recommended plan does not reach, and what prevents it; nothing for one that complies."""
+    """What the recommended plan does not reach, and what prevents it; nothing for one that complies.
+
+    Then the cones that the spin axis breaks.
+    """
     found = compared.recommendation
-    if found.plan is None or found.standing is Standing.COMPLIES:
+    if found.plan is None:
         return ()
-    body, chosen = compared.spacecraft, found.plan
+    return (*_missed(found.plan, compared), *_cones_broken(found.plan, compared))
+
+
+def _cones_broken(chosen: Plan, compared: Comparison) -> Iterator[str]:
+    """The cones that the spin axis does not keep with the recommended plan, and which plans do."""
+    keeping = [one.scheme for one in compared.plans if one.feasible and one.kept]
+    those = f"{listed(keeping)} keep{'s' * (len(keeping) == 1)} all cones" if keeping else "no plan compared keeps it"
+    yield from (sentence(f"{strays(one)}; {those}") for one in chosen.aspects if not one.kept)
+
+
+def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
+    """What the recommended plan does not reach, and what prevents it."""
+    found, body = compared.recommendation, compared.spacecraft
+    if found.standing is Standing.COMPLIES:
+        return
     required = found.standing is Standing.MISSES and bool(compliance.required(body))
     what = "nutation" if body.goal.axis is None else "target"
     if len(compared.plans) > 1:
@@ -129,7 +150,7 @@ def warnings(compared: Comparison) -> tuple[str, ...]:
         head = f"{chosen.scheme} does not {verb}"
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
     it = chosen.scheme if len(compared.plans) > 1 else "It"
-    return (" ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared))),)
+    yield " ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared)))
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:

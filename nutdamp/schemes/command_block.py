@@ -20,7 +20,7 @@ from nutdamp import compliance, flight, work
 from nutdamp.commands import Block, Commands
 from nutdamp.compliance import Part
 from nutdamp.errors import Infeasible
-from nutdamp.limits import keeps_limits, usable
+from nutdamp.limits import commandable_widths, keeps_limits, usable
 from nutdamp.outcome import left_by
 from nutdamp.physics.sun_train import phasor_sum
 from nutdamp.schedule import Schedule
@@ -212,11 +212,6 @@ class Search:
         channel = next(one for one in self.channels if one.name == block.channel)
         return self._rate(channel) * block.count * block.width
 
-    def _widths(self, channel: Channel) -> Array:
-        """Those that can be commanded and that the channel allows."""
-        widths = self.commands.widths
-        return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
-
     def _spaced(self, every: int) -> bool:
         """Whether pulses in one of ``every`` spins are as far apart as limits.gap asks for."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
@@ -258,7 +253,7 @@ class Search:
         With a target the length of the rhumb line: a block that is longer or shorter than the way ends no nearer than
         a third of the difference. Without one the nutation, which they can lower by the sum of their kicks at most.
         """
-        widths, counts = self._widths(channel)[:, None], self._counts(state, every)[None, :]
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
         bounds = {bound.part: bound.most for bound in self.bounds}
         if self.body.goal.axis is None:
             kick = abs(channel.transverse) * widths
@@ -272,7 +267,10 @@ class Search:
     def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
         """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
         if len(index):
-            widths, counts = self._widths(channel)[index[:, 0]], self._counts(state, every)[index[:, 1]]
+            widths, counts = (
+                commandable_widths(self.commands, channel)[index[:, 0]],
+                self._counts(state, every)[index[:, 1]],
+            )
             for wait in range(WAITS if abs(state.phasor) > 0.0 else 1):
                 yield self._at_delays(state, channel, self.earliest + wait, widths, counts, every)
 
@@ -281,7 +279,7 @@ class Search:
         state = before.state
         _, way = self.model.course(state)
         for channel in self.channels:
-            widths = _spread(self._widths(channel), MOST_WIDTHS)
+            widths = _spread(commandable_widths(self.commands, channel), MOST_WIDTHS)
             if not len(widths):
                 continue
             step = self.model.turned_by(channel, widths, float(state.spin))
@@ -301,7 +299,7 @@ class Search:
         if self.body.goal.axis is None or every is None:
             return
         for channel in self.channels:
-            widths = _spread(self._widths(channel), 3)
+            widths = _spread(commandable_widths(self.commands, channel), 3)
             for width in widths.tolist():
                 step = float(self.model.turned_by(channel, width, float(start.state.spin)))
                 counts = np.unique(np.rint(SHARES * float(way) / step).clip(1, self.commands.max_count).astype(int))

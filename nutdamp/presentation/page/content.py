@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from rich.console import Group
 
 from nutdamp import __version__
+from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, cases_of, decide
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
-from nutdamp.presentation.end_tables import direction_text, spin_text
+from nutdamp.presentation.end_tables import bounds_text, direction_text, spin_text, target_text
 from nutdamp.presentation.page.craft import ends_note, ends_sheet, spacecraft_blocks
 from nutdamp.presentation.page.document import (
     UNCONTROLLED,
@@ -41,12 +42,13 @@ from nutdamp.presentation.page.pictures import (
     schemes_picture_of,
     trade_picture_of,
 )
-from nutdamp.presentation.page.sheets import comparison_sheet, pulse_sheet
+from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees
 from nutdamp.presentation.trade_tables import front_parts
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
+from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 
 if TYPE_CHECKING:  # few reports disperse
@@ -100,21 +102,28 @@ def report_page(
             sections.append(_dispersion(chosen, flown[chosen.scheme], note, pictured=pictured))
     sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
     return Page(
-        title=control.title or f"{body.name}: damping {degrees(body.nutation)} of nutation",
+        title=control.title or _title(body),
         control=control,
         verdict=_verdict(compared, decided),
+        met=None if decided is None else decided.met,
         good=decided is not None and decided.met is not False and decided.plan.standing is Standing.COMPLIES,
         decision=() if decided is None else tuple(_decision(decided)),
-        figures=() if decided is None else tuple(_figures(decided)),
+        figures=tuple(_unplanned(body) if decided is None else _figures(decided)),
         sections=(*sections, _repeat(repeat, flown)),
         made_by=f"Made by nutdamp {__version__}.",
     )
 
 
+def _title(body: Spacecraft) -> str:
+    """What is to be done."""
+    turn = "" if body.goal.axis is None else f" and turning the spin axis by {degrees(body.to_turn)}"
+    return f"{body.name}: damping {degrees(body.tilt)} of nutation{turn}"
+
+
 def _verdict(compared: Comparison, decided: Decision | None) -> str:
     reason = verdicts.reason(compared)
     if decided is None:
-        return f"No recommendation: {reason}."
+        return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     whom = "Recommended" if decided.cases is None else "Recommended for nominal values"
     said = f"Requirement: {decisions.verdict(decided)}. {whom}: {decided.plan.scheme} – {reason}."
     return " ".join((said, *verdicts.warnings(compared)))
@@ -126,19 +135,39 @@ def _decision(decided: Decision) -> Iterator[Block]:
     how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
     title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin"
     yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
+    if decided.aspects:
+        yield aspects_sheet(decided)
     if decisions.better(decided):
         yield Remarks((("Note", decisions.better(decided)),))
 
 
 def _figures(decided: Decision) -> Iterator[Figure]:
     """The numbers to read first: the verdict, where it points at the end, what it costs."""
-    flown = decided.plan.flight
+    body, final = decided.plan.spacecraft, decided.final
     yield Figure("requirement", decisions.verdict(decided))
-    yield Figure("spin axis ends at", direction_text(flown.spacecraft, flown.final.axis))
-    yield Figure("H ends at", direction_text(flown.spacecraft, flown.final.momentum))
-    yield Figure("final spin", spin_text(flown.final.spin))
+    for name, end in (("spin axis ends at", final.axis), ("H ends at", final.momentum)):
+        yield Figure(name, direction_text(body, end), target_text(body, end))
+    goal = "" if body.goal.spin is None else f"target: {spin_text(body.goal.spin)}"
+    yield Figure("final spin", spin_text(final.spin), goal)
+    for one in decided.aspects:
+        yield Figure(f"axis from {one.keep.name}", f"{degrees(one.least)} to {degrees(one.largest)}", _keeping(one))
     for name, value in decisions.cost(decided):
         yield Figure(name, value)
+
+
+def _keeping(one: Aspect) -> str:
+    """What the spin axis has to keep to a direction, and whether it does; empty where it is only watched."""
+    bounds = bounds_text(one.keep)
+    return f"{bounds}: {decisions.KEPT[one.kept]}" if bounds else ""
+
+
+def _unplanned(body: Spacecraft) -> Iterator[Figure]:
+    """The numbers to read first where there is no plan: what was required."""
+    yield Figure("requirement", "NOT met: no scheme is feasible", verdicts.required(body))
+    if body.goal.axis is not None:
+        way = f"{degrees(body.to_turn)} from H at t = 0"
+        yield Figure("target", direction_text(body, body.goal.axis), way)
+    yield Figure("nutation at t = 0", degrees(body.tilt))
 
 
 def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) -> Section:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.flight import Flight
+from nutdamp.physics import attitude
 from nutdamp.presentation.check_tables import channel_table, disturbance_table
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
@@ -99,7 +100,7 @@ def ends_sheet(flown: Flight) -> Sheet:
     start, state = body.momentum, flown.settled
     end = np.asarray(state.rates * np.asarray(body.inertia.moments))
     size = float(np.linalg.norm(start))
-    directions = ("spin axis", flown.axis(np.zeros(1))[0], final.axis), ("H", start / size, final.momentum)
+    directions = ("spin axis", body.axis, final.axis), ("H", start / size, final.momentum)
     rows: list[tuple[str, ...]] = []
     for what, before, after in directions:
         for which, name in enumerate(angle_names(body)):
@@ -108,7 +109,13 @@ def ends_sheet(flown: Flight) -> Sheet:
     rows.append(("|H|", quantity(size, "N m s"), quantity(float(np.linalg.norm(end)), "N m s"), MISSING))
     goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
     rows.append(("spin", spin_text(body.spin), spin_text(final.spin), goal))
-    rows.append(("nutation", degrees(body.nutation), degrees(final.nutation), MISSING))
+    largest = body.nutation, final.nutation
+    if body.inertia.symmetric:
+        rows.append(("nutation", *map(degrees, largest), MISSING))
+    else:
+        now = body.tilt, float(attitude.angle_between(final.axis, final.momentum))
+        rows.append(("nutation at that time", *map(degrees, now), MISSING))
+        rows.append(("largest nutation from then on, without pulses", *map(degrees, largest), MISSING))
     heads: tuple[Column, ...] = (Column("quantity", number=False), Column("t = 0"), Column("after the last pulse"))
     if target is None and body.goal.spin is None:
         rows = [row[:-1] for row in rows]

@@ -101,10 +101,11 @@ class Section(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """One of the few numbers to read first."""
+    """One of the few numbers to read first; ``note``: what to compare it with."""
 
     name: str
     value: str
+    note: str = ""
 
 
 class Control(NamedTuple):
@@ -129,11 +130,15 @@ UNCONTROLLED = Control()
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report: title, verdict (``good``: nothing is missed), the decision, numbers to read first, sections."""
+    """A whole report: title, verdict, the decision, numbers to read first, sections.
+
+    ``met``: whether the requirement is, None where nothing is required; ``good``: nothing is missed at all.
+    """
 
     title: str
     control: Control
     verdict: str
+    met: bool | None
     good: bool
     decision: tuple[Block, ...]
     figures: tuple[Figure, ...]

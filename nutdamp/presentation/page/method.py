@@ -12,7 +12,9 @@ from nutdamp.guide.topic import Formula, Rows, Topic
 from nutdamp.outcome import left_by, tolerated
 from nutdamp.planning import Plan
 from nutdamp.presentation.page.document import Block, Column, Facts, Listing, Points, Prose, Sheet
+from nutdamp.presentation.plan_tables import beyond_floors
 from nutdamp.presentation.text import MISSING, degrees, quantity
+from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import AGREE, Verification
 
 EQUATIONS = ("1", "17", "18", "19")
@@ -35,7 +37,7 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
         scheme = guide.found(chosen.scheme)
         lines += _listed(scheme, _formulas(scheme)[0])
     yield Listing("Equations", "\n".join(lines))
-    yield Facts("Symbols", tuple(_symbols(topics, chosen)))
+    yield Facts("Symbols", (*_symbols(topics, chosen), *_floors(compared.spacecraft)))
     yield Points(guide.SOURCES[:1])
 
 
@@ -62,6 +64,16 @@ def _symbols(topics: list[Topic], chosen: Plan | None) -> Iterator[tuple[str, st
             assert chosen is not None
             yield chosen.scheme, " ".join(block for block in part.blocks if isinstance(block, str))
             return
+
+
+def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
+    """What the impulses of plans are compared with."""
+    beyond = beyond_floors(body)
+    holds = f"no floor here, with {beyond}" if beyond else "no schedule takes less"
+    yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
+    if body.goal.axis is not None:
+        turning = quantity(body.turning_impulse, "N m s")
+        yield "C|ω3|β", f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
 
 
 def assumption_blocks() -> Iterator[Block]:

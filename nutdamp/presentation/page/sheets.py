@@ -14,10 +14,10 @@ from nutdamp.flight import Residual
 from nutdamp.outcome import spin_phases
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.decisions import COUNT
-from nutdamp.presentation.end_tables import angle_names, angle_texts
+from nutdamp.presentation.decisions import COUNT, KEPT
+from nutdamp.presentation.end_tables import angle_names, angle_texts, bounds_text
 from nutdamp.presentation.page.document import Column, Sheet
-from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
+from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, ratios
 from nutdamp.presentation.text import MISSING, degrees, longitude
 
 Cell = Callable[[Plan], str]
@@ -43,15 +43,11 @@ def comparison_sheet(compared: Comparison, decided: Decision | None = None) -> S
 
 
 def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
-    least = compared.spacecraft.least_impulse
     columns: list[tuple[Column, Cell]] = [
         (Column("pulses"), lambda plan: str(len(plan.pulses))),
         (Column("ends at", "s"), lambda plan: f"{plan.pulses.end:.3f}"),
         (Column("impulse", "N m s"), lambda plan: _number(plan.pulses.total_impulse)),
-        (
-            Column("× least"),
-            lambda plan: f"{plan.pulses.total_impulse / least:.4f}" if least > 0.0 else MISSING,
-        ),
+        *((Column("impulse", name), cell) for name, cell in ratios(compared.spacecraft)),
     ]
     if any(plan.feasible and plan.pulses.propellant is not None for plan in compared.plans):
         columns.append((Column("propellant", "g"), lambda plan: _number(plan.pulses.propellant, 1e3)))
@@ -117,6 +113,27 @@ def pulse_sheet(plan: Plan) -> Sheet:
             columns.append((Column(f"{cone.replace('_', ' ')} {when}", "deg"), angles))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet(f"Pulses of {plan.scheme}", tuple(column for column, _ in columns), rows)
+
+
+def aspects_sheet(decided: Decision) -> Sheet:
+    """One row a direction that is watched: how near the spin axis comes to it, how far from it, and what it has to."""
+    rows = tuple(
+        (
+            one.keep.name,
+            *(
+                cell
+                for angle, at in (one[1:3], one[3:5])
+                for cell in (degrees(angle).removesuffix(" deg"), f"{at:.3f}")
+            ),
+            bounds_text(one.keep) or "none",
+            KEPT[one.kept] if one.keep in decided.plan.spacecraft.keep else MISSING,
+        )
+        for one in decided.aspects
+    )
+    names = ("direction", ""), ("least angle", "deg"), ("at", "s"), ("largest angle", "deg"), ("at", "s")
+    heads = [Column(name, unit, bool(unit)) for name, unit in (*names, ("limit", ""), ("verdict", ""))]
+    title = "The spin axis from directions that the file names, to one nutation period after the last pulse"
+    return Sheet(title, tuple(heads), rows, sortable=False, stacked=True)
 
 
 def residual_sheet(title: str, left: Residual) -> Sheet:

@@ -77,8 +77,7 @@ class BlockModel:
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """By how much one pulse turns H, rad."""
-        half = 0.5 * spin * width
-        return abs(channel.transverse) * width * np.sinc(half / np.pi) / (self.inertia.C * abs(spin))
+        return sun_train.turned_by(self.inertia.C * abs(spin), abs(channel.transverse), width, spin)
 
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
         """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
