@@ -19,7 +19,7 @@ from samples import some
 
 from nutdamp import basilisk, flight, planning
 from nutdamp.basilisk import BasiliskFlight
-from nutdamp.cli.verify import command as verify_command
+from nutdamp.cli.root import group
 from nutdamp.errors import MissingExtra
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
@@ -87,7 +87,7 @@ def test_basilisk_has_its_say_in_the_verdict(
     assert not found.agree
     assert verdict(found) == "The flown motion and Basilisk DO NOT AGREE (within 1e-09 rad)."
     with pytest.raises(SystemExit) as left:
-        verify_command.main(["--scheme", "two-pulse", "--quiet"], standalone_mode=False)
+        group.main(["verify", "--scheme", "two-pulse", "--quiet"], standalone_mode=False)
     assert left.value.code == 1
     assert "the flown motion and Basilisk do not agree" in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from nutdamp.cli import plan, report
+from nutdamp.cli.root import group
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import two_pulse
 
@@ -24,7 +24,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_rest_of_the_comparison_is_shown(folder: Path) -> None:
-    done = CliRunner().invoke(plan.command, ["--json", "plan.json", "--csv", "pulses.csv"])
+    done = CliRunner().invoke(group, ["plan", "--json", "plan.json", "--csv", "pulses.csv"])
     assert done.exit_code == 1
     for text in ("internal error,", "please report:", "ZeroDivisionError", "Recommended: optimal"):
         assert text in done.stdout
@@ -37,27 +37,27 @@ def test_the_rest_of_the_comparison_is_shown(folder: Path) -> None:
 
 
 def test_the_traceback_is_shown_on_demand(folder: Path) -> None:
-    done = CliRunner().invoke(plan.command, ["--debug"])
+    done = CliRunner().invoke(group, ["plan", "--debug"])
     assert done.exit_code == 1
     assert "Traceback" in done.stderr
     assert "ZeroDivisionError: float division by zero" in done.stderr
 
 
 def test_the_page_is_written(folder: Path) -> None:
-    done = CliRunner().invoke(report.command, ["-o", "report.md"])
+    done = CliRunner().invoke(group, ["report", "-o", "report.md"])
     assert done.exit_code == 1
     assert "ZeroDivisionError" in (folder / "report.md").read_text(encoding="utf-8")
 
 
 def test_a_scheme_that_fails_alone_recommends_nothing(folder: Path) -> None:
-    done = CliRunner().invoke(plan.command, ["--scheme", "two-pulse"])
+    done = CliRunner().invoke(group, ["plan", "--scheme", "two-pulse"])
     assert done.exit_code == 1
     assert "please report:" in done.stdout
     assert "No recommendation" in done.stdout
 
 
 def test_robust_plans_go_on_without_it(folder: Path) -> None:
-    done = CliRunner().invoke(plan.command, ["--robust", "--scheme", "two-pulse", "--scheme", "four-pulse"])
+    done = CliRunner().invoke(group, ["plan", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse"])
     assert done.exit_code == 1
     assert "Robust plan: four-pulse" in done.stdout
     assert "two-pulse: internal error, please report: ZeroDivisionError" in done.stdout
