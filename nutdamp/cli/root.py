@@ -89,6 +89,4 @@ def main() -> None:
     # Read when numpy is loaded. Matrices are small here, so that threads within their products cost more than they
     # save; dispersed cases have threads of their own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Else pydantic looks through all packages installed for plugins.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     run(group)

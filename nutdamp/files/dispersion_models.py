@@ -5,13 +5,10 @@ The sizes of tolerances stay as they are written here: `dispersion_rules` finds 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field, WrapValidator
-from pydantic_core import CoreSchema, core_schema
-
-from nutdamp.files.fields import Section
+from nutdamp.files.sections import Field, Length, Rule, Section
 from nutdamp.tolerances import KINDS, Dispersions, Tolerance
 from nutdamp.units import parse, pattern
 
@@ -88,24 +85,21 @@ class ToleranceSection(Section):
         return Tolerance(kind, size, relative)
 
 
-def _three_alike(value: object, several: core_schema.ValidatorFunctionWrapHandler) -> object:
-    """A single tolerance stands for all three rates."""
-    return [ToleranceSection.model_validate(value)] * 3 if isinstance(value, dict) else several(value)
-
-
-def _all_alike(value: object, several: core_schema.ValidatorFunctionWrapHandler) -> object:
-    """A single tolerance stands for all thrusters."""
-    single = isinstance(value, dict) and not by_name(value)
-    return {ALL: ToleranceSection.model_validate(value)} if single else several(value)
-
-
-class Shown:
-    """Annotation of what is at ``key``: its JSON Schema, with the units of its quantity."""
+class _Alike(Rule):
+    """Annotation of what is at ``key``: several tolerances, for which one may stand; in the schema with their units."""
 
     def __init__(self, key: str) -> None:
         self.key = key
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """A single tolerance stands for all three rates, or for all thrusters."""
+        if isinstance(value, dict) and self.key == "omega0":
+            return inner([value] * 3)
+        alone = isinstance(value, dict) and self.key in BY_THRUSTER and not by_name(value)
+        return inner({ALL: value} if alone else value)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """One tolerance or several."""
         single = _json_schema(QUANTITIES[self.key])
         if self.key == "omega0":
             return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
@@ -128,51 +122,51 @@ def _json_schema(kind: str) -> dict[str, Any]:
     }
 
 
-_Three = Annotated[list[ToleranceSection], Field(min_length=3, max_length=3), WrapValidator(_three_alike)]
-_ByThruster = Annotated[dict[str, ToleranceSection], WrapValidator(_all_alike)]
+_Three = Annotated[list[ToleranceSection], Length(3, 3)]
+_ByThruster = dict[str, ToleranceSection]
 
 
 class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
 
-    A: Annotated[ToleranceSection, Shown("A")] | None = Field(
+    A: Annotated[ToleranceSection, _Alike("A")] | None = Field(
         default=None, description="Of the transverse moment of inertia, kg m² or %.", examples=[{"normal": "2 %"}]
     )
-    C: Annotated[ToleranceSection, Shown("C")] | None = Field(
+    C: Annotated[ToleranceSection, _Alike("C")] | None = Field(
         default=None,
         description="Of the moment of inertia about the spin axis, kg m² or %.",
         examples=[{"normal": "1.6 kg m^2"}],
     )
-    omega0: Annotated[_Three, Shown("omega0")] | None = Field(
+    omega0: Annotated[_Three, _Alike("omega0")] | None = Field(
         default=None,
         description="Of each body rate at t = 0, rad/s or %; or a list of three.",
         examples=[{"normal": "0.1 deg/s"}],
     )
-    thrust: Annotated[_ByThruster, Shown("thrust")] | None = Field(
+    thrust: Annotated[_ByThruster, _Alike("thrust")] | None = Field(
         default=None,
         description="Of each thruster, the same in all its pulses, % or N; or by name.",
         examples=[{"normal": "3 %"}],
     )
-    thrust_per_pulse: Annotated[ToleranceSection, Shown("thrust_per_pulse")] | None = Field(
+    thrust_per_pulse: Annotated[ToleranceSection, _Alike("thrust_per_pulse")] | None = Field(
         default=None, description="Of the thrust, in each pulse anew, %.", examples=[{"normal": "1 %"}]
     )
-    thrust_direction: Annotated[_ByThruster, Shown("thrust_direction")] | None = Field(
+    thrust_direction: Annotated[_ByThruster, _Alike("thrust_direction")] | None = Field(
         default=None,
         description="Tilt of each force about two axes across it, rad; or by name.",
         examples=[{"normal": "0.5 deg"}],
     )
-    position: Annotated[_ByThruster, Shown("position")] | None = Field(
+    position: Annotated[_ByThruster, _Alike("position")] | None = Field(
         default=None,
         description="Of each thruster's position, each component, m; or by name.",
         examples=[{"normal": "5 mm"}],
     )
-    timing: Annotated[ToleranceSection, Shown("timing")] | None = Field(
+    timing: Annotated[ToleranceSection, _Alike("timing")] | None = Field(
         default=None, description="Shift of each pulse, s.", examples=[{"uniform": "5 ms"}]
     )
-    timing_offset: Annotated[ToleranceSection, Shown("timing_offset")] | None = Field(
+    timing_offset: Annotated[ToleranceSection, _Alike("timing_offset")] | None = Field(
         default=None, description="One shift of the whole schedule, s.", examples=[{"bias": "2 ms"}]
     )
-    attitude: Annotated[ToleranceSection, Shown("attitude")] | None = Field(
+    attitude: Annotated[ToleranceSection, _Alike("attitude")] | None = Field(
         default=None,
         description="Of the direction of the spin axis at t = 0, about two axes across it, rad.",
         examples=[{"normal": "0.2 deg"}],

@@ -1,26 +1,19 @@
-"""Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
-
-One table holds the wording of pydantic's errors.
-"""
+"""Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, get_args, get_origin
-
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest
 from nutdamp.files.dispersion_models import by_name
 from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.facts import MOMENT, Finding
-from nutdamp.files.fields import TAGS, section_of
 from nutdamp.files.kinds import foreign
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import findings
+from nutdamp.files.sections import Problems, Section, section_of
 from nutdamp.files.settings import Setting, overlay
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
@@ -40,15 +33,14 @@ def read_contents(
     root, unplaced = overlay(root, settings)
     faults += unplaced
     found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root)]
-    try:
-        contents = SpacecraftFile.model_validate(root.plain())
-    except ValidationError as error:
-        judged = {finding.path for finding in found if not finding.at_key}
-        found += [finding for finding in _type_errors(error) if finding.path not in judged]
+    problems: Problems = []
+    contents = SpacecraftFile.read(root.plain(), problems)
+    judged = {finding.path for finding in found if not finding.at_key}
+    found += [Finding(path, problem) for path, problem in problems if path not in judged]
     faults += [_placed(finding, root, name) for finding in found]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
         warn(doubt)
-    if faults:
+    if faults or contents is None:
         raise FaultyFile(faults)
     return contents
 
@@ -65,14 +57,14 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
     return place.fault(name, dotted(path), finding.problem)
 
 
-def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
+def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
     """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
 
     A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too; any
     other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
     names, of entries of the ``model``.
     """
-    fields = model.model_fields if model else {}
+    fields = model.fields() if model else {}
     named = named and isinstance(node.value, dict) and by_name(node.value)
     if fields and isinstance(node.value, dict) and not named:
         for key in [key for key in node.value if key not in fields]:
@@ -88,7 +80,7 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
                 cure = "put a space behind the colon"
             yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
     for step, child in node.children():
-        annotation = fields[step].annotation if isinstance(step, str) and fields and not named else model
+        annotation = fields[step].type if isinstance(step, str) and fields and not named else model
         if child.value is None:
             cure = "give a value, or leave the key out" if isinstance(step, str) else "expected a value"
             yield Finding((*path, step), f"empty; {cure}")
@@ -99,60 +91,3 @@ def _spelling(node: Node, model: type[BaseModel] | None, path: KeyPath, named: b
 def _holds_names(annotation: Any) -> bool:
     """Whether the type of a field is that of a mapping by names."""
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
-
-
-def _type_errors(error: ValidationError) -> Iterator[Finding]:
-    for details in error.errors(include_url=False):
-        wording = _WORDING.get(details["type"])
-        path = tuple(step for step in details["loc"] if step not in TAGS)
-        yield Finding(path, wording(details) if wording else details["msg"])
-
-
-def _description(path: KeyPath) -> str:
-    """What is at ``path``, as the model describes it."""
-    model: type[BaseModel] | None = SpacecraftFile
-    text = ""
-    for step in path:
-        if model is not None and isinstance(step, str):
-            field = model.model_fields[step]
-            model, text = section_of(field.annotation), field.description or ""
-    return text[:1].lower() + text[1:].rstrip(".")
-
-
-def _mismatch(details: ErrorDetails, expected: str) -> str:
-    return f"expected {expected}, got {shown(details['input'])}"
-
-
-def _text(details: ErrorDetails) -> str:
-    cure = "" if isinstance(details["input"], dict | list) else "; put it in quotes"
-    return _mismatch(details, "a text") + cure
-
-
-def _count(details: ErrorDetails) -> str:
-    expected, found = details["ctx"].get("min_length", details["ctx"].get("max_length")), len(details["input"])
-    if expected == 1:
-        return "empty; expected an entry"
-    return f"expected {expected} entries, got {found}"
-
-
-def _choice(details: ErrorDetails) -> str:
-    expected, given = details["ctx"]["expected"], details["input"]
-    meant = nearest(given, re.findall("'([^']*)'", expected)) if isinstance(given, str) else None
-    return _mismatch(details, expected) + (f"; did you mean {shown(meant)}?" if meant else "")
-
-
-_WORDING: dict[str, Callable[[ErrorDetails], str]] = {
-    "missing": lambda details: f"missing; {_description(details['loc'])}",
-    "model_type": lambda details: _mismatch(details, "a mapping {key: value, …}"),
-    "dict_type": lambda details: _mismatch(details, "a mapping {key: value, …}"),
-    "list_type": lambda details: _mismatch(details, "a list [value, …]"),
-    "int_type": lambda details: _mismatch(details, "a whole number"),
-    "literal_error": _choice,
-    "greater_than_equal": lambda details: _mismatch(details, f"at least {details['ctx']['ge']}"),
-    "less_than_equal": lambda details: _mismatch(details, f"at most {details['ctx']['le']}"),
-    "string_type": _text,
-    "too_short": _count,
-    "too_long": _count,
-    "value_error": lambda details: str(details["ctx"]["error"]),
-}
-"""What to say for each type of pydantic error that the models can cause."""

@@ -1,14 +1,13 @@
-"""What the models of a spacecraft file are made of: quantities with units and bounds, mappings with known keys."""
+"""What the sections of a spacecraft file are made of: quantities with units and bounds, directions."""
 
 from __future__ import annotations
 
 import math
 import operator
-from typing import Any, get_args
+from collections.abc import Callable
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
-
+from nutdamp.files.sections import Rule
 from nutdamp.units import KINDS, parse, pattern, shown
 
 SMALLEST = 1e-15
@@ -23,7 +22,7 @@ _BOUNDS = {
 RIGHT_ANGLE = parse("90 deg", "angle")
 
 
-class Quantity:
+class Quantity(Rule):
     """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON Schema, in SI."""
 
     def __init__(self, kind: str, **bounds: float) -> None:
@@ -59,72 +58,46 @@ class Quantity:
         )
         return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
 
-    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.check)
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
+        """See `check`."""
+        return self.check(value)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: object) -> dict[str, Any]:
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """A number in the bounds, or one with a unit."""
         number = {"type": "number", **self.bounds}
         if not KINDS[self.kind].factors:
             return number
         return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
 
 
-class AxialShorthand:
+class AxialShorthand(Rule):
     """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
 
     single = Quantity("torque")
 
-    def check(self, value: object, vector: core_schema.ValidatorFunctionWrapHandler) -> object:
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """Three components; raises ValueError, which says what would be right."""
-        return vector(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
+        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        single = self.single.__get_pydantic_json_schema__(schema, handler)
-        return {"anyOf": [handler(schema), *single["anyOf"]]}
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The vector or the torque."""
+        return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
 
 
-TAGS = ("[list]", "{mapping}")
-"""What pydantic adds to the path of a fault in a value that is either a list or a mapping."""
-
-
-def list_or_mapping(value: object) -> str:
-    """Which of `TAGS` is meant by a value."""
-    return TAGS[isinstance(value, dict)]
-
-
-class OrWord:
+class OrWord(Rule):
     """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
 
     def __init__(self, word: str) -> None:
         self.word = word
 
-    def check(self, value: object, direction: core_schema.ValidatorFunctionWrapHandler) -> object:
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """The angles or the word; raises ValueError, which says what would be right."""
         if value == self.word:
             return value
         if not isinstance(value, list):
             raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
-        return direction(value)
+        return inner(value)
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self.check, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"const": self.word}]}
-
-
-class Section(BaseModel):
-    """A mapping of the file: no key that is not named here."""
-
-    # Built once, with the root, when the first file is read.
-    model_config = ConfigDict(extra="forbid", defer_build=True)
-
-
-def section_of(annotation: Any) -> type[BaseModel] | None:
-    """The model within the type of a field, such as that of a list's entries."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(section_of, get_args(annotation))), None)
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The angles or the word."""
+        return {"anyOf": [inner(), {"const": self.word}]}

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-
 from nutdamp.errors import BadRequest
+from nutdamp.files import sections
 from nutdamp.files.dispersion_models import QUANTITIES, RELATIVE, ToleranceSection
-from nutdamp.files.fields import Quantity, section_of
+from nutdamp.files.fields import Quantity
 from nutdamp.files.models import SpacecraftFile
+from nutdamp.files.sections import Section, section_of
 from nutdamp.guide import FILE, meant
 from nutdamp.guide.topic import Part, Rows, Topic
 from nutdamp.units import KINDS
@@ -24,8 +23,8 @@ class Key(NamedTuple):
     """
 
     path: str
-    field: FieldInfo
-    section: type[BaseModel] | None
+    field: sections.Key
+    section: type[Section] | None
 
     @property
     def parent(self) -> str:
@@ -40,9 +39,9 @@ class Key(NamedTuple):
     @property
     def row(self) -> tuple[str, str]:
         """The key, and its description, unit, default and example."""
-        example = next(iter(self.field.examples or ()), None)
+        example = next(iter(self.field.examples), None)
         facts = [self._unit(), self._default(), "" if example is None else f"example: {flow(example)}"]
-        return self.name, "\n".join([self.field.description or "", "; ".join(fact for fact in facts if fact)])
+        return self.name, "\n".join([self.field.description, "; ".join(fact for fact in facts if fact)])
 
     def _unit(self) -> str:
         if self.section is ToleranceSection:
@@ -52,18 +51,18 @@ class Key(NamedTuple):
         return "" if self.section is not None else _what(self.field)
 
     def _default(self) -> str:
-        if self.field.is_required():
+        if self.field.default is sections.REQUIRED:
             return "required"
-        if "default" in (self.field.description or "").casefold():
+        if "default" in self.field.description.casefold():
             return ""
         value = self.field.default
         return "default none" if value is None or value == [] else f"default {value:g}"
 
 
-def keys(model: type[BaseModel] = SpacecraftFile, prefix: str = "") -> Iterator[Key]:
+def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Key]:
     """All keys of the file, each before those below it."""
-    for name, field in model.model_fields.items():
-        section = section_of(field.annotation)
+    for name, field in model.fields().items():
+        section = section_of(field.type)
         yield Key(f"{prefix}{name}", field, section)
         if section is not None:
             yield from keys(section, f"{prefix}{name}.")
@@ -102,7 +101,7 @@ def _sections(key: Key, every: list[Key]) -> Iterator[Part]:
     """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
     if key.section is None:
         return
-    listed = get_origin(_plain(key.field.annotation)) is list
+    listed = get_origin(_plain(key.field.type)) is list
     title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
     children = [one for one in every if one.parent == key.path]
     about = " ".join((key.section.__doc__ or "").split())
@@ -131,16 +130,16 @@ def _near(below: str, every: list[Key]) -> str:
     )
 
 
-def _what(field: FieldInfo) -> str:
+def _what(field: sections.Key) -> str:
     """The units of a quantity, the words of a choice, or what else is to be written."""
-    quantity = _first(Quantity, (*field.metadata, field.annotation))
+    quantity = _first(Quantity, (field.type,))
     if quantity is not None:
         factors = KINDS[quantity.kind].factors
         return f"unit {_either(factors)}" if factors else "plain numbers, without unit"
-    choices = _choices(field.annotation)
+    choices = _choices(field.type)
     if choices:
         return _either(choices)
-    plain = _plain(field.annotation)
+    plain = _plain(field.type)
     return {int: "a whole number", str: "a text"}.get(plain, "")
 
 

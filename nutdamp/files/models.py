@@ -5,12 +5,10 @@ What needs more than one key to judge is in `rules`.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
-
-from pydantic import ConfigDict, Field
+from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.files.dispersion_models import DispersionsSection
-from nutdamp.files.fields import OrWord, Section
+from nutdamp.files.fields import OrWord
 from nutdamp.files.quantities import (
     AcuteAngle,
     Angle,
@@ -39,6 +37,7 @@ from nutdamp.files.quantities import (
     Torques,
     Window,
 )
+from nutdamp.files.sections import Field, Length, Section
 from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
 
 
@@ -50,9 +49,7 @@ def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
 class InertiaSection(Section):
     """Moments of inertia about the centre of mass: A and C, or the whole tensor."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
-    )
+    schema_extra: ClassVar = {"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
 
     A: Moment | None = Field(default=None, description="Transverse moment of inertia, kg m².", examples=["120 kg m^2"])
     C: Moment | None = Field(
@@ -99,14 +96,12 @@ class AttitudeSection(Section):
 class ThrusterSection(Section):
     """A thruster: position, direction and force, or only its torque."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "oneOf": [
-                _needs("position", "direction", "force", without=("torque", "lever_arm")),
-                _needs("torque", without=("position", "direction", "force")),
-            ]
-        }
-    )
+    schema_extra: ClassVar = {
+        "oneOf": [
+            _needs("position", "direction", "force", without=("torque", "lever_arm")),
+            _needs("torque", without=("position", "direction", "force")),
+        ]
+    }
 
     name: Name = Field(description="Name of the thruster, used by channels and in schedules.", examples=["T1"])
     position: Position | None = Field(
@@ -225,7 +220,7 @@ _KINDS: list[Any] = [
 class DisturbanceSection(Section):
     """A disturbance torque, in the axes of the file."""
 
-    model_config = ConfigDict(json_schema_extra={"oneOf": _KINDS})
+    schema_extra: ClassVar = {"oneOf": _KINDS}
 
     name: Name | None = Field(default=None, description="Name of the disturbance, for reports.", examples=["leak"])
     kind: Literal["constant", "rotating", "axial"] | None = Field(
@@ -263,10 +258,7 @@ class DissipationSection(Section):
 class SpacecraftFile(Section):
     """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers are SI."""
 
-    model_config = ConfigDict(
-        title="nutdamp spacecraft file",
-        json_schema_extra={"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]},
-    )
+    schema_extra: ClassVar = {"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]}
 
     name: Name = Field(description="Name of the spacecraft.", examples=["Sounder-1"])
     mass: Mass | None = Field(
@@ -305,7 +297,7 @@ class SpacecraftFile(Section):
         description="Body-fixed thrusters.",
         examples=[[{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}]],
     )
-    channels: Annotated[dict[str, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)] | None = Field(
+    channels: Annotated[dict[str, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
         default=None,
         description="Names of thrusters that fire together; without it each thruster is a channel of its own.",
         examples=[{"+M1": ["T1", "T2"]}],

@@ -4,24 +4,33 @@ from __future__ import annotations
 
 import datetime
 import re
-from typing import Annotated
-
-from pydantic import AfterValidator, Field, Strict
+from collections.abc import Callable
+from typing import Annotated, Any
 
 from nutdamp.files.fields import RIGHT_ANGLE, AxialShorthand, Quantity
+from nutdamp.files.sections import Length, Rule, Within
 from nutdamp.units import shown
 
 
-def _epoch(text: str) -> str:
-    """Refuses what is not a date and a time; their text is passed on as it is."""
-    try:
-        if not re.fullmatch(_EPOCH, text):
-            raise ValueError
-        datetime.datetime.fromisoformat(text)
-    except ValueError:
-        example = "2026-03-01T12:00:00Z"
-        raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
-    return text
+class _DateAndTime(Rule):
+    """Annotation of a text that is a date and a time."""
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """The text as it is; raises ValueError for what is no date and time."""
+        text = inner(value)
+        try:
+            if text is not None:
+                if not re.fullmatch(_EPOCH, text):
+                    raise ValueError
+                datetime.datetime.fromisoformat(text)
+        except ValueError:
+            example = "2026-03-01T12:00:00Z"
+            raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
+        return text
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """A text of that form."""
+        return {**inner(), "pattern": f"^{_EPOCH}$"}
 
 
 _EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
@@ -41,7 +50,7 @@ Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
 Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
 Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
 
-_THREE = Field(min_length=3, max_length=3)
+_THREE = Length(3, 3)
 Rates = Annotated[list[Rate], _THREE]
 Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
 Velocity = Annotated[list[Annotated[float, Quantity("speed")]], _THREE]
@@ -49,10 +58,10 @@ Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
 Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
 DisturbingTorques = Annotated[Torques, AxialShorthand()]
 Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
-Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Field(min_length=4, max_length=4)]
-InTheSky = Annotated[list[Angle], Field(min_length=2, max_length=2)]
+Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
+InTheSky = Annotated[list[Angle], Length(2, 2)]
 Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
-Window = Annotated[list[Time], Field(min_length=2, max_length=2)]
-Name = Annotated[str, Field(min_length=1)]
-Epoch = Annotated[str, AfterValidator(_epoch), Field(json_schema_extra={"pattern": f"^{_EPOCH}$"})]
-Count = Annotated[int, Strict(), Field(ge=1, le=1_000_000)]
+Window = Annotated[list[Time], Length(2, 2)]
+Name = Annotated[str, Length(1)]
+Epoch = Annotated[str, _DateAndTime()]
+Count = Annotated[int, Within(1, 1_000_000)]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Discriminator, Field, Tag
-
-from nutdamp.files.fields import RIGHT_ANGLE, TAGS, OrWord, Section, list_or_mapping
+from nutdamp.files.fields import RIGHT_ANGLE, OrWord
 from nutdamp.files.quantities import (
     Angle,
     Apart,
@@ -19,6 +17,7 @@ from nutdamp.files.quantities import (
     Time,
     Velocity,
 )
+from nutdamp.files.sections import Field, Length, Section
 
 
 class OrbitSection(Section):
@@ -57,10 +56,7 @@ class WidthSection(Section):
     max: PositiveTime = Field(description="Longest width, s.", examples=["500 ms"])
 
 
-Widths = Annotated[
-    Annotated[list[PositiveTime], Field(min_length=1), Tag(TAGS[0])] | Annotated[WidthSection, Tag(TAGS[1])],
-    Discriminator(list_or_mapping),
-]
+Widths = Annotated[list[PositiveTime], Length(1)] | WidthSection
 
 
 class CommandsSection(Section):
@@ -73,7 +69,7 @@ class CommandsSection(Section):
         examples=[{"step": "1 ms", "min": "20 ms", "max": "500 ms"}, ["0.1 s", "0.2 s"]],
     )
     max_count: Count = Field(default=255, description="Most pulses of a block; default 255.", examples=[255])
-    every: Annotated[list[Count], Field(min_length=1)] = Field(
+    every: Annotated[list[Count], Length(1)] = Field(
         default=[1], description="Spins from one pulse to the next that can be chosen; default [1].", examples=[[1, 2]]
     )
 

@@ -21,7 +21,7 @@ from nutdamp import guide
 from nutdamp.cli.root import group
 from nutdamp.cli.scheme_options import SHARED
 from nutdamp.files.file_guide import flow, keys
-from nutdamp.files.models import SpacecraftFile
+from nutdamp.files.schema import json_schema
 from nutdamp.files.settings import parse_setting
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.guide.equation import EQUATIONS, SYMBOLS, Equation
@@ -140,7 +140,7 @@ def test_every_key_of_the_models_is_in_the_file_topic() -> None:
     """With its description, unit and example; and each can be requested alone."""
     shown = words(explained("file"))
     every = list(keys())
-    schema = SpacecraftFile.model_json_schema()
+    schema = json_schema()
     names = set(schema["properties"]).union(*(section["properties"] for section in schema["$defs"].values()))
     assert {key.name for key in every} == names | set(TOLERANCE_KINDS)
     for key in every:
@@ -278,11 +278,11 @@ def test_abb_2_is_a_circle_about_a_centre_aside(run: Run, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("topics", "allowed"),
-    [([name for name in ("", *guide.NAMES) if name != guide.FILE], set()), ([guide.FILE], {"pydantic", "yaml"})],
+    [([name for name in ("", *guide.NAMES) if name != guide.FILE], set()), ([guide.FILE], {"yaml"})],
     ids=["texts", "file"],
 )
 def test_the_guide_loads_no_numbers(tmp_path: Path, topics: list[str], allowed: set[str]) -> None:
-    """Neither numpy nor scipy, and pydantic only for the keys of the file."""
+    """Neither numpy nor scipy."""
     code = (
         f"import sys\nfrom nutdamp.cli.root import group\nfor topic in {topics!r}:\n"
         "    group.main(['explain', *topic.split()], standalone_mode=False)\n"
@@ -293,7 +293,7 @@ def test_the_guide_loads_no_numbers(tmp_path: Path, topics: list[str], allowed: 
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     loaded = done.stdout.rpartition("LOADED ")[2].split()
-    assert {"numpy", "scipy", "matplotlib", "yaml", "pydantic"} & set(loaded) <= allowed
+    assert {"numpy", "scipy", "matplotlib", "yaml"} & set(loaded) <= allowed
 
 
 def test_shells_complete_topics() -> None:

@@ -378,7 +378,7 @@ def test_the_example_shows_every_key() -> None:
     from nutdamp.files.schema import json_schema
 
     sections = [json_schema(), *json_schema()["$defs"].values()]
-    assert sections[0]["properties"].keys() == SpacecraftFile.model_fields.keys()
+    assert sections[0]["properties"].keys() == SpacecraftFile.fields().keys()
     for section in sections:
         for key in section["properties"]:
             assert re.search(rf"\b{key}:", example_text()), key
