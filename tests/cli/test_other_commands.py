@@ -205,8 +205,8 @@ def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib() -> None:
         "import contextlib, sys\nfrom nutdamp.cli.root import group\n"
         f"for number, words in enumerate({LEAN!r}):\n"
         "    with contextlib.suppress(SystemExit): group.main([*words.split(), '-q'], standalone_mode=False)\n"
-        "    heavy = {'scipy', 'matplotlib', 'pydantic', 'jinja2', *(['numpy.ma'] if number < 2 else [])} & set(sys.modules)\n"
-        "    print('LOADED by', words, *sorted(heavy))"
+        "    heavy = {'scipy', 'matplotlib', 'pydantic', 'jinja2', *(['numpy.ma'] if number < 2 else [])}\n"
+        "    print('LOADED by', words, *sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = [line for line in done.stdout.splitlines() if line.startswith("LOADED by")]
