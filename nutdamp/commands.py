@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,8 @@ class SunSensor:
     half_width: float = 0.5 * math.pi
     jitter: float = 0.0
 
-    def sees(self, sun_angle: float) -> bool:
-        """Whether it sees the Sun at this angle (rad) from the spin axis."""
+    def sees(self, sun_angle: Any) -> Any:
+        """Whether it sees the Sun at this angle (rad) from the spin axis; of arrays each."""
         return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width
 
 
@@ -55,3 +56,8 @@ class Block:
     width: float
     count: int
     every: int = 1
+
+    @property
+    def sun_pulses(self) -> range:
+        """Numbers of the Sun pulses that fire it."""
+        return range(self.first, self.first + self.count * self.every, self.every)

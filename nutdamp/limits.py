@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.commands import Commands
-from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, channel_pulse, touching
+from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 OFF_TICK = 1e-6
@@ -264,9 +264,12 @@ class Breach(NamedTuple):
 def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach]:
     """What ``pulses``, in order, break of the limits and on-times of the file, pulse by pulse.
 
-    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything.
+    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything. Command blocks
+    have steps of their own, from a Sun pulse that comes on no tick: limits.tick is not theirs.
     """
     windows, previous_end, number = Windows(spacecraft), -math.inf, 0
+    if isinstance(pulses, Schedule) and pulses.blocks:
+        windows.limits = replace(windows.limits, tick=None)
     channels = {channel.name: channel for channel in spacecraft.channels}
     for number, pulse in enumerate(pulses, start=1):
         for limit, bound, by, allowed in _margins(windows, channels.get(pulse.channel), pulse, previous_end):

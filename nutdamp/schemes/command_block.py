@@ -20,7 +20,7 @@ from nutdamp import compliance, flight, work
 from nutdamp.commands import Block, Commands
 from nutdamp.compliance import Part
 from nutdamp.errors import Infeasible
-from nutdamp.limits import commandable_widths, keeps_limits, usable
+from nutdamp.limits import OFF_TICK, Windows, commandable_widths, keeps_limits, usable
 from nutdamp.outcome import left_by
 from nutdamp.physics.sun_train import phasor_sum
 from nutdamp.schedule import Schedule
@@ -43,6 +43,12 @@ WAITS, LATER_WAITS = 24, 12
 
 MOST_WIDTHS = 24
 """Widths that are looked at for a second and a third block, where more can be commanded."""
+
+WINDOWS = 8
+"""Blackout windows after which a block is begun, or before which one ends, at most: the first ones."""
+
+BESIDE = 0.01
+"""Share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses."""
 
 SHARES = np.linspace(0.0, 1.0, 13)[1:]
 """Shares of the way that a first block may go, where others follow."""
@@ -94,12 +100,18 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     commands = spacecraft.commands
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file says nothing of commands: it needs the keys sun, sun_sensor and commands")
+    steps = _steps(spacecraft, commands)
+    spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     search = Search(spacecraft, channels, commands)
     flights: list[Flown] = []
-    pulses, why = 0, "no block that can be commanded ends within the horizon; a longer limits.horizon may help"
+    outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
+    pulses, why = (
+        0,
+        f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help",
+    )
     best = search.best(options.max_blocks or BLOCKS)
     for found in best:
         if pulses > FLOWN_PULSES or work.exhausted():
@@ -112,7 +124,20 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not flights:
         raise Infeasible(why)
     chosen = min(flights, key=lambda one: one.rank)
-    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank <= best[0].rank),))
+    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank <= best[0].rank), *steps))
+
+
+def _steps(spacecraft: Spacecraft, commands: Commands) -> tuple[str, ...]:
+    """That blocks are on no ticks, where their steps are others than those."""
+    tick = spacecraft.limits.tick
+    if tick is None:
+        return ()
+    steps = np.array([commands.delay_step, *commands.widths]) / tick
+    if np.abs(steps - np.rint(steps)).max() <= OFF_TICK:
+        return ()
+    return (
+        f"limits.tick = {tick:g} s is not kept: blocks have the steps of commands, delays of {commands.delay_step:g} s",
+    )
 
 
 class Search:
@@ -126,6 +151,7 @@ class Search:
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
         self.pause = math.ceil(limits.gap / self.model.turn)
+        self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
 
     def _lowered(self, bound: compliance.Bound) -> compliance.Bound:
@@ -143,7 +169,9 @@ class Search:
             if min((one.rank for one in found), default=(1.0,))[0] <= 0.0 or work.exhausted():
                 break
             if number == 2:
-                firsts = [*sorted(found, key=lambda one: one.rank)[: FIRST // 2], *self._parts(start)]
+                small = self._behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
+                some = (sorted(ones, key=lambda one: one.rank)[: FIRST // 2] for ones in (small, found))
+                firsts = [one for ones in some for one in ones] + list(self._parts(start))
             firsts = [
                 more
                 for first in firsts[: FIRST if number == 2 else FIRST // 3]
@@ -189,6 +217,7 @@ class Search:
             work.spend(LOOKED * float(np.prod(shape)))
             severity = np.max(np.broadcast_arrays(*(self._share(bound, left) for bound in self.bounds)), axis=0)
             over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
+            over = over | self._dark(before.state, trial, state)
             severity = np.where(np.isnan(severity) | over, np.inf, severity)
             cost = spent + self._rate(channel) * np.broadcast_to(trial.count * trial.width, shape)
             failed = np.where(severity <= 1.0, 0.0, severity).ravel()
@@ -267,16 +296,14 @@ class Search:
     def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
         """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
         if len(index):
-            widths, counts = (
-                commandable_widths(self.commands, channel)[index[:, 0]],
-                self._counts(state, every)[index[:, 1]],
-            )
-            for wait in range(WAITS if abs(state.phasor) > 0.0 else 1):
-                yield self._at_delays(state, channel, self.earliest + wait, widths, counts, every)
+            widths = commandable_widths(self.commands, channel)[index[:, 0]]
+            counts = self._counts(state, every)[index[:, 1]]
+            for wait in self._waits(state, self.earliest, WAITS if abs(state.phasor) > 0.0 else 1):
+                yield self._at_delays(state, channel, wait, widths, counts, every)
 
     def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
         """Blocks that go the rest of the way, or take the nutation that is left."""
-        state = before.state
+        state, least = before.state, self.pause if before.blocks else self.earliest
         _, way = self.model.course(state)
         for channel in self.channels:
             widths = _spread(commandable_widths(self.commands, channel), MOST_WIDTHS)
@@ -289,7 +316,7 @@ class Search:
             for every in self.commands.every:
                 if not self._spaced(every):
                     continue
-                for wait in range(self.pause, self.pause + LATER_WAITS):
+                for wait in self._waits(state, least, LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
 
     def _parts(self, start: Found) -> Iterator[Found]:
@@ -302,11 +329,38 @@ class Search:
             widths = _spread(commandable_widths(self.commands, channel), 3)
             for width in widths.tolist():
                 step = float(self.model.turned_by(channel, width, float(start.state.spin)))
-                counts = np.unique(np.rint(SHARES * float(way) / step).clip(1, self.commands.max_count).astype(int))
                 delay = self._commanded(self.model.delay(channel, heading, width))
-                for count in counts.tolist():
-                    trial = Trial(self.earliest, delay, width, count, every)
-                    yield from self._behind(start, iter([(channel, trial)]), few=1)
+                first = float(start.state.sun_pulse) + float(delay) + width
+                fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
+                counts = np.rint([*SHARES * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
+                for count in np.unique(counts.clip(1, self.commands.max_count).astype(int)).tolist():
+                    for wait in self._waits(start.state, self.earliest, 1):
+                        trial = Trial(wait, delay, width, count, every)
+                        yield from self._behind(start, iter([(channel, trial)]), few=1)
+
+    def _waits(self, state: State, least: int, few: int) -> list[int]:
+        """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
+        after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
+        later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
+        return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
+
+    def _dark(self, state: State, trial: Trial, after: State) -> NDArray[np.bool_]:
+        """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
+        shape = np.shape(after.sun_pulse)
+        found = np.zeros(shape, dtype=bool)
+        if not len(self.dark[0]):
+            return found
+        work.spend(LOOKED * found.size * len(self.dark[0]))
+        turn = self.model.turn
+        first = state.sun_pulse + trial.wait * turn
+        interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
+        interval = np.where(np.asarray(trial.count) > 1, interval, turn)
+        aside = BESIDE * turn
+        for begins, ends in zip(*self.dark, strict=True):
+            low = np.ceil((begins - aside - trial.width - first - trial.delay) / interval)
+            high = np.floor((ends + aside - first - trial.delay) / interval)
+            found |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
+        return found
 
     def _at_delays(
         self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int

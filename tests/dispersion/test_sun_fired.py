@@ -27,7 +27,7 @@ from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Disturbance
 from nutdamp.tolerances import Dispersions, Tolerance
 
-CASES = 24
+CASES = 16
 DISPERSED = """
 dispersions:
   A: {normal: 2 %}
@@ -67,11 +67,9 @@ def three_moments(spin: float) -> Model:
         model_of(),
         model_of(spin=1.3),
         three_moments(2.0),
-        model_of(
-            disturbances=(Disturbance(0.02 + 0.01j, 0.03), Disturbance(0.03 + 0.0j, rate=-3.0)), dissipation=900.0
-        ),
+        model_of(disturbances=(Disturbance(0.02 + 0.01j, 0.03), Disturbance(0.03 + 0.0j, rate=-3.0))),
     ],
-    ids=["spin reversed", "spin", "three moments", "disturbances, dissipation"],
+    ids=["spin reversed", "spin", "three moments", "disturbances"],
 )
 def test_each_case_fires_as_its_own_body_alone(model: Model) -> None:
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
@@ -79,7 +77,7 @@ def test_each_case_fires_as_its_own_body_alone(model: Model) -> None:
     found = np.empty((len(OUTPUTS), CASES))
     measure(model, RealWidths(model)(model.cases(draws)), found)
     planned = np.array([pulse.start for pulse in model.schedule])
-    for case in range(0, CASES, 3):
+    for case in range(0, CASES, 7):
         one = dispersed.one_of(draws, case)
         true, _ = realised(model, one)
         starts = np.array([pulse.start for pulse in fired(true, model.schedule.blocks)])

@@ -22,11 +22,10 @@ from nutdamp.comparison import usual
 from nutdamp.errors import Infeasible
 from nutdamp.outcome import left_by
 from nutdamp.physics import attitude, sun_train
-from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
 from nutdamp.schemes.command_block import Search
 from nutdamp.schemes.tools.block_model import BlockModel, Trial
-from nutdamp.schemes.tools.sun_pulses import fired, sun_pulses
+from nutdamp.schemes.tools.sun_pulses import fired, sun_clock
 from nutdamp.spacecraft import Commands, Disturbance, Requirement, Spacecraft, SunSensor
 
 Array = NDArray[np.float64]
@@ -59,9 +58,20 @@ def test_with_three_moments_and_an_axial_torque_too() -> None:
 
 def test_without_nutation_a_sun_pulse_comes_every_turn() -> None:
     body = commanded(spinner(degrees=0.0, spin=-3.0), np.array([1.0, 1.0, 0.5]), azimuth=2.0)
-    found = sun_pulses(flight.flown(body, Schedule(), 20.0), 20.0)
-    assert np.diff(found) == pytest.approx(2.0 * math.pi / 3.0, rel=1e-12)
-    assert len(found) == 10
+    clock = sun_clock(body)
+    found = [float(clock.sun_pulse(number).since[0]) for number in (1, 2, 3, 7, 40)]
+    turn = 2.0 * math.pi / 3.0
+    assert 0.0 <= found[0] < turn
+    assert np.diff(found) == pytest.approx([turn, turn, 4.0 * turn, 33.0 * turn], rel=1e-12)
+
+
+def test_a_sun_within_the_nutation_cone_gives_no_pulse() -> None:
+    """It does not go round in the body; nor is there a Sun pulse where there is no sensor."""
+    body = commanded(spinner(degrees=8.0, channels=cross(8.0)), np.array([0.02, 0.0, 1.0]))
+    with pytest.raises(Infeasible, match="no Sun pulse comes after"):
+        fired(body, (Block("+1", 1, 0.1, 0.1, 30),))
+    with pytest.raises(Infeasible, match="needs sun and sun_sensor"):
+        fired(replace(body, sun_sensor=None), ())
 
 
 def test_a_sun_out_of_view_gives_no_pulse() -> None:
@@ -265,3 +275,52 @@ def test_what_cannot_be_flown_says_why() -> None:
     plan = planning.plan(blind, "command-block")
     assert not plan.feasible
     assert "does not see the Sun" in remarks.infeasibility(plan)
+
+
+# --- limits ----------------------------------------------------------------------------------------------------------
+
+
+def test_blocks_keep_out_of_blackout_windows() -> None:
+    """A window in the middle of the way: one block ends before it or begins after it, or two leave it out."""
+    free = planning.plan(a_turn(), "command-block").pulses
+    begins, ends = free.pulses[8].start - 1.0, free.pulses[8].start + 21.0
+    body = a_turn(blackout=((begins, ends),))
+    plan = planning.plan(body, "command-block")
+    assert plan.feasible, remarks.infeasibility(plan)
+    assert plan.meets_requirement
+    assert not any(pulse.end > begins and pulse.start < ends for pulse in plan.pulses)
+    assert any(pulse.end > begins and pulse.start < ends for pulse in free)
+
+
+def test_a_way_that_only_fits_around_a_window_is_gone_in_two_blocks() -> None:
+    free = planning.plan(a_turn(), "command-block").pulses
+    window = (free.pulses[8].start - 1.0, free.pulses[8].start + 1.0)
+    body = a_turn(blackout=(window,), horizon=free.end + 12.0)
+    assert body.commands is not None
+    body = replace(body, commands=replace(body.commands, widths=np.array([free.blocks[0].width])))
+    plan = planning.plan(body, "command-block")
+    assert plan.feasible, remarks.infeasibility(plan)
+    assert len(plan.pulses.blocks) > 1
+    assert not any(pulse.end > window[0] and pulse.start < window[1] for pulse in plan.pulses)
+    assert plan.left is not None
+    assert math.degrees(float(plan.left.aim)) < 1.0
+
+
+def test_where_a_blackout_leaves_no_block_the_reason_says_so() -> None:
+    body = a_turn(blackout=((0.0, 100_000.0),))
+    plan = planning.plan(body, "command-block")
+    assert not plan.feasible
+    assert "outside the blackout windows" in remarks.infeasibility(plan)
+
+
+def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
+    free, ticked = (planning.plan(a_turn(**limits), "command-block") for limits in ({}, {"tick": 0.0173}))
+    assert ticked.feasible, remarks.infeasibility(ticked)
+    assert ticked.pulses.blocks == free.pulses.blocks
+    assert any("limits.tick = 0.0173 s is not kept" in note for note in ticked.pulses.notes)
+    body = a_turn()
+    assert body.commands is not None
+    widths = np.array([0.2, 0.3])
+    alike = replace(body, commands=replace(body.commands, delay_step=0.02, widths=widths))
+    plan = planning.plan(replace(alike, limits=replace(body.limits, tick=0.01)), "command-block")
+    assert not any("tick" in note for note in plan.pulses.notes)
