@@ -89,7 +89,7 @@ def example(name: str) -> str:
 class Campaign(NamedTuple):
     """A campaign of ACE: pulses, s, rpm before and after, nutation deg, propellant lbm, Sun angle before and after."""
 
-    count: int
+    pulses: int
     took: float
     before: float
     after: float
@@ -127,12 +127,12 @@ def test_campaigns_of_ace_end_at_the_sun_angle_reported_after_the_time_reported(
     model, thruster = BlockModel(body), next(channel for channel in body.channels if channel.name == "P1")
     step = float(model.turned_by(thruster, WIDTH, body.spin))
     change = math.radians(one.sun[1] - one.sun[0])
-    delay = float(model.delay(thruster, side * math.acos(change / (one.count * step)), WIDTH))
-    made = flown(body, Block("P1", 1, delay, WIDTH, one.count))
+    delay = float(model.delay(thruster, side * math.acos(change / (one.pulses * step)), WIDTH))
+    made = flown(body, Block("P1", 1, delay, WIDTH, one.pulses))
     ends = math.degrees(float(attitude.angle_between(made.final.momentum, sun_of(body))))
     assert ends == pytest.approx(one.sun[1], abs=0.3)  # so near the Sun, second order shows
     mine = made.schedule.end - made.schedule.pulses[0].start
-    spins = (one.count - 1) * model.turn
+    spins = (one.pulses - 1) * model.turn
     assert abs(mine - spins) < 0.75 * model.turn  # as H goes about the Sun, Sun pulses come sooner or later
     assert 0.0 < one.took - spins < 2.0 * model.turn
 
@@ -141,11 +141,11 @@ def test_campaigns_of_ace_end_at_the_sun_angle_reported_after_the_time_reported(
 def test_three_thrusters_of_ace_take_the_propellant_reported(date: str) -> None:
     """Within 13 %: few pulses took more each, as the first ones are colder and longer."""
     one = CAMPAIGNS[date]
-    made = flown(ace(one), Block("P1", 1, 1.0, WIDTH, one.count)).schedule
+    made = flown(ace(one), Block("P1", 1, 1.0, WIDTH, one.pulses)).schedule
     assert made.propellant is not None
     difference = 3.0 * made.propellant / (one.used * POUND) - 1.0
     assert -0.14 < difference < 0.01
-    if one.count < 50:
+    if one.pulses < 50:
         assert difference < -0.02  # they took more than the width of the longest campaign gives
 
 

@@ -1,4 +1,4 @@
-"""Firing blocks of pulses from the Sun pulses of the nutating body."""
+"""Sun pulses of the nutating body, and firing blocks of pulses from them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from nutdamp import work
-from nutdamp.commands import Block
+from nutdamp.commands import Block, SunSensor
 from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
 from nutdamp.physics.rigid_cases import Bodies
 from nutdamp.physics.sun_clock import Stretch, SunClock
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft import Spacecraft, Vector
+
+SAMPLES = 32
+"""Samples of the Sun's azimuth in each spin turn, between which a Sun pulse is found."""
+
+ITERATIONS = 60
+"""Steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual."""
+
+EXACT = 1e-13
+"""Share of a spin turn to which it is found."""
 
 FIRED = 1.0
 """Units of `work` of a pulse that is fired."""
@@ -30,18 +41,60 @@ def spin_turn(spacecraft: Spacecraft) -> float:
     return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.spin) + inertia.a * spacecraft.spin)
 
 
+def sun_pulses(flown: Flight, until: float) -> Vector:
+    """The times (n,) s from 0 to ``until`` s at which the Sun passes the sensor; the flight must reach so far.
+
+    Raises Infeasible where the sensor does not see the Sun then.
+    """
+    body = flown.spacecraft
+    sensor, turn = body.sun_sensor, spin_turn(body)
+    assert sensor is not None
+    assert body.sun is not None
+    times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
+    # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
+    ahead = _ahead(flown, times)
+    index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
+    found = times[index] + ahead[index] * turn / (2.0 * math.pi)
+    for _ in range(ITERATIONS):
+        off = (_ahead(flown, np.minimum(found, until)) + math.pi) % (2.0 * math.pi) - math.pi
+        found += off * turn / (2.0 * math.pi)
+        if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
+            break
+    found = found[(found >= 0.0) & (found <= until)]
+    _, quaternions = flown.motion(found)
+    axis = attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
+    for time, angle in zip(found.tolist(), attitude.angle_between(axis, body.sun).tolist(), strict=True):
+        _expect_seen(sensor, time, angle)
+    return found
+
+
+def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
+    """Raise Infeasible where the sensor does not see the Sun at this ``angle`` (rad) from the spin axis."""
+    if not sensor.sees(angle):
+        raise Infeasible(
+            f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the spin axis: "
+            "there is no Sun pulse"
+        )
+
+
+def _ahead(flown: Flight, times: Vector) -> Vector:
+    """By what angle (n,) in [0, 2π) the body has to turn until the Sun passes the sensor."""
+    body = flown.spacecraft
+    assert body.sun_sensor is not None
+    assert body.sun is not None
+    _, quaternions = flown.motion(times)
+    seen = attitude.rotate(attitude.conjugate(quaternions), body.sun)
+    azimuth = np.arctan2(seen[:, 1], seen[:, 0])
+    return np.asarray(math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi))
+
+
 def sun_pulse(spacecraft: Spacecraft, clock: SunClock, number: int) -> Stretch:
     """The motion as a Sun pulse comes that the sensor sees; raises Infeasible where it sees none."""
     before, found = float(clock.time[0]), clock.sun_pulse(number)
     if clock.lost[0]:
         raise Infeasible(f"no Sun pulse comes after {max(before, 0.0):.4g} s: the spin axis is too near to the Sun")
-    angle = float(clock.angle(found)[0])
     assert spacecraft.sun_sensor is not None
-    if not spacecraft.sun_sensor.sees(angle):
-        raise Infeasible(
-            f"the Sun sensor does not see the Sun at {found.since[0]:.4g} s, {math.degrees(angle):.4g}° from the spin "
-            "axis: there is no Sun pulse"
-        )
+    _expect_seen(spacecraft.sun_sensor, float(found.since[0]), float(clock.angle(found)[0]))
     return found
 
 
