@@ -46,7 +46,7 @@ def sun_clock(spacecraft: Spacecraft) -> SunClock | None:
         return None
     turn = sun_pulses.spin_turn(spacecraft)
     try:
-        return SunClock(turn, sun_pulses.Clock(spacecraft).time_of(1))
+        return SunClock(turn, sun_pulses.first_sun_pulse(spacecraft))
     except Infeasible as reason:
         return SunClock(turn, None, str(reason))
 

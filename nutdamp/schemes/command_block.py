@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +54,8 @@ BESIDE = 0.01
 SHARES = np.linspace(0.0, 1.0, 13)[1:]
 """Shares of the way that a first block may go, where others follow."""
 
-FIRST = 48
-"""First blocks behind which others are looked for."""
+FIRST = 24
+"""First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
 
 BLOCKS = 3
 """Blocks of a schedule, at most."""
@@ -170,11 +171,11 @@ class Search:
                 break
             if number == 2:
                 small = self._behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
-                some = (sorted(ones, key=lambda one: one.rank)[: FIRST // 2] for ones in (small, found))
-                firsts = [one for ones in some for one in ones] + list(self._parts(start))
+                ranked = (sorted(ones, key=lambda one: one.rank) for ones in (found, small))
+                firsts = [one for ones in (*ranked, self._parts(start)) for one in islice(ones, FIRST)]
             firsts = [
                 more
-                for first in firsts[: FIRST if number == 2 else FIRST // 3]
+                for first in firsts[: 3 * FIRST if number == 2 else 2 * FIRST // 3]
                 for more in self._behind(first, self._rest(first), few=4)
             ]
             firsts.sort(key=lambda one: one.rank)

@@ -16,7 +16,7 @@ import numpy as np
 from nutdamp.compliance import Left
 from nutdamp.errors import Infeasible
 from nutdamp.physics import sun_train
-from nutdamp.schemes.tools.sun_pulses import spin_turn, sun_clock, sun_pulse
+from nutdamp.schemes.tools.sun_pulses import first_sun_pulse, spin_turn
 from nutdamp.spacecraft import Channel, Spacecraft
 
 
@@ -65,7 +65,7 @@ class BlockModel:
         self._frame = np.array([np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun])
         self.goal = self._frame @ spacecraft.target_axis
         self.rate = self.inertia.body_rate
-        first = float(sun_pulse(spacecraft, sun_clock(spacecraft), 1).since[0])
+        first = first_sun_pulse(spacecraft)
         rate = self.rate * spacecraft.spin
         self.start = State(
             sun_angle=math.atan2(sine, float(sun @ start)),

@@ -61,9 +61,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
         if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
     found = found[(found >= 0.0) & (found <= until)]
-    _, quaternions = flown.motion(found)
-    axis = attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
-    for time, angle in zip(found.tolist(), attitude.angle_between(axis, body.sun).tolist(), strict=True):
+    for time, angle in zip(found.tolist(), attitude.angle_between(flown.axis(found), body.sun).tolist(), strict=True):
         _expect_seen(sensor, time, angle)
     return found
 
@@ -107,6 +105,11 @@ def sun_clock(spacecraft: Spacecraft) -> SunClock:
     bodies = Bodies(np.array(dynamics.moments)[:, None], dynamics.constant, dynamics.forcing)
     state = Stretch(np.zeros(1), start.rates[:, None], start.quaternion[:, None])
     return SunClock(bodies, state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
+
+
+def first_sun_pulse(spacecraft: Spacecraft) -> float:
+    """When the first Sun pulse comes, s; raises Infeasible where there is none."""
+    return float(sun_pulse(spacecraft, sun_clock(spacecraft), 1).since[0])
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
