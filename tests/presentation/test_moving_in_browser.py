@@ -321,6 +321,16 @@ def test_without_script_and_in_print_the_pictures_remain(browse: Browse, written
         assert page.locator("figure svg").first.is_visible()
 
 
+@pytest.mark.parametrize("width", [360, 400])
+def test_on_a_phone_the_buttons_stand_in_one_line(browse: Browse, written: Any, width: int) -> None:
+    with browse(written(EXAMPLE), width) as page:
+        tops = page.eval_on_selector_all(
+            ".controls button, .controls select", "all => all.map((one) => one.getBoundingClientRect().y)"
+        )
+        assert len(tops) == 4
+        assert max(tops) - min(tops) < 3.0
+
+
 @pytest.mark.parametrize("width", [400, 800, 1280])
 def test_nothing_of_it_is_cut(browse: Browse, written: Any, width: int) -> None:
     with browse(written(TARGET), width) as page:

@@ -196,6 +196,23 @@ def test_wide_tables_scroll_in_their_box(tab: Browse) -> None:
         pytest.fail("the arrow keys scroll nothing")
 
 
+@pytest.mark.parametrize("name", QUICK)
+def test_on_a_screen_all_columns_are_seen_and_no_shade_lies_under_the_last(tab: Browse, name: str) -> None:
+    """At 1280 px, and where a table does scroll the shade is no wider than the blank behind the last column."""
+    with tab(name, 1280) as page:
+        sizes = page.eval_on_selector_all(
+            ".wide:has(> .sheet)", "all => all.map((one) => [one.ariaLabel, one.scrollWidth - one.clientWidth])"
+        )
+        assert sizes
+        assert [one for one in sizes if one[1] > 0] == []
+        shade, blank = page.evaluate(
+            """() => { const box = document.querySelector(".wide:has(> .sheet)");
+            const cell = box.querySelector("tr > :last-child");
+            return [getComputedStyle(box).backgroundSize.split(", ")[1], getComputedStyle(cell).paddingRight]; }"""
+        )
+        assert float(shade.split("px")[0]) <= float(blank.removesuffix("px"))
+
+
 CONTRAST = """(selector) => {
   const colour = (text) => text.match(/[\\d.]+/g).map(Number);
   const light = (rgb) => {
