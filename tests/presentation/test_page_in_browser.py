@@ -97,6 +97,18 @@ def test_it_fits_phones_screens_and_paper(tab: Browse, name: str) -> None:
         assert page.evaluate(BEYOND, "table, svg, pre") == []
 
 
+def test_paper_has_every_sentence(tab: Browse) -> None:
+    """But what the moving view says of itself, which is not on paper either."""
+    with tab("ace", round(A4)) as page:
+        page.emulate_media(media="print")
+        hidden = page.evaluate(
+            """[...document.querySelectorAll("p, li, figcaption, td, dd")]
+            .filter((one) => !one.closest(".moving") && !one.closest("nav") && one.textContent && !one.offsetHeight)
+            .map((one) => one.textContent)"""
+        )
+        assert hidden == []
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_it_prints_to_a_few_sheets_of_a4(tab: Browse, name: str) -> None:
     with tab(name) as page:
