@@ -115,15 +115,13 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
     classes = min(CLASSES, max(count // CLASS_SIZE, 1))
     ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
     for name, draw in draws.items():
-        edges = np.partition(draw, ranks)[ranks] if len(ranks) else draw[:0]
-        index = np.searchsorted(edges, draw, side="right")
-        sizes = np.bincount(index, minlength=classes)
-        filled = sizes > 0
-        between = np.empty(ROWS)
-        for row in range(ROWS):
-            sums = np.bincount(index, weights=centred[row], minlength=classes)
-            between[row] = (sums[filled] ** 2 / sizes[filled]).sum()
-        chance = (int(filled.sum()) - 1) / count
+        order = np.argsort(draw)
+        sorted_ = draw[order]
+        starts = np.append(0, np.searchsorted(sorted_, sorted_[ranks]))
+        starts = starts[np.diff(starts, append=count) > 0]  # equal draws are of one class
+        sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
+        between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
+        chance = (len(starts) - 1) / count
         found[name] = {
             output: max(0.0, (float(between[VECTORS[output]].sum()) / variances[output] - chance) / (1.0 - chance))
             if variances[output] > 0.0 and chance < 1.0
