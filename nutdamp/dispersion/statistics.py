@@ -70,7 +70,7 @@ class Exact:
         return float(self.values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Exact quantiles, to the last bit those of `numpy.quantile`, which divides all values for each of them anew."""
+        """Exact quantiles, to the last bit those of `numpy.quantile`; each divides what lies above the last one."""
         places = np.asarray(probabilities) * (len(self.values) - 1)
         found = np.empty(len(places))
         rest, first = self.values.copy(), 0  # what lies above the last quantile, and its rank
