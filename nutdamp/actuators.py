@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # few spacecraft have valves, and none else needs to load them
+    from nutdamp.physics.valve import Valve
 
 Vector = NDArray[np.float64]
 
@@ -19,6 +23,7 @@ class Thruster:
     """One thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
 
     ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
+    ``valve`` is what it makes of commands; None gives full thrust from the start of a command to its end.
     """
 
     name: str
@@ -29,6 +34,7 @@ class Thruster:
     min_on_time: float = 0.0
     max_on_time: float = math.inf
     position: Vector | None = None
+    valve: Valve | None = None
 
     @property
     def mass_flow(self) -> float | None:
@@ -53,6 +59,11 @@ class Channel:
     def torque(self) -> Vector:
         """Sum of the torques, (3,) N m."""
         return np.asarray(sum(thruster.torque for thruster in self.thrusters), dtype=np.float64)
+
+    @property
+    def valve(self) -> Valve | None:
+        """That of its thrusters, which all have the same."""
+        return self.thrusters[0].valve
 
     @property
     def transverse(self) -> complex:

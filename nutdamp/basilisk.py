@@ -74,7 +74,7 @@ def fly(
     if until > MOST_STEPS * longest:
         raise Infeasible(f"the motion takes more than {MOST_STEPS} steps of Basilisk")
     hub = _Hub(spacecraft, longest)
-    edges = {edge for pulse in schedule for edge in (pulse.start, pulse.end) if 0.0 < edge < until}
+    edges = {edge for pulse in schedule for edge in pulse.edges if 0.0 < edge < until}
     knots = sorted({0.0, until, *np.linspace(0.0, until, samples).tolist(), *edges})
     motion: list[tuple[Vector, Vector]] = []
     taken = 0.0
@@ -111,20 +111,21 @@ def stretches(
 ) -> Iterator[tuple[float, Vector]]:
     """Durations (s) and constant torques (3,) (N m) that make up one stretch between edges of pulses.
 
-    A turning torque becomes two constant ones an interval, mixed from its values at the Gauss nodes so that the
-    mean and the first moment over time are kept: the commutator-free Magnus method of fourth order (Celledoni,
+    One that turns, rises or falls becomes two constant ones an interval, mixed from its values at the Gauss nodes so
+    that the mean and the first moment over time are kept: the commutator-free Magnus method of fourth order (Celledoni,
     Marthinsen, Owren 2003), in which each half step is a motion under constant torque.
     """
-    constant = np.zeros(3)
-    for pulse in schedule:
-        if pulse.torque is not None and pulse.start <= start and end <= pulse.end:
-            constant += pulse.torque
+    constant, slope = np.zeros(3), np.zeros(3)
+    for push in (pulse.push(start, end) for pulse in schedule):
+        if push is not None:
+            constant += push[0]
+            slope += 0.0 if push[1] is None else push[1]
     for one in spacecraft.disturbances:
         constant[2] += one.axial
         if one.rate == 0.0:
             constant[:2] += (one.transverse.real, one.transverse.imag)
     turning = [(one.transverse, one.rate) for one in spacecraft.disturbances if one.rate != 0.0]
-    if not turning:
+    if not turning and not slope.any():
         yield end - start, constant
         return
     count = max(math.ceil((end - start) / (2.0 * longest)), 1)
@@ -132,12 +133,13 @@ def stretches(
     for index in range(count):
         middle = start + (index + 0.5) * interval
         early, late = (
-            sum(size * np.exp(1j * rate * (middle + shift * interval)) for size, rate in turning)
+            complex(sum(size * np.exp(1j * rate * (middle + shift * interval)) for size, rate in turning))
             for shift in (-GAUSS, GAUSS)
         )
-        mean, slope = 0.5 * (early + late), 2.0 * GAUSS * (early - late)
-        for turned in (mean + slope, mean - slope):
-            yield 0.5 * interval, constant + np.array([turned.real, turned.imag, 0.0])
+        mean, lean = 0.5 * (early + late), 2.0 * GAUSS * (early - late)
+        even, uneven = constant + slope * (middle - start), -4.0 * GAUSS * GAUSS * interval * slope
+        for turned, ramp in ((mean + lean, uneven), (mean - lean, -uneven)):
+            yield 0.5 * interval, even + ramp + np.array([turned.real, turned.imag, 0.0])
 
 
 class _Hub:

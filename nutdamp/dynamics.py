@@ -53,24 +53,33 @@ class Dynamics:
         return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
 
     def path(
-        self, state: SpinState, start: float, end: float, torques: Sequence[Vector] = (), *, most: int
+        self,
+        state: SpinState,
+        start: float,
+        end: float,
+        torques: Sequence[Vector] = (),
+        slope: Vector | None = None,
+        *,
+        most: int,
     ) -> tuple[Path, SpinState]:
         """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
 
-        Raises Infeasible where it takes more than ``most`` steps of integration.
+        With a ``slope`` (3,) N m/s the torque runs evenly from that sum. Raises Infeasible where it takes more than
+        ``most`` steps of integration.
         """
         if self.known is None:
-            return self._path(state, start, end, torques, most)
-        leg = np.concatenate([state.rates, state.quaternion, (start, end), *torques]).tobytes()
+            return self._path(state, start, end, torques, slope, most)
+        ramp = () if slope is None else (slope,)
+        leg = np.concatenate([state.rates, state.quaternion, (start, end), *torques, *ramp]).tobytes()
         found = self.known.get(leg)
         if found is None or found[0].steps > most:
             if len(self.known) >= REMEMBERED:
                 self.known.clear()
-            found = self.known[leg] = self._path(state, start, end, torques, most)
+            found = self.known[leg] = self._path(state, start, end, torques, slope, most)
         return found
 
     def _path(
-        self, state: SpinState, start: float, end: float, torques: Sequence[Vector], most: int
+        self, state: SpinState, start: float, end: float, torques: Sequence[Vector], slope: Vector | None, most: int
     ) -> tuple[Path, SpinState]:
         work.spend(LEG)
         if end == start or (self.free and not torques):
@@ -78,7 +87,7 @@ class Dynamics:
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         pieces = rigid.integrate(
-            self.moments, torque, state.rates, state.quaternion, start, end, forcing=self.forcing, most=most
+            self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope
         )
         work.spend(PULSE + self.step_cost * len(pieces))
         rates_, quaternion_ = pieces[-1].final

@@ -259,6 +259,13 @@ def _effective_impulse(spacecraft: Spacecraft, pulse: Pulse, spin: float) -> com
     """What ``pulse`` acts like on ω at its centre, N m s; ``spin`` is ω3 there before it acts, rad/s."""
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
+    if pulse.command is not None and pulse.command.ramps:
+        from nutdamp.physics import valve  # few spacecraft have any
+
+        begin = spin - drift * (pulse.t - pulse.thrust[0])
+        rate, ramps = axial_torque / inertia.C, pulse.command.ramps
+        shape = valve.shape_factor(inertia.body_rate, begin, rate, ramps, pulse.t, spacecraft.growth, drift)
+        return complex(pulse.impulse[0], pulse.impulse[1]) * shape
     factor = rates.width_factor(
         inertia.body_rate,
         spin - 0.5 * drift * pulse.on_time,
@@ -283,10 +290,10 @@ def flown(
     dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
     allowed = _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end
-    spans = tuple((pulse.start, pulse.end) for pulse in pulses)
+    spans = tuple(pulse.thrust for pulse in pulses)
     starts, ends = np.array(spans).reshape(-1, 2).T
     last = max(until, over)
-    edges = sorted({0.0, last, *(time for span in spans for time in span)})
+    edges = sorted({0.0, over, last, *(time for pulse in pulses for time in pulse.edges)})
     legs: list[Leg] = []
     settled = state
     for now, end in zip(edges, [*edges[1:], last], strict=True):
@@ -300,9 +307,8 @@ def flown(
             state = dynamics.kicked(state, kick)
         if now == over:
             settled = state
-        on = [pulses[index].torque for index in np.flatnonzero((starts <= now) & (end <= ends))]
-        torques = [torque for torque in on if torque is not None]
-        path, following = dynamics.path(state, now, end, torques, most=allowed)
+        on = [pulses[index] for index in np.flatnonzero((starts <= now) & (end <= ends))]
+        path, following = dynamics.path(state, now, end, *_torques(on, now, end), most=allowed)
         allowed -= path.steps
         completed, at_end = (
             int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
@@ -311,6 +317,16 @@ def flown(
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
     return Flight(spacecraft, schedule, tuple(legs), settled, dynamics.moments, spans)
+
+
+def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:
+    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope together, N m/s.
+
+    No slope, None, where all keep even.
+    """
+    pushes = [push for push in (pulse.push(start, end) for pulse in pulses) if push is not None]
+    slopes = [slope for _, slope in pushes if slope is not None]
+    return [torque for torque, _ in pushes], np.sum(slopes, axis=0) if slopes else None
 
 
 def _allowed(schedule: Schedule, until: float) -> int:
@@ -323,15 +339,30 @@ def momentum_gained(flown: Flight) -> Vector:
     gained = np.zeros(3)
     nodes, weights = np.array([(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]).T
     for leg in flown.legs:
-        firing = [p.force for p in flown.schedule if p.force is not None and p.start <= leg.start and leg.end <= p.end]
-        force = np.asarray(sum(firing, np.zeros(3)))
-        if leg.end == leg.start or not force.any():
+        firing = [p for p in flown.schedule if p.thrust[0] <= leg.start and leg.end <= p.thrust[1]]
+        if leg.end == leg.start or not any(p.force is not None and p.force.any() for p in firing):
             continue
         ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
         turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
         edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
         middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
         times = (middles[:, None] + half * nodes).ravel()
-        pushes = attitude.rotate(leg.path.motion(times)[1], force).reshape(-1, len(nodes), 3)
+        pushes = attitude.rotate(leg.path.motion(times)[1], _forces(firing, times)).reshape(-1, len(nodes), 3)
         gained += half * np.einsum("snc,n->c", pushes, weights)
     return gained
+
+
+def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
+    """Force (3,) N of pulses, or (n, 3) at the ``times`` (n,) s where that of one of them rises or falls."""
+    total = np.zeros(3)
+    for pulse in firing:
+        if pulse.force is None:
+            continue
+        if pulse.command is None:
+            total = total + pulse.force
+            continue
+        corners = [(ramp.begin, ramp.first) for ramp in pulse.command.ramps]
+        corners += [(ramp.end, ramp.last) for ramp in pulse.command.ramps]
+        places, levels = np.array(sorted(corners, key=lambda one: one[0])).T
+        total = total + np.interp(times, places, levels)[:, None] * pulse.force
+    return np.asarray(total)

@@ -73,14 +73,14 @@ class Hindrance:
         longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
         most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
         return bool(most) and all(
-            one.on_time >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
+            one.loaded[1] >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
         )
 
     @property
     def shortest(self) -> bool:
         """Whether a pulse is no longer than its channel has to be on."""
         least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
-        return any(0.0 < one.on_time <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
+        return any(0.0 < one.loaded[1] <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
 
     @property
     def to_the_end(self) -> bool:

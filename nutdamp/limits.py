@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.commands import Commands
-from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, touching
+from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, commanded, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 OFF_TICK = 1e-6
@@ -180,7 +180,19 @@ def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
     """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the spin axis."""
-    return longest_useful(channel.max_on_time, spacecraft.body_period) if channel.damps else channel.max_on_time
+    longest = effective_on_times(channel)[1]
+    return longest_useful(longest, spacecraft.body_period) if channel.damps else longest
+
+
+def effective_on_times(channel: Channel) -> tuple[float, float]:
+    """Bounds (s) of the pulses that a channel can give, in effective on-times: without a valve those commanded."""
+    return effective_on_time(channel, channel.min_on_time), effective_on_time(channel, channel.max_on_time)
+
+
+def effective_on_time(channel: Channel, on_time: float) -> float:
+    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the torque."""
+    valve = channel.valve
+    return on_time if valve is None or math.isinf(on_time) else valve.thrust(on_time).on_time
 
 
 def longest_useful(max_on_time: float, period: float) -> float:
@@ -222,6 +234,9 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
         return pulse
     windows, channel = Windows(spacecraft), channel_of(spacecraft, pulse)
     bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+    if channel is not None and pulse.command is not None:
+        start, on_time = pulse.loaded
+        return commanded(channel, windows.nearest_tick(start), windows.on_time(on_time, *bounds))
     on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
     t = windows.nearest_tick(pulse.start) + 0.5 * on_time
     if channel is not None:
@@ -275,12 +290,14 @@ def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach
         for limit, bound, by, allowed in _margins(windows, channels.get(pulse.channel), pulse, previous_end):
             if by > allowed:
                 yield Breach(limit, number, pulse, bound, by)
-        if windows.blocked_until(pulse.start, pulse.on_time) is not None:
+        start = pulse.loaded[0]
+        lasts = pulse.on_time if pulse.command is None else pulse.over - start
+        if windows.blocked_until(start, lasts) is not None:
             for begins, ends in windows.limits.blackout:
-                by = min(ends - pulse.start, pulse.end - begins)
-                if by > touching(pulse.end):
+                by = min(ends - start, pulse.over - begins)
+                if by > touching(pulse.over):
                     yield Breach(Limit.BLACKOUT, number, pulse, begins, by, (begins, ends))
-        previous_end = max(previous_end, pulse.end)
+        previous_end = max(previous_end, pulse.over)
     most = spacecraft.limits.max_pulses
     if most is not None and number > most:
         yield Breach(Limit.MAX_PULSES, number, pulse, most, number - most)
@@ -289,19 +306,23 @@ def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach
 def _margins(
     windows: Windows, channel: Channel | None, pulse: Pulse, previous_end: float
 ) -> Iterator[tuple[Limit, float, float, float]]:
-    """Each limit but the blackout windows with its bound, by how much a pulse exceeds it, and by how much it may; s."""
-    limits, slack = windows.limits, touching(pulse.end)
-    if pulse.on_time > 0.0:
-        coarsest = RESOLUTION * pulse.on_time
-        yield Limit.RESOLUTION, coarsest, math.ulp(pulse.end), coarsest
-    yield Limit.EARLIEST, limits.earliest, limits.earliest - pulse.start, 0.0 if pulse.start < 0.0 else slack
-    yield Limit.HORIZON, windows.horizon, pulse.end - windows.horizon, slack
-    yield Limit.GAP, limits.gap, previous_end + limits.gap - pulse.start, slack
+    """Each limit but the blackout windows with its bound, by how much a pulse exceeds it, and by how much it may; s.
+
+    Starts, on-times and ticks are those of the command; horizon and gap wait until its thrust is over too.
+    """
+    limits, slack = windows.limits, touching(pulse.over)
+    start, on_time = pulse.loaded
+    if on_time > 0.0:
+        coarsest = RESOLUTION * on_time
+        yield Limit.RESOLUTION, coarsest, math.ulp(pulse.over), coarsest
+    yield Limit.EARLIEST, limits.earliest, limits.earliest - start, 0.0 if start < 0.0 else slack
+    yield Limit.HORIZON, windows.horizon, pulse.over - windows.horizon, slack
+    yield Limit.GAP, limits.gap, previous_end + limits.gap - start, slack
     if channel is not None:
-        yield Limit.MIN_ON_TIME, channel.min_on_time, channel.min_on_time - pulse.on_time, slack
-        yield Limit.MAX_ON_TIME, channel.max_on_time, pulse.on_time - channel.max_on_time, slack
+        yield Limit.MIN_ON_TIME, channel.min_on_time, channel.min_on_time - on_time, slack
+        yield Limit.MAX_ON_TIME, channel.max_on_time, on_time - channel.max_on_time, slack
     if limits.tick is not None:
-        for limit, value in ((Limit.START_TICK, pulse.start), (Limit.ON_TIME_TICK, pulse.on_time)):
+        for limit, value in ((Limit.START_TICK, start), (Limit.ON_TIME_TICK, on_time)):
             yield limit, limits.tick, abs(value - windows.nearest_tick(value)), slack + OFF_TICK * limits.tick
 
 

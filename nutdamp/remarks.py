@@ -95,7 +95,8 @@ def _broken(breach: Breach) -> str:
     if limit is Limit.MAX_PULSES:
         return f"{breach.number} pulses are more than {breach.bound:.0f}"
     begins, ends = breach.window or (math.nan, math.nan)
-    on = f"is on for {pulse.on_time:.6g} s"
+    start, on_time = pulse.loaded
+    on = f"is on for {on_time:.6g} s"
     how = {
         Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
         Limit.EARLIEST: f"starts before {bound}",
@@ -107,7 +108,7 @@ def _broken(breach: Breach) -> str:
         Limit.START_TICK: f"starts off the ticks of {bound}",
         Limit.ON_TIME_TICK: f"is on for a time off the ticks of {bound}",
     }[limit]
-    return f"pulse {breach.number} ({pulse.channel}, {pulse.start:.6g} s to {pulse.end:.6g} s) {how}"
+    return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"
 
 
 def _bounds(plan: Plan) -> Iterator[str]:

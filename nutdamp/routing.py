@@ -19,6 +19,7 @@ from nutdamp.demands import Keep
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Schedule
+from nutdamp.schemes.tools import commanding
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.words import listed
@@ -50,11 +51,13 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOption
     Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
     out.
     """
+    body = spacecraft if spacecraft.plain else commanding.plain(spacecraft)
     for route in routes(spacecraft):
         if work.exhausted():
             return
         try:
-            yield _over(spacecraft, scheme, options, route)
+            made = _over(body, scheme, options, route)
+            yield made if spacecraft.plain else schemes.commanded(scheme, spacecraft, made, options)
         except Infeasible:
             continue
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from nutdamp.commands import Block
 from nutdamp.spacecraft import Channel, Steerable, Vector
+
+if TYPE_CHECKING:
+    from nutdamp.physics.valve import Ramp
 
 STEERABLE = "steerable"
 """Channel name of the pulses of a steerable torquer."""
@@ -26,11 +29,24 @@ Label = TypeVar("Label")
 
 
 @dataclass(frozen=True, slots=True)
+class Command:
+    """What is loaded to fire a pulse through a valve, ``start`` and ``on_time`` s, and the thrust that follows.
+
+    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse.
+    """
+
+    start: float
+    on_time: float
+    ramps: tuple[Ramp, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Pulse:
     """One rectangular torque pulse, or an ideal impulse (``on_time`` 0, ``torque`` None).
 
     ``t`` is its centre in s; ``torque`` (3,) N m and ``impulse`` (3,) N m s are in principal body axes;
-    ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None.
+    ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None. Through a valve it is what
+    the ``command`` gives: ``t`` is the centroid of its thrust and ``on_time`` the effective one, impulse over torque.
     """
 
     t: float
@@ -40,6 +56,56 @@ class Pulse:
     torque: Vector | None = None
     force: Vector | None = None
     propellant: float | None = None
+    command: Command | None = None
+
+    @property
+    def loaded(self) -> tuple[float, float]:
+        """Start and on-time as they are commanded, s."""
+        return (self.start, self.on_time) if self.command is None else (self.command.start, self.command.on_time)
+
+    @property
+    def thrust(self) -> tuple[float, float]:
+        """When its thrust begins and ends, s."""
+        if self.command is None or not self.command.ramps:
+            return self.start, self.end
+        return self.command.ramps[0].begin, self.command.ramps[-1].end
+
+    @property
+    def over(self) -> float:
+        """When both command and thrust are over, s."""
+        return self.end if self.command is None else max(sum(self.loaded), self.thrust[1])
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Times (s) at which its thrust begins, ends, or begins or ends to rise or to fall."""
+        if self.command is None:
+            return self.start, self.end
+        return tuple(time for ramp in self.command.ramps for time in ramp[:2])
+
+    def push(self, start: float, end: float) -> tuple[Vector, Vector | None] | None:
+        """Torque (3,) N m at ``start`` and its slope, N m/s, None for none, up to ``end`` s, with no edge in between.
+
+        None where it does not fire then.
+        """
+        if self.torque is None or end <= start:
+            return None
+        if self.command is None:
+            return (self.torque, None) if self.start <= start and end <= self.end else None
+        for ramp in self.command.ramps:
+            if ramp.begin <= start and end <= ramp.end:
+                if ramp.first == ramp.last:
+                    return self.torque * ramp.first, None
+                slope = (ramp.last - ramp.first) / (ramp.end - ramp.begin)
+                return self.torque * (ramp.first + slope * (start - ramp.begin)), self.torque * slope
+        return None
+
+    def moved(self, by: float) -> Pulse:
+        """The same ``by`` s later."""
+        command = self.command
+        if command is not None:
+            ramps = tuple(ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps)
+            command = Command(command.start + by, command.on_time, ramps)
+        return replace(self, t=self.t + by, command=command)
 
     @property
     def start(self) -> float:
@@ -66,12 +132,12 @@ def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Labe
     """Labels of pulses that begin while their channel still fires an earlier one, each with the label of that."""
     firing: dict[str, tuple[Label, float]] = {}
     found = []
-    for label, pulse in sorted(pulses, key=lambda one: one[1].start):
+    for label, pulse in sorted(pulses, key=lambda one: one[1].loaded[0]):
         before, end = firing.get(pulse.channel, (label, -math.inf))
-        if pulse.start < end - touching(end):
+        if pulse.loaded[0] < end - touching(end):
             found.append((label, before))
-        if pulse.end > end:
-            firing[pulse.channel] = label, pulse.end
+        if pulse.over > end:
+            firing[pulse.channel] = label, pulse.over
     return found
 
 
@@ -80,8 +146,29 @@ def touching(time: float) -> float:
     return max(TOUCHING, math.ulp(time)) if math.isfinite(time) else 0.0
 
 
+def commanded(channel: Channel, start: float, on_time: float) -> Pulse:
+    """What ``channel`` gives when it is commanded on at ``start`` s for ``on_time`` s."""
+    valve = channel.valve
+    if valve is None:
+        return _rectangle(channel, start + 0.5 * on_time, on_time)
+    thrust = valve.thrust(on_time)
+    ramps = tuple(ramp._replace(begin=start + ramp.begin, end=start + ramp.end) for ramp in thrust.ramps)
+    command = Command(start, on_time, ramps)
+    if not ramps:
+        return Pulse(start, 0.0, channel.name, np.zeros(3), propellant=channel.mass_flow and 0.0, command=command)
+    return replace(_rectangle(channel, start + thrust.centroid, thrust.on_time), command=command)
+
+
 def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
-    """One firing of ``channel``, centred at ``t`` s and ``on_time`` s long."""
+    """One firing of ``channel``, centred at ``t`` s and ``on_time`` s long, and the command that gives it."""
+    valve = channel.valve
+    if valve is None or on_time == 0.0:
+        return _rectangle(channel, t, on_time)
+    loaded = valve.on_time_for(float(on_time))
+    return commanded(channel, float(t) - valve.thrust(loaded).centroid, loaded)
+
+
+def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
     flow = channel.mass_flow
     return Pulse(
         t=t,
@@ -160,6 +247,11 @@ class Schedule:
         return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
 
     @property
+    def through_valves(self) -> bool:
+        """Whether any of the pulses is not what it is commanded."""
+        return any(pulse.command is not None for pulse in self.pulses)
+
+    @property
     def cost(self) -> float:
         """Propellant in kg; where that is not known, impulse in N m s."""
         propellant = self.propellant
@@ -172,7 +264,7 @@ class Schedule:
     @property
     def end(self) -> float:
         """End of the last pulse, s; 0 without pulses."""
-        return max((pulse.end for pulse in self.pulses), default=0.0)
+        return max((pulse.over for pulse in self.pulses), default=0.0)
 
     @property
     def total_impulse(self) -> float:

@@ -30,6 +30,8 @@ from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
+from nutdamp.physics.feed import Cold as Cold
+from nutdamp.physics.feed import Tank as Tank
 from nutdamp.rounding import cleaned
 from nutdamp.tolerances import Dispersions
 
@@ -177,7 +179,8 @@ class Spacecraft(views.Shown):
     which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far true values may differ;
     ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun,
     where it is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of
-    ``sun_sensor`` may hold; ``source`` is what it was read from, None once a field is replaced.
+    ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not;
+    ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -199,6 +202,8 @@ class Spacecraft(views.Shown):
     keep: tuple[Keep, ...] = ()
     sun_sensor: SunSensor | None = None
     commands: Commands | None = None
+    cold: Cold | None = None
+    tank: Tank | None = None
     source: Source | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
@@ -218,6 +223,11 @@ class Spacecraft(views.Shown):
         Only names and types are checked; `with_` checks all that a file is checked for. Raises BadRequest.
         """
         return arguments.replaced(self, fields)
+
+    @property
+    def plain(self) -> bool:
+        """Whether every command gives a rectangular pulse of full thrust: no valves, no cold nozzles, no blowdown."""
+        return self.cold is None and self.tank is None and not any(channel.valve for channel in self.channels)
 
     @property
     def rates(self) -> Vector:

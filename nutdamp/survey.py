@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import commandable_widths, longest_useful, shortest_on_time, usable
+from nutdamp.limits import (
+    commandable_widths,
+    effective_on_time,
+    effective_on_times,
+    longest_useful,
+    shortest_on_time,
+    usable,
+)
 from nutdamp.physics import cones, damping, forced, rates, stability, sun_train
 from nutdamp.schemes.tools import sun_pulses
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
@@ -65,7 +72,7 @@ class Turns:
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
     """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
     found, commands, spin = [], spacecraft.commands, spacecraft.spin
-    for channel in () if commands is None else usable(spacecraft):
+    for channel in () if commands is None or not spacecraft.plain else usable(spacecraft):
         assert commands is not None
         widths = commandable_widths(commands, channel)
         if len(widths):
@@ -90,9 +97,38 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
     period = spacecraft.body_period
     steps = []
     for channel in spacecraft.channels:
-        shortest, longest = shortest_on_time(spacecraft, channel), longest_useful(channel.max_on_time, period)
+        shortest = effective_on_time(channel, shortest_on_time(spacecraft, channel))
+        longest = longest_useful(effective_on_times(channel)[1], period)
         steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), _step(spacecraft, channel, longest)))
     return tuple(steps)
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """What a command of ``on_time`` s gives: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
+
+    The centroid counts from the start of the command.
+    """
+
+    channel: Channel
+    on_time: float
+    effective: float
+    impulse: float
+    centroid: float
+
+
+def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
+    """What the shortest and the longest command of each channel give, of those that have valves."""
+    found = []
+    for channel in spacecraft.channels:
+        if channel.valve is None:
+            continue
+        for on_time in dict.fromkeys((shortest_on_time(spacecraft, channel), channel.max_on_time)):
+            if 0.0 < on_time < math.inf:
+                thrust = channel.valve.thrust(on_time)
+                impulse = channel.strength * thrust.on_time
+                found.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
+    return tuple(found)
 
 
 def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:

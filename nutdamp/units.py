@@ -47,6 +47,8 @@ KINDS: dict[str, Kind] = {
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
     "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3}),
+    "pressure": Kind("a pressure", {"Pa": 1.0, "bar": 1e5}),
+    "impulse": Kind("an impulse", {"N s": 1.0}),
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }

@@ -15,6 +15,7 @@ from nutdamp.physics import attitude, rates
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.supply import lacking, supplied, thrust_laws
 
 SAMPLES = 201
 """Even times at which two flights are compared, besides the edges of the pulses."""
@@ -111,7 +112,7 @@ def verify(
     """
     end = schedule.end + spacecraft.inertial_period
     judge = flight.flown(spacecraft, schedule, end)
-    times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.end for pulse in schedule]]))
+    times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
     reference = _motion(judge, times)
     methods = (
         _closed_form(spacecraft, schedule, end, times, reference),
@@ -154,7 +155,7 @@ def _closed_form(
             np.array([pulse.impulse[2] for pulse in schedule]),
         )
         body = np.column_stack([omega.real, omega.imag, spin])
-    outside = np.all([(times <= pulse.start) | (times >= pulse.end) for pulse in schedule], axis=0)
+    outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
     return _method("impulse sum (17), arcs", spacecraft, arcs.residual, (body, quaternion), reference, between)
 
@@ -174,7 +175,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
     initial = spacecraft.initial
     state = np.concatenate([axes @ initial.rates, attitude.multiply(initial.quaternion, _turn(axes.T))])
     edges = {0.0, float(times[-1]), *times.tolist()}
-    edges |= {edge for pulse in schedule for edge in (pulse.start, pulse.end)}
+    edges |= {edge for pulse in schedule for edge in pulse.edges}
     knots = sorted(edge for edge in edges if edge <= times[-1])
     rows, evaluations = {}, 0
     for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
@@ -183,7 +184,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
                 state[:3] += inverse @ (axes @ pulse.impulse)
         rows[now] = state.copy()
         if end > now:
-            torque = _body_torque(spacecraft, schedule, now, end)
+            torque = _Torque(spacecraft, schedule, now, end)
 
             def derivative(t: float, y: Vector, torque: _Torque = torque) -> Vector:
                 nonlocal evaluations
@@ -213,12 +214,14 @@ def _turn(rotation: Vector) -> Vector:
 class _Torque:
     """Torque in the axes of the file over one stretch, a function of time."""
 
-    def __init__(self, spacecraft: Spacecraft, firing: list[Vector]) -> None:
-        self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
-        self.constant = np.asarray(sum(firing, np.zeros(3)))
+    def __init__(self, spacecraft: Spacecraft, schedule: Schedule, start: float, end: float) -> None:
+        self.spacecraft, self.axes, self.start = spacecraft, spacecraft.inertia.axes, start
+        pushes = [push for push in (pulse.push(start, end) for pulse in schedule) if push is not None]
+        self.constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
+        self.slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
 
     def __call__(self, t: float) -> Vector:
-        total = self.constant.copy()
+        total = self.constant + self.slope * (t - self.start)
         for one in self.spacecraft.disturbances:
             turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
             total += (turned.real, turned.imag, one.axial)
@@ -237,13 +240,6 @@ def _sink(spacecraft: Spacecraft, momentum: Vector) -> Vector:
     direction = momentum / size
     across = direction * (direction @ axis) - axis  # of length sin θ
     return np.asarray(spacecraft.growth * size * (direction @ axis) * across)
-
-
-def _body_torque(spacecraft: Spacecraft, schedule: Schedule, start: float, end: float) -> _Torque:
-    firing = [
-        pulse.torque for pulse in schedule if pulse.torque is not None and pulse.start <= start and end <= pulse.end
-    ]
-    return _Torque(spacecraft, firing)
 
 
 def _by_dop853(spacecraft: Spacecraft, schedule: Schedule, times: Vector, reference: tuple[Vector, Vector]) -> Method:
@@ -312,7 +308,7 @@ def _method(
 def _conserved(flown: Flight) -> tuple[float, float]:
     """Largest relative change of |H| and of the energy along one coast."""
     moments = np.asarray(flown.moments)
-    firing = [(pulse.start, pulse.end) for pulse in flown.schedule]
+    firing = [pulse.thrust for pulse in flown.schedule]
     worst = [0.0, 0.0]
     for leg in flown.legs:
         if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
@@ -337,7 +333,7 @@ def _budget(
     sharp = _sharp(ideal, exact)
     rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, exact)]
     if spacecraft.limits.tick is not None:
-        rounded = Schedule(tuple(commandable(spacecraft, pulse) for pulse in exact))
+        rounded = Schedule(supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact)))
         rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
     if spacecraft.disturbances and not expected:
         rows.append(("disturbances", spacecraft, sharp))
@@ -349,6 +345,7 @@ def _budget(
         rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
     if spacecraft.growth != 0.0:
         rows.append((f"{WITHOUT}dissipation", replace(ideal, dissipation=None), sharp))
+    rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in thrust_laws(spacecraft)]
     if spacecraft.disturbances and expected:
         rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
     return tuple(

@@ -16,6 +16,7 @@ s the turn of axis 3 away from H at κ sin θ cos θ. No torque of dissipation s
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -36,6 +37,19 @@ class Push(NamedTuple):
     start: float
     end: float
     torque: Array
+
+
+class Swell(NamedTuple):
+    """A body torque that runs evenly from ``first`` (3,) N m at ``start`` s to ``last`` at ``end`` s."""
+
+    start: float
+    end: float
+    first: Array
+    last: Array
+
+    def at(self, t: float) -> Array:
+        """The torque at ``t`` s."""
+        return self.first + (self.last - self.first) * ((t - self.start) / (self.end - self.start))
 
 
 class Kick(NamedTuple):
@@ -98,14 +112,36 @@ def turned(first: Array, second: Array) -> float:
     )
 
 
-def coast(moments: Sequence[float], motion: Motion, torque: Array, times: Array) -> list[Motion]:
-    """The motion at ``times`` (n,) s > 0 under a constant body torque."""
-    moments_ = np.asarray(moments, dtype=float)
+def through_valve(
+    start: float, on_time: float, torque: Array, *, opening: float, closing: float, rise: float, fall: float
+) -> list[Swell]:
+    """What a command gives through a valve: the level rises at 1/rise while it is open and falls at 1/fall once not.
 
-    def slope(_: float, y: Array) -> Array:
+    By the level at each moment, up to one; no formula for impulse or centroid stands here.
+    """
+    opened, closed = start + opening, start + on_time + closing
+    if closed <= opened:
+        return []
+    peak = 1.0 if rise == 0.0 else min(1.0, (closed - opened) / rise)
+    corners = [(opened, 0.0), (opened + peak * rise, peak), (closed, peak), (closed + peak * fall, 0.0)]
+    return [
+        Swell(begin, end, low * torque, high * torque)
+        for (begin, low), (end, high) in itertools.pairwise(corners)
+        if end > begin
+    ]
+
+
+def coast(
+    moments: Sequence[float], motion: Motion, torque: Array, times: Array, growing: Array | None = None
+) -> list[Motion]:
+    """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so many (3,) N m/s."""
+    moments_ = np.asarray(moments, dtype=float)
+    rate = np.zeros(3) if growing is None else growing
+
+    def slope(t: float, y: Array) -> Array:
         w, rotation = y[:3], y[3:].reshape(3, 3)
         cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        acceleration = (torque - cross @ (moments_ * w)) / moments_
+        acceleration = (torque + rate * t - cross @ (moments_ * w)) / moments_
         return np.concatenate([acceleration, (rotation @ cross).ravel()])
 
     y0 = np.concatenate([motion.rates, motion.rotation.ravel()])
@@ -163,7 +199,7 @@ def euler_angles(A: float, C: float, size: float, growth: float, start: Array, t
 def fly(
     moments: Sequence[float],
     rates: Array,
-    events: Iterable[Push | Kick],
+    events: Iterable[Push | Swell | Kick],
     until: float,
     rotation: Array | None = None,
     growth: float = 0.0,
@@ -180,8 +216,15 @@ def fly(
             middle = 0.5 * (now + edge)
             pushing = [e.torque for e in events if isinstance(e, Push) and e.start < middle < e.end]
             torque = np.sum(pushing, axis=0) if pushing else np.zeros(3)
+            swelling = [e for e in events if isinstance(e, Swell) and e.start < middle < e.end]
+            growing = sum(((e.last - e.first) / (e.end - e.start) for e in swelling), np.zeros(3))
+            torque = torque + sum((e.at(now) for e in swelling), np.zeros(3))
             span = np.array([edge - now])
-            found = sinking(moments, motion, torque, span, growth) if growth else coast(moments, motion, torque, span)
+            found = (
+                sinking(moments, motion, torque, span, growth)
+                if growth
+                else coast(moments, motion, torque, span, growing)
+            )
             motion, now = found[0], edge
         for event in events:
             if isinstance(event, Kick) and event.t == edge:

@@ -38,7 +38,7 @@ dispersions:
   timing: {uniform: 5 ms}
 """
 
-BROKEN = "name: Broken\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 0]\ncolour: red\n"
+BROKEN = "name: Broken\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 0]\npaintwork: red\n"
 
 CALLS = """
 --version

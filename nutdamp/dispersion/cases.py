@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -135,10 +136,13 @@ class Model:
         object.__setattr__(self, "_members", members)
         object.__setattr__(self, "_actuations", tuple(map(self._actuation, self.schedule)))
 
-    @property
+    @cached_property
     def on_times(self) -> tuple[float, ...]:
-        """On-time of each pulse, s: commanded, so the same in every case."""
-        return tuple(pulse.on_time for pulse in self.schedule)
+        """On-time of each pulse, s: commanded, so the same in every case.
+
+        Through a valve that of the rectangle which has the impulse, the centroid and the spread of the thrust.
+        """
+        return tuple(map(_width, self.schedule))
 
     @property
     def target(self) -> Vector:
@@ -180,8 +184,11 @@ class Model:
         for number, one in enumerate(self._actuations, start=1):
             late = plus(offset, draws.get(f"Sun pulse {number}", 0.0))
             shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-            start = one.pulse.start
-            starts.append(start if _nothing(shift) else _not_before(start + shift))
+            start, lead = one.pulse.start, 0.0
+            if one.pulse.command is not None:
+                start = one.pulse.command.start
+                lead = one.pulse.t - 0.5 * self.on_times[number - 1] - start
+            starts.append(plus(start if _nothing(shift) else _not_before(start + shift), lead))
             factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
             torque, mean, flow = torques[one.source]
             if one.source == STEERABLE and not self._members[STEERABLE]:
@@ -215,6 +222,8 @@ class Model:
             return _Actuation(pulse, source, pulse.on_time, _parts(pulse.impulse))
         torque = np.sum([thruster.torque for thruster in thrusters], axis=0)
         duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(torque))
+        if pulse.torque is not None and not self.spacecraft.plain:  # weaker where it is cold or the pressure falls
+            duration *= float(torque @ pulse.torque) / float(torque @ torque)
         remainder = pulse.impulse - duration * torque
         if np.linalg.norm(remainder) <= ROUNDING * np.linalg.norm(pulse.impulse):
             # What is left is rounding; a single thruster takes it, so that its direction is exactly the schedule's.
@@ -267,6 +276,15 @@ class Model:
             return x, y, z
         cosine, sine = cos_sin(angle)
         return x * cosine - y * sine, x * sine + y * cosine, z
+
+
+def _width(pulse: Pulse) -> float:
+    """Length (s) of the rectangle that a pulse counts as."""
+    if pulse.command is None or not pulse.command.ramps:
+        return pulse.on_time
+    from nutdamp.physics import valve  # few spacecraft have any
+
+    return valve.spread(pulse.command.ramps, pulse.t)
 
 
 def _not_before(start: Cases) -> Cases:

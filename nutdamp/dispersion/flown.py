@@ -41,11 +41,11 @@ class RealWidths:
             settled, turned, _, seen = self._fired(cases)
             propellant = None if propellant is None else propellant * self._share(seen)
         else:
-            pulses = rigid_cases.Pulses(
-                _whole(cases.starts, count),
-                np.array(self.model.on_times),
-                np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count),
-            )
+            starts = _whole(cases.starts, count)
+            impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
+            pulses = rigid_cases.Pulses(starts, np.array(self.model.on_times), impulses)
+            if self.model.schedule.through_valves:
+                pulses = self._ramps(starts, impulses)
             settled, turned = rigid_cases.fly(self._bodies(moments), rates, _upright(count), pulses)
         momentum = _triple(moments * settled)
         after = carried(tuple(turned), momentum)
@@ -82,6 +82,26 @@ class RealWidths:
         """Share of the propellant that pulses (k, n) take of which only those ``seen`` are fired."""
         taken = np.array([pulse.propellant for pulse in self.model.schedule], dtype=float)
         return np.asarray(taken @ seen / taken.sum())
+
+    def _ramps(self, starts: Array, impulses: Array) -> rigid_cases.Pulses:
+        """The pulses by the ramps of their thrust, each as one of its own; as in `rigid_cases.Pulses`."""
+        begins, lengths, parts, leans = [], [], [], []
+        schedule, on_times = self.model.schedule, self.model.on_times
+        for pulse, on_time, start, impulse in zip(schedule, on_times, starts, impulses, strict=True):
+            if pulse.command is None:
+                begins.append(start)
+                lengths.append(on_time)
+                parts.append(impulse)
+                leans.append(0.0)
+                continue
+            for ramp in pulse.command.ramps:
+                begins.append(start + (ramp.begin - (pulse.t - 0.5 * on_time)))
+                lengths.append(ramp.end - ramp.begin)
+                parts.append(impulse * (ramp.impulse / pulse.on_time))
+                leans.append((ramp.last - ramp.first) / (ramp.last + ramp.first))
+        count = starts.shape[1]
+        starts, impulses = np.array(begins).reshape(-1, count), np.array(parts).reshape(-1, 3, count)
+        return rigid_cases.Pulses(starts, np.array(lengths), impulses, np.array(leans))
 
 
 def _count(cases: DispersedCases) -> int:

@@ -22,12 +22,14 @@ def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
     body, case = model.spacecraft, RealWidths(model).timed(model.cases(draws))
     pulses = []
-    for planned, start, parts in zip(model.schedule, case.starts, case.impulses, strict=True):
+    for planned, width, start, parts in zip(model.schedule, model.on_times, case.starts, case.impulses, strict=True):
         impulse = np.array(parts, dtype=float).reshape(3)
         torque = None if planned.on_time == 0.0 else impulse / planned.on_time
-        pulses.append(
-            Pulse(float(np.squeeze(start)) + 0.5 * planned.on_time, planned.on_time, planned.channel, impulse, torque)
-        )
+        t = float(np.squeeze(start)) + 0.5 * width
+        if planned.command is not None:
+            pulses.append(replace(planned.moved(t - planned.t), impulse=impulse, torque=torque))
+        else:
+            pulses.append(Pulse(t, planned.on_time, planned.channel, impulse, torque))
     tilt = np.array([*case.tilt, 0.0], dtype=float)
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])

@@ -144,6 +144,8 @@ class Study:
         parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
         if schedule.blocks:  # each case fires them from its own Sun pulses
             parts += [schedule.blocks, body.sun, body.sun_sensor]
+        if schedule.through_valves:
+            parts.append([pulse.command for pulse in schedule])
         with np.printoptions(precision=17, floatmode="unique"):
             return hashlib.sha256(repr(parts).encode()).hexdigest()
 

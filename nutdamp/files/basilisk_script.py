@@ -43,14 +43,12 @@ def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
     """Rows of the schedule: what fires, how long, torque; an ideal impulse lasts no time and gives its impulse."""
     pulses, axes = plan.pulses, body.inertia.axes
     longest = default_step(body, pulses, pulses.end)
-    edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in (pulse.start, pulse.end))})
+    edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
     for now, end in zip(edges, [*edges[1:], pulses.end], strict=True):
         for pulse in pulses:
             if pulse.torque is None and pulse.t == now:
                 yield f"({pulse.channel!r}, 0.0, {_vector(axes @ pulse.impulse)})"
-        firing = [
-            pulse.channel for pulse in pulses if pulse.start <= now and end <= pulse.end and pulse.torque is not None
-        ]
+        firing = [pulse.channel for pulse in pulses if pulse.push(now, end) is not None]
         if end > now:
             for duration, torque in stretches(body, pulses, now, end, longest):
                 yield f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, {_vector(axes @ torque)})"

@@ -10,7 +10,7 @@ from nutdamp import __version__, survey
 from nutdamp.aspect import at_start
 from nutdamp.errors import CannotRead, Fault, FaultyFile, printable
 from nutdamp.files.plan_json import aspects_json, spacecraft_json
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft import Channel, Spacecraft
 
 
 def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
@@ -70,6 +70,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
                 "smallest_step_deg": math.degrees(steps.smallest),
                 "largest_step_deg": math.degrees(steps.largest),
                 "damps": steps.channel.damps,
+                **_valve_json(steps.channel, spacecraft),
             }
             for steps in survey.channel_steps(spacecraft)
         ],
@@ -94,6 +95,24 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
             "nearest_off_deg": None if pair is None else abs(math.degrees(pair.miss)),
         },
+    }
+
+
+def _valve_json(channel: Channel, spacecraft: Spacecraft) -> dict[str, Any]:
+    """What the shortest and the longest command of a channel give; nothing without a valve."""
+    if channel.valve is None:
+        return {}
+    return {
+        "commands": [
+            {
+                "on_time_s": one.on_time,
+                "effective_on_time_s": one.effective,
+                "impulse_Nms": one.impulse,
+                "centroid_s": one.centroid,
+            }
+            for one in survey.acting(spacecraft)
+            if one.channel is channel
+        ]
     }
 
 

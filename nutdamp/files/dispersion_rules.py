@@ -61,7 +61,7 @@ def _probability(facts: Facts) -> Iterator[Finding]:
 
 def _entries(facts: Facts) -> Iterator[Entry]:
     """All tolerances in the file."""
-    thrusts = _thrusts(facts)
+    forces = thrusts(facts)
     for key, kind in QUANTITIES.items():
         path: KeyPath = ("dispersions", key)
         node = facts.root.get(*path)
@@ -72,10 +72,10 @@ def _entries(facts: Facts) -> Iterator[Entry]:
                 yield Entry((*path, index), kind, _spin(facts) if index == 2 else None, "the spin")
         elif key in BY_THRUSTER and isinstance(node.value, dict) and by_name(node.value):
             for name, _ in node.children():
-                nominal = thrusts.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
+                nominal = forces.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
                 yield Entry((*path, name), kind, nominal, f"the thrust of {name}" if kind == "force" else "")
         elif key == "thrust":
-            known = [(thrust, name) for name, thrust in thrusts.items() if thrust is not None]
+            known = [(thrust, name) for name, thrust in forces.items() if thrust is not None]
             least = min(known, default=(None, ""))
             yield Entry(path, kind, least[0], f"the thrust of {least[1]}")
         else:
@@ -109,7 +109,7 @@ def _spin(facts: Facts) -> float | None:
     return abs(spin) if spin else None
 
 
-def _thrusts(facts: Facts) -> dict[str, float | None]:
+def thrusts(facts: Facts) -> dict[str, float | None]:
     """The thrust in N of each thruster of the file and its torquer; None where it is not known."""
     found: dict[str, float | None] = {}
     for index, _ in facts.children("thrusters"):
@@ -128,7 +128,7 @@ def _thrusts(facts: Facts) -> dict[str, float | None]:
 
 def _thruster_names(facts: Facts) -> Iterator[Finding]:
     """Tolerances of thrusters that the file does not have."""
-    known = list(_thrusts(facts))
+    known = list(thrusts(facts))
     for key in BY_THRUSTER:
         path: KeyPath = ("dispersions", key)
         node = facts.root.get(*path)
@@ -196,7 +196,7 @@ def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | No
 def _without_thrust(facts: Facts, entry: Entry) -> str | None:
     """A thruster that an absolute tolerance concerns and whose thrust is not known."""
     named = entry.path[2:]
-    for name, thrust in _thrusts(facts).items():
+    for name, thrust in thrusts(facts).items():
         if thrust is None and (not named or name == named[0]):
             return f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
     return None

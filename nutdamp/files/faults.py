@@ -15,6 +15,7 @@ from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import findings
 from nutdamp.files.sections import Problems, Section, section_of
 from nutdamp.files.settings import Setting, overlay
+from nutdamp.files.thrust_rules import thrust_findings
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 
@@ -32,7 +33,7 @@ def read_contents(
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root)]
+    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
     problems: Problems = []
     contents = SpacecraftFile.read(root.plain(), problems)
     judged = {finding.path for finding in found if not finding.at_key}

@@ -39,6 +39,7 @@ from nutdamp.files.quantities import (
 )
 from nutdamp.files.sections import Field, Length, Section
 from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
+from nutdamp.files.thrust_models import ColdSection, ImpulseBits, ValveSection
 
 
 def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
@@ -129,6 +130,17 @@ class ThrusterSection(Section):
     min_on_time: Time = Field(default=0.0, description="Shortest firing, s; default 0.", examples=["20 ms"])
     max_on_time: PositiveTime | None = Field(
         default=None, description="Longest firing, s; default: no limit.", examples=["2 s"]
+    )
+    valve: ValveSection | None = Field(
+        default=None,
+        description="How the thrust follows a command; default: that of the file, or full thrust at once.",
+        examples=[{"open_delay": "8 ms", "close_delay": "12 ms"}],
+    )
+    impulse_bit: ImpulseBits | None = Field(
+        default=None,
+        description="Instead of valve a table from tests: rows of on-time, s, impulse, N s, and its centroid after the "
+        "start of the command, s.",
+        examples=[[["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]]],
     )
 
 
@@ -304,6 +316,16 @@ class SpacecraftFile(Section):
     )
     steerable: SteerableSection | None = Field(
         default=None, description="A torquer for any transverse axis.", examples=[{"torque": "20 N m"}]
+    )
+    valve: ValveSection | None = Field(
+        default=None,
+        description="How the thrust of every thruster that does not say it itself follows a command.",
+        examples=[{"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"}],
+    )
+    cold: ColdSection | None = Field(
+        default=None,
+        description="Cold nozzles, which make the first pulses of each channel weaker.",
+        examples=[{"first": "90 %", "pulses": 4}],
     )
     disturbances: list[DisturbanceSection] = Field(
         default=[],

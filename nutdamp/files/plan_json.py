@@ -92,13 +92,19 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
 
 
 def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
-    """One pulse of ``body``; with an epoch ``utc`` is when it starts."""
-    utc = body.utc(pulse.start)
+    """One pulse of ``body``; with an epoch ``utc`` is when it starts.
+
+    Through a valve start and on-time are those of the command, and the effective ones are there too.
+    """
+    start, on_time = pulse.loaded
+    utc = body.utc(start)
+    effective = {"effective_start_s": pulse.start, "effective_on_time_s": pulse.on_time}
     return {
         "t_s": pulse.t,
-        "start_s": pulse.start,
+        "start_s": start,
         **({} if utc is None else {"utc": utc}),
-        "on_time_s": pulse.on_time,
+        "on_time_s": on_time,
+        **({} if pulse.command is None else effective),
         "channel": pulse.channel,
         "torque_Nm": None if pulse.torque is None else body.inertia.in_file(pulse.torque).tolist(),
         "impulse_Nms": body.inertia.in_file(pulse.impulse).tolist(),

@@ -8,20 +8,21 @@ the steerable torquer, and of channels that the file does not know, take their t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from nutdamp.epoch import Epoch
 from nutdamp.errors import nearest, printable
-from nutdamp.files.pulses_csv import HEADER, IMPULSE, TORQUE, UTC
+from nutdamp.files.pulses_csv import EFFECTIVE, HEADER, IMPULSE, TORQUE, UTC
 from nutdamp.files.table import Cells, Table
 from nutdamp.planning import Plan
 from nutdamp.remarks import broken_limits
-from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, overlapping
+from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, commanded, overlapping
 from nutdamp.schemes import SchemeOptions
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.supply import Supply
 from nutdamp.units import shown
 
 AGREES = 1e-6
@@ -35,7 +36,7 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
 
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
-    table = Table(path, (*HEADER, UTC), "pulses")
+    table = Table(path, (*HEADER, *EFFECTIVE, UTC), "pulses")
     return _Reader(table, spacecraft).read()
 
 
@@ -57,6 +58,7 @@ class _Reader:
     def __init__(self, table: Table, spacecraft: Spacecraft) -> None:
         self.table, self.spacecraft = table, spacecraft
         self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.commanded: dict[int, Cells] = {}  # of pulses of a channel of the file, by line
 
     def read(self) -> tuple[Schedule, list[str]]:
         header = self.table.header
@@ -69,7 +71,16 @@ class _Reader:
         for line, other in overlapping(pulses):
             self.table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
         self.table.check()
-        return Schedule(tuple(pulse for _, pulse in pulses)), self.table.warned
+        return Schedule(tuple(self._supplied(pulses))), self.table.warned
+
+    def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
+        """The pulses as strong as they are one after the other, compared with what their rows say."""
+        supply = Supply(self.spacecraft)
+        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda one: one[1].loaded[0]):
+            fired = supply.fire(pulse, self.channels.get(pulse.channel))
+            if line in self.commanded:
+                self._expect(line, self.commanded[line], fired)
+            yield fired
 
     def _instead(self, name: str) -> str:
         """The channel that a name not in the file may stand for, or all there are."""
@@ -95,17 +106,21 @@ class _Reader:
                 line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
             )
             return None
-        timing = self._timing(line, cells)
+        channel = self.channels.get(name)
+        timing = self._timing(line, cells, channel)
         if timing is None:
             return None
-        t, on_time = timing
-        channel = self.channels.get(name)
+        t, on_time, lead = timing
         if channel is not None and on_time > 0.0:
-            return self._of_channel(line, cells, channel_pulse(channel, t, on_time))
+            self.commanded[line] = cells
+            return channel_pulse(channel, t, on_time) if lead is None else commanded(channel, t - lead, on_time)
         return self._as_given(line, cells, name, t, on_time)
 
-    def _timing(self, line: int, cells: Cells) -> tuple[float, float] | None:
-        """Centre and on-time, s; the start rules where there is one."""
+    def _timing(self, line: int, cells: Cells, channel: Channel | None) -> tuple[float, float, float | None] | None:
+        """Centre and on-time, s; the start rules where there is one.
+
+        Through a valve the centre is the centroid of the thrust; how long it comes after the start is the third, s.
+        """
         column = next((column for column in STARTS if cells.get(column)), None)
         if column is None:
             self.table.fault(line, STARTS[0], "the time is missing")
@@ -116,32 +131,54 @@ class _Reader:
         if on_time < 0.0:
             self.table.fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
             return None
-        start = time if column == STARTS[0] else time - 0.5 * on_time
+        lead = None if channel is None or on_time == 0.0 else self._lead(line, channel, on_time)
+        centre = 0.5 * on_time if lead is None else lead
+        start = time if column == STARTS[0] else time - centre
         if start < -1e-9:
             self.table.fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
             return None
-        t = max(start, 0.0) + 0.5 * on_time if column == STARTS[0] else max(time, 0.5 * on_time)
+        t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
         if not Pulse(t, on_time, "", np.zeros(3)).resolved:
             step = math.ulp(t + 0.5 * on_time)
             self.table.fault(
                 line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart"
             )
             return None
-        self._compare(line, cells, (STARTS[1],), [t], f"start_s + on_time_s/2 = {t:g}", scale=max(t, on_time))
-        return t, on_time
+        meant = f"start_s + on_time_s/2 = {t:g}" if lead is None else f"the centroid of the thrust, {t:g}"
+        self._compare(line, cells, (STARTS[1],), [t], meant, scale=max(t, on_time))
+        return t, on_time, lead
 
-    def _of_channel(self, line: int, cells: Cells, pulse: Pulse) -> Pulse:
-        """A pulse of a channel of the spacecraft file, which says what it does."""
+    def _lead(self, line: int, channel: Channel, on_time: float) -> float | None:
+        """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
+        if channel.valve is None:
+            return None
+        least, most = channel.valve.known
+        if not least <= on_time <= most:
+            problem = f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {least:g} s to {most:g} s"
+            self.table.fault(line, "on_time_s", problem)
+        thrust = channel.valve.thrust(on_time)
+        if not thrust.ramps:
+            text = f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not open"
+            self.table.warn(line, f"closed {channel.name}", text)
+        return thrust.centroid
+
+    def _expect(self, line: int, cells: Cells, pulse: Pulse) -> None:
+        """Warn where the row of a pulse says something else than the spacecraft file, which says what it does."""
+        if pulse.torque is None:
+            return
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
-        assert pulse.torque is not None
         torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
         self._compare(line, cells, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
-        self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × on_time_s, {_vector(impulse)}")
+        length = "on_time_s" if pulse.command is None else "effective_on_time_s"
+        self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
         if pulse.propellant is not None:
             used = f"{pulse.propellant:g} by the spacecraft file"
             self._compare(line, cells, ("propellant_kg",), [pulse.propellant], used)
+        if pulse.command is not None:
+            meant = f"what the valve of {named} makes of the command"
+            for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
+                self._compare(line, cells, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)
         self._compare_dates(line, cells, pulse)
-        return pulse
 
     def _as_given(self, line: int, cells: Cells, name: str, t: float, on_time: float) -> Pulse | None:
         """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
@@ -227,7 +264,7 @@ class _Reader:
             self.table.warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
 
     def _compare_dates(self, line: int, cells: Cells, pulse: Pulse) -> None:
-        expected = self.spacecraft.utc(pulse.start)
+        expected = self.spacecraft.utc(pulse.loaded[0])
         if not cells.get(UTC) or expected is None:
             return
         try:

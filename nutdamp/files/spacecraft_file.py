@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import (
     Attitude,
     Channel,
+    Cold,
     Commands,
     Disturbance,
     Goal,
@@ -48,6 +50,10 @@ from nutdamp.spacecraft import (
     SunSensor,
     Thruster,
 )
+
+if TYPE_CHECKING:
+    from nutdamp.files.thrust_models import ValveSection
+    from nutdamp.physics.valve import Valve
 
 __all__ = ["load_spacecraft", "read_spacecraft"]
 
@@ -71,7 +77,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     contents = read_contents(text, name, settings, warn)
     inertia = _inertia(contents.inertia)
     omega0 = _rates(contents, inertia)
-    thrusters = {entry.name: _thruster(entry, inertia.axes) for entry in contents.thrusters}
+    thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     steerable = _steerable(contents.steerable)
     torquer = steerable if thrusters else steerable or Steerable()
@@ -92,6 +98,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
         orbit=_orbit(contents.orbit),
+        cold=None if contents.cold is None else Cold(contents.cold.first, contents.cold.pulses),
     )
     sunward = _sun(contents)
     return replace(
@@ -129,7 +136,8 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])
 
 
-def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
+def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None) -> Thruster:
+    """A thruster in principal axes; ``every`` is the valve of those that have none of their own."""
     force: Vector | None = None
     position: Vector | None = None
     if entry.torque is not None:
@@ -142,16 +150,38 @@ def _thruster(entry: ThrusterSection, axes: Vector) -> Thruster:
         thrust, force = entry.force, force_vector(entry.direction, entry.force)
         position = np.array(entry.position)
         torque = np.cross(position, force)
+    valve = _valve(entry, every, thrust)
+    least, most = entry.min_on_time, math.inf if entry.max_on_time is None else entry.max_on_time
+    if entry.impulse_bit is not None:  # outside its rows nothing is known
+        least, most = max(least, entry.impulse_bit[0][0]), min(most, entry.impulse_bit[-1][0])
     return Thruster(
         name=entry.name,
         torque=axes.T @ torque,
         force=None if force is None else axes.T @ force,
         thrust=thrust,
         isp=entry.isp,
-        min_on_time=entry.min_on_time,
-        max_on_time=math.inf if entry.max_on_time is None else entry.max_on_time,
+        min_on_time=least,
+        max_on_time=most,
         position=None if position is None else axes.T @ position,
+        valve=valve,
     )
+
+
+def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
+    """What a thruster of ``thrust`` N makes of commands; None where that is full thrust from start to end."""
+    if entry.impulse_bit is None and entry.valve is None and every is None:
+        return None
+    from nutdamp.physics import valve  # few files have any
+
+    if entry.impulse_bit is not None:
+        assert thrust is not None
+        return valve.Measured(
+            tuple((on_time, impulse / thrust, centroid) for on_time, impulse, centroid in entry.impulse_bit)
+        )
+    section = entry.valve or every
+    assert section is not None
+    times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
+    return valve.Trapezoid(*times, section.on_time_is == "effective") if any(times) else None
 
 
 def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:

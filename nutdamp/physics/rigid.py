@@ -87,19 +87,24 @@ def integrate(
     end: float,
     forcing: Forcing = NOTHING,
     most: int = MOST_STEPS,
+    slope: Array | None = None,
 ) -> list[Piece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
+    With a ``slope`` (3,) N m/s the torque is that at ``start`` and runs evenly from there. Raises Infeasible for
+    motions over more than `LONGEST` rad or ``most`` steps.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
+    jerk = None if slope is None else slope / inertia
+    if jerk is not None:
+        strength = max(strength, float(np.linalg.norm(acceleration + jerk * (end - start))))
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
-    if moments[0] == moments[1] and forcing.growth == 0.0 and not turned <= SHORT:
+    if moments[0] == moments[1] and forcing.growth == 0.0 and jerk is None and not turned <= SHORT:
         return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
     size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
@@ -113,7 +118,9 @@ def integrate(
         if not pace * left <= LONGEST:
             raise _too_long(now, end, pace * left)
         unit = 1.0 / pace if pace > 0.0 else left
-        series = _series(moments, acceleration, forcing, floor, now, np.concatenate([rates, quaternion]), unit)
+        state = np.concatenate([rates, quaternion])
+        here = acceleration if jerk is None else acceleration + jerk * gone
+        series = _series(moments, here, forcing, floor, now, state, unit, jerk)
         step = min(_reach(series, unit) * unit, left)
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
@@ -205,6 +212,7 @@ def _series(
     now: float,
     state: Array,
     unit: float,
+    jerk: Array | None = None,
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
@@ -227,6 +235,8 @@ def _series(
         following[2] = step * coupling[2] * w[0, 1]
         if k == 0:
             following[:3] += unit * acceleration
+        elif k == 1 and jerk is not None:
+            following[:3] += step * unit * jerk
         for index, (size, turn) in enumerate(turning):
             following[0] += step * size.real / first
             following[1] += step * size.imag / second

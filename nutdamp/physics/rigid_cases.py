@@ -58,16 +58,26 @@ class Bodies:
 class Pulses:
     """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
 
-    An on-time of 0 is an ideal impulse.
+    An on-time of 0 is an ideal impulse. With ``leans`` (k,) torques run evenly from 1 - lean times their mean to 1 +
+    lean times it.
     """
 
     starts: Array
     on_times: Array
     impulses: Array
+    leans: Array | None = None
 
     def some(self, cases: Any) -> Pulses:
         """Those of ``cases`` (an index of arrays)."""
-        return Pulses(self.starts[:, cases], self.on_times, self.impulses[:, :, cases])
+        return Pulses(self.starts[:, cases], self.on_times, self.impulses[:, :, cases], self.leans)
+
+    @property
+    def slopes(self) -> Array | None:
+        """Slope of each torque, (k, 3, n) N m/s; None where all keep even."""
+        if self.leans is None or not self.leans.any():
+            return None
+        lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
+        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None, None])
 
     @property
     def edges(self) -> Array:
@@ -80,9 +90,17 @@ class Pulses:
         ideal = self.on_times == 0.0
         torque = self.impulses / np.where(ideal, 1.0, self.on_times)[:, None, None]
         torque[ideal] = 0.0
+        if self.leans is not None:  # what begins at its first value, less than its mean, ends at its last
+            first, last = (1.0 - self.leans)[:, None, None] * torque, (1.0 + self.leans)[:, None, None] * torque
+            kick = np.where(ideal[:, None, None], self.impulses, 0.0)
+            return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
         kick = np.where(ideal[:, None, None], self.impulses, 0.0)
-        shape = (-1, *self.impulses.shape[1:])
-        return np.stack([torque, -torque], axis=1).reshape(shape), np.stack([kick, 0.0 * kick], axis=1).reshape(shape)
+        return _edgewise(torque, -torque), _edgewise(kick, 0.0 * kick)
+
+
+def _edgewise(begins: Array, ends: Array) -> Array:
+    """What is at begins and at ends (k, 3, n) in turn, (2k, 3, n)."""
+    return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
 
 
 def fly(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> tuple[Array, Array]:
@@ -123,12 +141,17 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) 
 
 def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, order: NDArray[np.intp]) -> None:
     """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
-    edges, (turns, kicks) = pulses.edges, pulses.jumps
+    edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
     now = np.zeros(rates.shape[1])
     on: set[int] = set()
     for edge in order.tolist():
         torque = np.sum(turns[sorted(on)], axis=0) if on else None
-        advance(bodies, rates, quaternion, now, edges[edge] - now, torque)
+        slope = None
+        if torque is not None and slopes is not None:
+            rising = [first // 2 for first in sorted(on)]
+            slope = np.sum(slopes[rising], axis=0)
+            torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
+        advance(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         if pulses.on_times[number] == 0.0:
@@ -145,24 +168,40 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -
     order = np.argsort(edges, axis=0, kind="stable")
     edges = np.take_along_axis(edges, order, axis=0)
     turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
+    slopes, slope = pulses.slopes, None
+    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), order[:, None, :], axis=0)
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
-    for edge, turn, kick in zip(edges, turns, kicks, strict=True):
-        advance(bodies, rates, quaternion, now, edge - now, torque)
+    for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
+        advance(bodies, rates, quaternion, now, edge - now, torque, slope)
+        torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
-        torque = torque + turn
+        if bends is not None:
+            slope = bends[number] if slope is None else slope + bends[number]
         rates += kick / bodies.moments
 
 
-def advance(bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, torque: Array | None) -> None:
-    """Move on by ``duration`` (n,) s from ``now`` under a ``torque`` (3, n) N m, in place; None is no torque."""
+def advance(
+    bodies: Bodies,
+    rates: Array,
+    quaternion: Array,
+    now: Array,
+    duration: Array,
+    torque: Array | None,
+    slope: Array | None = None,
+) -> None:
+    """Move on by ``duration`` (n,) s from ``now`` under a ``torque`` (3, n) N m, in place; None is no torque.
+
+    With a ``slope`` (3, n) N m/s it runs evenly from there.
+    """
     if not duration.any():
         return
     if torque is None and bodies.free:
         _arc(bodies.moments, bodies.forcing.growth, rates, quaternion, duration)
         return
     acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
-    _integrate(bodies, rates, quaternion, now, duration, acceleration)
+    jerk = None if slope is None or not slope.any() else slope / bodies.moments
+    _integrate(bodies, rates, quaternion, now, duration, acceleration, jerk)
 
 
 def cos_sin(angle: Any) -> tuple[Any, Any]:
@@ -229,14 +268,26 @@ def _product(left: Sequence[Array] | Array, right: Sequence[Array]) -> tuple[Arr
 
 
 def _integrate(
-    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, acceleration: Array
+    bodies: Bodies,
+    rates: Array,
+    quaternion: Array,
+    now: Array,
+    duration: Array,
+    acceleration: Array,
+    jerk: Array | None = None,
 ) -> None:
-    """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place."""
+    """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
+
+    With a ``jerk`` (3, n) rad/s³ the acceleration is that at ``now``.
+    """
     forcing, moments = bodies.forcing, bodies.moments
-    if len(now) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
+    if jerk is None and len(now) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
         _integrate_symmetric(bodies, rates, quaternion, now, duration, acceleration)
         return
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
+    if jerk is not None:
+        last = acceleration + jerk * duration
+        strength = np.maximum(strength, np.sqrt(np.sum(last * last, axis=0)))
     strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     pace = np.sqrt(np.sum(rates * rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
@@ -244,7 +295,9 @@ def _integrate(
     _expect_short(span)
     steps = max(1, math.ceil(span / STRIDE))
     for number in range(steps):
-        _step(bodies, rates, quaternion, now + duration * (number / steps), duration / steps, acceleration)
+        gone = duration * (number / steps)
+        here = acceleration if jerk is None else acceleration + jerk * gone
+        _step(bodies, rates, quaternion, now + gone, duration / steps, here, jerk)
 
 
 def _expect_short(span: float) -> None:
@@ -279,14 +332,22 @@ def _integrate_symmetric(
 
 
 def _step(
-    bodies: Bodies, rates: Array, quaternion: Array, now: Array, step: Array, acceleration: Array, halvings: int = 12
+    bodies: Bodies,
+    rates: Array,
+    quaternion: Array,
+    now: Array,
+    step: Array,
+    acceleration: Array,
+    jerk: Array | None = None,
+    halvings: int = 12,
 ) -> None:
     """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
-    series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration)
+    series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
     if series.converges():
         rates[:], quaternion[:] = series.end()
         return
     if halvings == 0:
         raise Infeasible(TOO_FAST)
     for begin in (0.0, 0.5):
-        _step(bodies, rates, quaternion, now + begin * step, 0.5 * step, acceleration, halvings - 1)
+        here = acceleration if jerk is None else acceleration + jerk * (begin * step)
+        _step(bodies, rates, quaternion, now + begin * step, 0.5 * step, here, jerk, halvings - 1)

@@ -32,10 +32,11 @@ class Series:
         now: Array,
         step: Array,
         acceleration: Array,
+        jerk: Array | None = None,
     ) -> None:
         first, second, third = moments
         count = len(step)
-        self.step, self.acceleration, self.moments = step, acceleration, moments
+        self.step, self.acceleration, self.jerk, self.moments = step, acceleration, jerk, moments
         self.coupling = np.stack([(second - third) / first, (third - first) / second, (first - second) / third])
         self.coupled = bool(self.coupling[2].any())
         self.rates = np.empty((LARGEST_ORDER + 1, 5, count))
@@ -44,7 +45,7 @@ class Series:
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
         self.sink = None if forcing.growth == 0.0 else _Sink(moments, forcing.growth, acceleration, rates, step)
         # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
-        self.even_spin = not self.coupled and self.sink is None
+        self.even_spin = not self.coupled and self.sink is None and jerk is None
         self.order = 0
 
     def converges(self) -> bool:
@@ -83,6 +84,8 @@ class Series:
         following[parts:] = 0.0
         if k == 0:
             following += self.acceleration
+        elif k == 1 and self.jerk is not None:
+            following += self.step * self.jerk
         for index, (size, turn) in enumerate(self.turning):
             following[0] += size.real / self.moments[0]
             following[1] += size.imag / self.moments[1]

@@ -13,7 +13,7 @@ from nutdamp import survey
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import degrees, duration, moment, quantity, vector
-from nutdamp.spacecraft import Channel, Spacecraft, SunSensor
+from nutdamp.spacecraft import Channel, Cold, Spacecraft, SunSensor
 from nutdamp.words import listed
 
 
@@ -26,6 +26,10 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
     turns = survey.turns(spacecraft)
     if turns:
         parts += [Text(), turns_table(turns)]
+    if any(channel.valve is not None for channel in spacecraft.channels):
+        parts += [Text(), valve_table(spacecraft)]
+    if spacecraft.cold is not None:
+        parts += [Text(), Text(_cold(spacecraft.cold))]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -122,6 +126,24 @@ def channel_table(spacecraft: Spacecraft) -> Table:
             degrees(steps.largest).removesuffix(" deg"),
         )
     return table
+
+
+def valve_table(spacecraft: Spacecraft) -> Table:
+    """What the shortest and the longest command of each channel give."""
+    names = ("channel\n", "on-time\ncommanded", "effective\non-time", "impulse\nN m s", "centroid after\nthe start")
+    table = columns(*names)
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for one in survey.acting(spacecraft):
+        times = (duration(time) for time in (one.on_time, one.effective))
+        alike.setdefault((*times, f"{one.impulse:.4g}", duration(one.centroid)), []).append(one.channel.name)
+    for cells, channels in alike.items():
+        table.add_row(", ".join(channels), *cells)
+    return table
+
+
+def _cold(cold: Cold) -> str:
+    levels = ", ".join(f"{100.0 * cold.factor(before):.4g}" for before in range(3))
+    return f"Cold nozzles: the first pulses of a channel have {levels} % … of the thrust."
 
 
 def _on_times(channel: Channel) -> str:

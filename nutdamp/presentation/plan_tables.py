@@ -258,17 +258,20 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
 def pulse_table(plan: Plan) -> Table:
     """One row a pulse: when, how long, which channel, and the nutation before and after.
 
-    With an epoch the start in UTC takes the room of the centre.
+    With an epoch the start in UTC takes the room of the centre. Through valves start and on-time are those of the
+    command, and the effective on-time stands beside it.
     """
     before, after = plan.flight.around_pulses()
     pulses, body = plan.pulses, plan.spacecraft
-    day, clocks = _clocks([body.utc(pulse.start, MILLISECONDS) for pulse in pulses])
+    loaded = [pulse.loaded for pulse in pulses]
+    day, clocks = _clocks([body.utc(start, MILLISECONDS) for start, _ in loaded])
     second = (f"UTC\n{day}", clocks) if clocks else ("centre\ns", [f"{pulse.t:.4f}" for pulse in pulses])
     cells: list[tuple[str, list[str]]] = [
         ("pulse\n", [str(index + 1) for index in range(len(pulses))]),
-        ("start\ns", [f"{pulse.start:.4f}" for pulse in pulses]),
+        ("start\ns", [f"{start:.4f}" for start, _ in loaded]),
         second,
-        ("on-time\ns", ["ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}" for pulse in pulses]),
+        ("on-time\ns", ["ideal" if on_time == 0.0 else f"{on_time:.4f}" for _, on_time in loaded]),
+        *([("effective\ns", [f"{pulse.on_time:.4f}" for pulse in pulses])] if pulses.through_valves else []),
         ("channel\n", [channel_text(pulse, body) for pulse in pulses]),
         ("impulse\nN m s", [f"{pulse.magnitude:.4g}" for pulse in pulses]),
         ("nutation\ndeg", [degrees(angle).removesuffix(" deg") for angle in before.nutation.tolist()]),

@@ -50,7 +50,7 @@ def _pulses(flight: Flight) -> Table:
     units = ("", "s", "s", "", "", "deg", "deg", "deg")
     table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
     for index, pulse in enumerate(flight.schedule):
-        on_time = "ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}"
+        on_time = "ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}"
         what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
         for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
             cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))

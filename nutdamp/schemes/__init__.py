@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, cast
@@ -49,6 +49,7 @@ __all__ = [
     "Scheme",
     "SchemeOptions",
     "alternatives",
+    "commanded",
     "options_of",
     "schedule",
 ]
@@ -81,6 +82,15 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     chosen = options_of(scheme, options)
     if scheme.on_true_body:
         return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
+    if not spacecraft.plain:
+        from nutdamp.schemes.tools import commanding
+
+        on_plain = commanding.options(spacecraft, chosen)
+        return commanding.planned(
+            spacecraft,
+            lambda body: schedule(name, body, on_plain),
+            _Correction(scheme, on_plain),
+        )
     model = model_of(spacecraft)
 
     def planned(body: Spacecraft) -> Schedule:
@@ -128,8 +138,26 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
         return []
     from nutdamp.schemes.tools.symmetric_model import model_of
 
-    chosen, model = options_of(scheme, options), model_of(spacecraft)
+    chosen = options_of(scheme, options)
+    if not spacecraft.plain:
+        from nutdamp.schemes.tools import commanding
+
+        found = alternatives(name, commanding.plain(spacecraft), commanding.options(spacecraft, chosen))
+        return [commanded(name, spacecraft, made, chosen) for made in found]
+    model = model_of(spacecraft)
     return [_corrected(scheme, model, made, chosen) for made in _loaded(scheme).alternatives(model.body, chosen)]
+
+
+def commanded(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
+    """A schedule ``made`` for the `commanding.plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+
+    Raises KeyError for a name not in `NAMES`.
+    """
+    from nutdamp.schemes.tools import commanding
+
+    scheme = SCHEMES[name]
+    chosen = commanding.options(spacecraft, options_of(scheme, options))
+    return commanding.commanded(spacecraft, made, _Correction(scheme, chosen))
 
 
 def _loaded(scheme: Scheme) -> ModuleType:
@@ -139,21 +167,37 @@ def _loaded(scheme: Scheme) -> ModuleType:
 
 def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
     """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
-    from nutdamp.schemes.tools import least_squares
-
     made = model.translate(made)
     if not model.exact:
         made = made.without_proof
     if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
         made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
-    if model.exact or options.uncorrected or not made.pulses:
-        return made
-    keeps = scheme.points and not options.frees_axis
-    # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-    chosen = tuple(range(-min(len(made), 4), 0)) if keeps else (-1,)
-    spin = scheme.sets_spin and model.spacecraft.goal.spin is not None
-    if spin:  # and the pulse that gives most to the spin
-        chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-    return least_squares.correct(
-        model.spacecraft, made, chosen=chosen, momentum=keeps, spin=spin, on_times=options.on_times
-    )
+    return made if model.exact else _Correction(scheme, options)(model.spacecraft, made)
+
+
+@dataclass(frozen=True, slots=True)
+class _Correction:
+    """Corrects schedules of a ``scheme`` on the motion of a true spacecraft."""
+
+    scheme: Scheme
+    options: SchemeOptions
+
+    @property
+    def momentum(self) -> bool:
+        """Whether H too is to end where it should."""
+        return self.scheme.points and not self.options.frees_axis
+
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = 4) -> Schedule:
+        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        from nutdamp.schemes.tools import least_squares
+
+        if self.options.uncorrected or not made.pulses:
+            return made
+        # The last pulses, which know what the others did on the model, undo what the true motion made of them.
+        chosen = tuple(range(-min(len(made), free), 0)) if self.momentum else (-1,)
+        spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
+        if spin and free == 4:  # and the pulse that gives most to the spin
+            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+        return least_squares.correct(
+            spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, on_times=self.options.on_times
+        )

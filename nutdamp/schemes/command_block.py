@@ -28,7 +28,7 @@ from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import CommandBlockOptions
 from nutdamp.schemes.tools.block_model import BlockModel, State, Trial
 from nutdamp.schemes.tools.reasons import no_channels
-from nutdamp.schemes.tools.sun_pulses import fired
+from nutdamp.schemes.tools.sun_pulses import ONLY_PLAIN, fired
 from nutdamp.spacecraft import Channel, Spacecraft
 
 Array = NDArray[np.float64]
@@ -101,6 +101,8 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     commands = spacecraft.commands
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file says nothing of commands: it needs the keys sun, sun_sensor and commands")
+    if not spacecraft.plain:
+        raise Infeasible(ONLY_PLAIN)
     steps = _steps(spacecraft, commands)
     spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     channels = usable(spacecraft)

@@ -53,7 +53,7 @@ thrusters:
   - {name: T1, torque: [0, 8, 0], isp: -1 s}
 channels: {a: [T9]}
 limits: {horizon: 10 s, earliest: 20 s, blackout: [[5 s, 2 s]]}
-colour: red
+paintwork: red
 """
     faults = faults_of(text)
     assert [(fault.line, fault.where) for fault in faults] == [
@@ -67,7 +67,7 @@ colour: red
         (8, "channels.a[0]"),
         (9, "limits.earliest"),
         (9, "limits.blackout[0]"),
-        (10, "colour"),
+        (10, "paintwork"),
     ]
 
 

@@ -96,14 +96,15 @@ def pulse_sheet(plan: Plan) -> Sheet:
     """One row a pulse: when, at what spin phase, how long, which channel, and the cones before and after."""
     flown, pulses, body = plan.flight, plan.pulses.pulses, plan.spacecraft
     tracks = flown.around_pulses()
-    phases = spin_phases(flown, np.array([pulse.start for pulse in pulses]))
-    dates = [body.utc(pulse.start, MILLISECONDS) for pulse in pulses]
+    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses]))
+    dates = [body.utc(pulse.loaded[0], MILLISECONDS) for pulse in pulses]
     columns: list[tuple[Column, list[str]]] = [
         (Column("pulse"), [str(index + 1) for index in range(len(pulses))]),
-        (Column("start", "s"), [f"{pulse.start:.4f}" for pulse in pulses]),
+        (Column("start", "s"), [f"{pulse.loaded[0]:.4f}" for pulse in pulses]),
         *([(Column("start", "UTC", number=False), [date or MISSING for date in dates])] if any(dates) else []),
         (Column("spin phase", "deg"), [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]),
-        (Column("on-time", "s"), ["ideal" if pulse.on_time == 0.0 else f"{pulse.on_time:.4f}" for pulse in pulses]),
+        (Column("on-time", "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]),
+        *([(Column("effective", "s"), [f"{one.on_time:.4f}" for one in pulses])] if plan.pulses.through_valves else []),
         (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
         (Column("impulse", "N m s"), [f"{pulse.magnitude:.4g}" for pulse in pulses]),
     ]

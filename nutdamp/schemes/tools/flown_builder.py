@@ -66,11 +66,11 @@ class FlownBuilder:
         base = self.now
         for pulse in pulses:
             self._before.append((self.now, self.here))
-            timed = replace(pulse, t=base + pulse.t)
-            self.here, steps = _after(self.here, replace(pulse, t=timed.t - self.now))
+            timed = pulse.moved(base)
+            self.here, steps = _after(self.here, timed.moved(-self.now))
             self.steps += steps
             self.pulses.append(timed)
-            self.now = timed.end
+            self.now = timed.over
 
     def correct(self, last: int, on_times: tuple[float, float] = ANY_ON_TIME) -> None:
         """Correct the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
@@ -81,7 +81,7 @@ class FlownBuilder:
         if last == 0:
             return
         self.now, self.here = self._before[-last]
-        made = Schedule(tuple(replace(pulse, t=pulse.t - self.now) for pulse in self.pulses[-last:]))
+        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-last:]))
         del self.pulses[-last:], self._before[-last:]
         self.fire(least_squares.correct(self.here, made, chosen=range(last), momentum=True, on_times=on_times))
 
@@ -99,7 +99,7 @@ def tolerable(spacecraft: Spacecraft) -> float:
 def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
     """The spacecraft as it is when ``pulse`` ends, with its time counted from there; and the steps that it took."""
     flown = flight.flown(spacecraft, Schedule((pulse,)))
-    settled, since, limits = flown.settled, pulse.end, spacecraft.limits
+    settled, since, limits = flown.settled, pulse.over, spacecraft.limits
     to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)
     given = spacecraft.attitude or Attitude(settled.quaternion)
     after = replace(

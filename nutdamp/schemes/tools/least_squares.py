@@ -13,12 +13,13 @@ import numpy as np
 
 from nutdamp import flight, work
 from nutdamp.dynamics import make_dynamics
-from nutdamp.limits import channel_of, commandable, keeps_limits, longest_on_time
+from nutdamp.limits import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import ANY_ON_TIME
 from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.supply import supplied
 
 CONVERGED = 1e-14
 """rad; a few roundings of the integration."""
@@ -124,9 +125,8 @@ def correct(
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends[:-1])
-        return Schedule(
-            (*kept, *(one.turn(part) for one, part in zip(pulses, parts, strict=True))), made.notes, made.bounds
-        )
+        fired = (*kept, *(one.turn(part) for one, part in zip(pulses, parts, strict=True)))
+        return Schedule(supplied(spacecraft, fired), made.notes, made.bounds)
 
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
@@ -141,7 +141,8 @@ def correct(
         np.concatenate([getattr(one, name) for one in pulses]) for name in ("start", "scale", "lower", "upper")
     )
     x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED or work.exhausted())
-    corrected = Schedule(tuple(commandable(spacecraft, pulse) for pulse in build(x)), made.notes, made.bounds)
+    rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
+    corrected = Schedule(rounded, made.notes, made.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
 
@@ -150,15 +151,15 @@ class _Movable:
     """What can be turned of a pulse: (start, on-time) of a channel, (start, impulse, angle) of a steerable torquer."""
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, on_times: tuple[float, float]) -> None:
-        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest
-        latest = max(spacecraft.horizon - pulse.on_time, pulse.start)
+        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
+        latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
         self.channel = channel_of(spacecraft, pulse)
         self.torquer = spacecraft.torquer
         if self.channel is not None:
             self.start = np.array([pulse.start, pulse.on_time])
             self.scale = np.array([pace, pulse.on_time])
             longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
-            self.lower = np.array([earliest, max(self.channel.min_on_time, on_times[0])])
+            self.lower = np.array([earliest, max(effective_on_times(self.channel)[0], on_times[0])])
             self.upper = np.array([latest, min(longest, on_times[1])])
         else:
             self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])

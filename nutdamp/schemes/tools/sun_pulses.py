@@ -30,6 +30,9 @@ EXACT = 1e-13
 FIRED = 1.0
 """Units of `work` of a pulse that is fired."""
 
+ONLY_PLAIN = "command blocks are planned and fired for full thrust at once: leave valve, impulse_bit and cold out"
+"""Why there are none for a spacecraft with valves or cold nozzles."""
+
 
 def spin_turn(spacecraft: Spacecraft) -> float:
     """Time between two Sun pulses, s: the average one of the free motion.
@@ -119,6 +122,8 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
     where there is no Sun pulse, where a channel is not known, and where a pulse would begin before the one before is
     over.
     """
+    if not spacecraft.plain:
+        raise Infeasible(ONLY_PLAIN)
     channels = {channel.name: channel for channel in spacecraft.channels}
     clock, sensor, errors = sun_clock(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter = 0.0 if seed is None or sensor is None else sensor.jitter

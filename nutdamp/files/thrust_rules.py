@@ -1,0 +1,118 @@
+"""What must hold between the keys of a spacecraft file that say what thrusters make of commands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from nutdamp.files.dispersion_rules import thrusts
+from nutdamp.files.facts import Facts, Finding
+from nutdamp.files.yaml_tree import KeyPath, Node
+
+VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
+
+THRUST_KEYS = ("valve", "cold")
+"""At the root of the file."""
+
+
+def thrust_findings(root: Node) -> Iterator[Finding]:
+    """Everything wrong with ``valve``, ``impulse_bit`` and ``cold``."""
+    facts = Facts(root)
+    thrusters = [index for index, _ in facts.children("thrusters")]
+    for key in THRUST_KEYS:
+        if facts.has(key) and not thrusters:
+            yield Finding((key,), "is of thrusters, and the file has none; leave it out", True)
+    named = thrusts(facts)
+    for index in thrusters:
+        path: KeyPath = ("thrusters", index)
+        if facts.has(*path, "valve") and facts.has(*path, "impulse_bit"):
+            yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
+        valve = _valve_path(facts, path)
+        if valve is not None:
+            yield from _opens(facts, path, valve)
+        elif facts.has(*path, "impulse_bit"):
+            yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
+    yield from _alike(facts)
+
+
+def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
+    """Where the valve of a thruster is: its own, or that of all."""
+    if facts.has(*path, "valve"):
+        return (*path, "valve")
+    return ("valve",) if facts.has("valve") and not facts.has(*path, "impulse_bit") else None
+
+
+def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
+    """A valve that closes before it opens, whatever the command."""
+    opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
+    longest = facts.number("time", *path, "max_on_time")
+    if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
+        problem = (
+            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s: the valve closes "
+            "before it opens, and no command gives thrust"
+        )
+        yield Finding((*valve, "open_delay"), problem)
+
+
+def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Finding]:
+    """What is wrong with an impulse_bit; ``thrust`` N, None where it is not known."""
+    table: KeyPath = (*path, "impulse_bit")
+    rows = [
+        [facts.number(kind, *table, row, column) for column, kind in enumerate(("time", "impulse", "time"))]
+        for row, _ in facts.children(*table)
+    ]
+    for number, (before, row) in enumerate(pairwise(rows), start=1):
+        for column, what, unit in ((0, "on-time", "s"), (1, "impulse", "N s")):
+            value, last = row[column], before[column]
+            if value is not None and last is not None and value <= last:
+                problem = f"{what} {value:g} {unit} is not above that of the row before, {last:g} {unit}"
+                yield Finding((*table, number, column), f"{problem}; expected rows with rising on-times and impulses")
+    if thrust is None:
+        if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
+            return  # what cannot be read is said already
+        yield Finding(table, "needs the thrust; give lever_arm", True)
+        return
+    for number, (on_time, impulse, centroid) in enumerate(rows):
+        if on_time is None or impulse is None or centroid is None:
+            continue
+        lasts = impulse / thrust
+        if centroid < 0.5 * lasts:
+            problem = (
+                f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the thrust "
+                f"would begin before the command; expected at least {0.5 * lasts:g} s"
+            )
+            yield Finding((*table, number, 2), problem)
+    first, last = (rows[0][0], rows[-1][0]) if rows else (None, None)
+    least, most = (facts.number("time", *path, key) for key in ("min_on_time", "max_on_time"))
+    if last is not None and least is not None and least >= last:
+        yield Finding((*path, "min_on_time"), f"{least:g} s is not below the last on-time of impulse_bit, {last:g} s")
+    if first is not None and most is not None and most <= first:
+        yield Finding((*path, "max_on_time"), f"{most:g} s is not above the first on-time of impulse_bit, {first:g} s")
+
+
+def _alike(facts: Facts) -> Iterator[Finding]:
+    """Thrusters of one channel that make different pulses of a command."""
+    kinds = {facts.text("thrusters", index, "name"): _kind(facts, index) for index, _ in facts.children("thrusters")}
+    for channel, node in facts.children("channels"):
+        members = [str(entry.value) for _, entry in node.children() if entry.value in kinds]
+        other = next((name for name in members if kinds[name] != kinds[members[0]]), None)
+        if other is not None:
+            problem = f"{members[0]} and {other} make different pulses of a command, by valve or impulse_bit"
+            yield Finding(("channels", channel), f"{problem}; let them fire in channels of their own")
+
+
+def _kind(facts: Facts, index: str | int) -> tuple[float | str | None, ...]:
+    """What a thruster makes of a command, to be compared."""
+    path: KeyPath = ("thrusters", index)
+    valve = _valve_path(facts, path)
+    if valve is not None:
+        times = tuple(facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES)
+        return (*times, facts.text(*valve, "on_time_is") or "command")
+    thrust = thrusts(facts).get(facts.text(*path, "name") or "") or math.inf
+    cells: list[float | str | None] = []
+    for row, _ in facts.children(*path, "impulse_bit"):
+        impulse = facts.number("impulse", *path, "impulse_bit", row, 1)
+        cells += [facts.number("time", *path, "impulse_bit", row, column) for column in (0, 2)]
+        cells.append(None if impulse is None else round(impulse / thrust, 12))
+    return tuple(cells) if cells else (*(0.0,) * len(VALVE_TIMES), "command")

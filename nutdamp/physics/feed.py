@@ -1,0 +1,54 @@
+"""What thrust depends on besides commands: how cold the nozzle is, and the pressure in the tank."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Cold:
+    """The first pulse of each channel has ``first`` times the thrust; over ``pulses`` of them this decays to one."""
+
+    first: float
+    pulses: float
+
+    def factor(self, before: int) -> float:
+        """Of the pulse that comes after so many ``before`` it: 1 - (1 - first) exp(-k/pulses)."""
+        return 1.0 - (1.0 - self.first) * math.exp(-before / self.pulses)
+
+
+@dataclass(frozen=True, slots=True)
+class Tank:
+    """A tank in blowdown: ``propellant`` kg, ``pressure`` at t = 0 and ``final_pressure`` Pa with nothing left.
+
+    Thrust goes with the pressure to the power ``exponent``. ``isp`` are rows of pressure, Pa, rising, and specific
+    impulse, s, between which it runs evenly; None leaves it to the thrusters.
+    """
+
+    propellant: float
+    pressure: float
+    final_pressure: float
+    exponent: float
+    isp: tuple[tuple[float, float], ...] | None = None
+
+    def pressure_after(self, used: float) -> float:
+        """Pressure (Pa) of the gas once so many kg are ``used``.
+
+        At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
+        V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
+        """
+        return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
+
+    def thrust_factor(self, used: float) -> float:
+        """Thrust over that at t = 0."""
+        return float((self.pressure_after(used) / self.pressure) ** self.exponent)
+
+    def isp_after(self, used: float) -> float | None:
+        """Specific impulse, s; None where the thrusters have their own."""
+        if self.isp is None:
+            return None
+        pressures, values = zip(*self.isp, strict=True)
+        return float(np.interp(self.pressure_after(used), pressures, values))

@@ -1,0 +1,180 @@
+"""Plans through valves: schemes lay rectangular pulses, and here they become the commands that give them.
+
+What a command gives is known by its effective on-time and the centroid of its thrust (`physics.valve`). So schemes plan
+for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
+limits that leave room for the delays. Each of its pulses becomes the command with the same impulse and centroid, cold
+and blowdown included; what the shape of the thrust changes besides is corrected on the flown motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from nutdamp.errors import Infeasible, TooShort
+from nutdamp.limits import commandable, effective_on_times, keeps_limits
+from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schemes.options import SchemeOptions
+from nutdamp.schemes.tools.least_squares import misses
+from nutdamp.spacecraft import Channel, Limits, Spacecraft
+from nutdamp.supply import Supply, supplied
+
+EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
+"""What the reasons of schemes, which know nothing of valves, are about."""
+
+PLANS = 4
+"""Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
+
+TAIL = 4
+"""Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
+
+
+def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0) -> Spacecraft:
+    """The body that schemes plan for: rectangles of full thrust at any time, that the channels can really give.
+
+    Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file.
+    """
+    lead, lag = _reaches(spacecraft)
+    limits = spacecraft.limits
+    return replace(
+        spacecraft,
+        channels=tuple(_plain(channel, weakest, strongest) for channel in spacecraft.channels),
+        cold=None,
+        tank=None,
+        limits=Limits(
+            horizon=spacecraft.horizon - lag,
+            earliest=limits.earliest + lead,
+            gap=limits.gap + lead + lag,
+            max_pulses=limits.max_pulses,
+            blackout=tuple((max(begins - lag, 0.0), ends + lead) for begins, ends in limits.blackout),
+        ),
+    )
+
+
+def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
+    """How long before and after the rectangle a command and its thrust may last, s, whichever the channel."""
+    found = [one.valve.reaches(*effective_on_times(one)) for one in spacecraft.channels if one.valve is not None]
+    return max((lead for lead, _ in found), default=0.0), max((lag for _, lag in found), default=0.0)
+
+
+def _plain(channel: Channel, weakest: float, strongest: float) -> Channel:
+    least, most = effective_on_times(channel)
+    least, most = least * max(strongest, 1.0), most * min(weakest, 1.0)
+    return replace(
+        channel,
+        thrusters=tuple(replace(one, valve=None, min_on_time=least, max_on_time=most) for one in channel.thrusters),
+    )
+
+
+def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
+    """The options of a scheme for the plain body: an on-time that is requested is a command.
+
+    Raises Infeasible where the channels make different pulses of it.
+    """
+    requested = getattr(chosen, "on_time", None)
+    if requested is None:
+        return chosen
+    found = {requested if one.valve is None else one.valve.thrust(requested).on_time for one in spacecraft.channels}
+    if len(found) > 1:
+        raise Infeasible(
+            f"an on-time of {requested:.4g} s is for channels with the same valve; these give pulses of different "
+            "length"
+        )
+    return replace(chosen, on_time=found.pop()) if found else chosen  # type: ignore[call-arg]
+
+
+class Correct(Protocol):
+    """Corrects a schedule on the flown motion of a body; ``momentum``: H too is to end where it should."""
+
+    @property
+    def momentum(self) -> bool:
+        """Whether more than the nutation counts."""
+        ...
+
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:
+        """The schedule with no more than the last ``free`` pulses moved."""
+        ...
+
+
+def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
+    """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `commanded`."""
+    weakest = strongest = 1.0
+    for _ in range(PLANS):
+        try:
+            made = plan(plain(spacecraft, weakest, strongest))
+        except TooShort as short:
+            raise TooShort(short.why + EFFECTIVE, short.cure) from None
+        except Infeasible as reason:
+            raise Infeasible(f"{reason}{EFFECTIVE}") from None
+        levels = _levels(spacecraft, made)
+        if weakest <= min(levels, default=1.0) and max(levels, default=1.0) <= strongest:
+            break
+        weakest, strongest = min([weakest, *levels]), max([strongest, *levels])
+    return commanded(spacecraft, made, correct)
+
+
+def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
+    """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
+
+    Raises Infeasible where the propellant does not last.
+    """
+    first = replace(made.without_proof, pulses=_translated(spacecraft, made))
+    tank = spacecraft.tank
+    if tank is not None and (first.propellant or 0.0) > tank.propellant:
+        raise Infeasible(f"takes {first.propellant:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
+    if spacecraft.limits.tick is None or not first.pulses:
+        return correct(spacecraft, first, TAIL)
+    return _on_ticks(spacecraft, first, correct)
+
+
+def _translated(spacecraft: Spacecraft, made: Schedule) -> tuple[Pulse, ...]:
+    """Each pulse as the command that has its impulse and its centroid."""
+    supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
+    for pulse in made:
+        channel = channels.get(pulse.channel)
+        if channel is not None:
+            on_time = pulse.on_time / supply.level(channel.name)
+            pulse = supply.fire(channel_pulse(channel, pulse.t, on_time), channel)
+        pulses.append(pulse)
+    return tuple(pulses)
+
+
+def _levels(spacecraft: Spacecraft, made: Schedule) -> list[float]:
+    """How strong each pulse of a channel is, over the thrust of the file."""
+    channels = {one.name: one for one in spacecraft.channels}
+    return [
+        float(np.linalg.norm(pulse.torque) / np.linalg.norm(channels[pulse.channel].torque))
+        for pulse in _translated(spacecraft, made)
+        if pulse.torque is not None and pulse.channel in channels
+    ]
+
+
+def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
+    """The schedule on the ticks of its commands.
+
+    It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves
+    less is taken.
+    """
+    smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
+    made = correct(smooth, made, TAIL)
+
+    def rounded(one: Schedule, count: int) -> Schedule:
+        """With the first ``count`` pulses on ticks."""
+        pulses = (commandable(spacecraft, pulse) if index < count else pulse for index, pulse in enumerate(one))
+        return replace(one, pulses=supplied(spacecraft, pulses))
+
+    in_turn = made
+    for behind in range(min(TAIL, len(made)) - 1, 0, -1):
+        in_turn = correct(smooth, rounded(in_turn, len(made) - behind), behind)
+    found = [rounded(one, len(made)) for one in (made, in_turn)]
+    kept = [one for one in found if keeps_limits(spacecraft, one.pulses)] or found
+    aimed = correct.momentum
+
+    def left(one: Schedule) -> float:
+        missed = misses(spacecraft, one)
+        return float(np.linalg.norm(missed if aimed else missed[:2]))
+
+    return min(kept, key=left)

@@ -1,0 +1,92 @@
+"""How strong each pulse of a schedule is: cold nozzles and falling pressure, pulse after pulse."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from nutdamp.actuators import STANDARD_GRAVITY
+from nutdamp.schedule import Pulse, Schedule, commanded
+from nutdamp.spacecraft import Channel, Spacecraft
+
+
+@dataclass(eq=False)
+class Supply:
+    """What has been fired so far: pulses by channel, and propellant, kg."""
+
+    spacecraft: Spacecraft
+    fired: Counter[str] = field(default_factory=Counter)
+    used: float = 0.0
+
+    @property
+    def steady(self) -> bool:
+        """Whether every pulse is as strong as the file says."""
+        return self.spacecraft.cold is None and self.spacecraft.tank is None
+
+    def level(self, channel: str) -> float:
+        """Thrust of the next pulse of ``channel``, over that of the file."""
+        cold, tank = self.spacecraft.cold, self.spacecraft.tank
+        level = 1.0 if cold is None else cold.factor(self.fired[channel])
+        return level if tank is None else level * tank.thrust_factor(min(self.used, tank.propellant))
+
+    def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
+        """The pulse as strong as it really is, taken into account for those after it."""
+        if channel is None or pulse.torque is None or self.steady:
+            return pulse
+        level, tank = self.level(channel.name), self.spacecraft.tank
+        isp = None if tank is None else tank.isp_after(min(self.used, tank.propellant))
+        flow = channel.mass_flow
+        if flow is not None and isp is not None and all(one.thrust is not None for one in channel.thrusters):
+            flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
+        propellant = None if flow is None else flow * pulse.on_time * level
+        torque, force = channel.torque * level, channel.force
+        self.fired[channel.name] += 1
+        self.used += propellant or 0.0
+        return replace(
+            pulse,
+            torque=torque,
+            impulse=torque * pulse.on_time,
+            force=None if force is None else force * level,
+            propellant=propellant,
+        )
+
+
+def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:
+    """The ``pulses`` as strong as they really are, in the order of their commands."""
+    supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
+    if supply.steady:
+        return tuple(pulses)
+    ordered = sorted(pulses, key=lambda pulse: pulse.loaded[0])
+    return tuple(supply.fire(pulse, channels.get(pulse.channel)) for pulse in ordered)
+
+
+VALVES, COLD, BLOWDOWN = "valves", "cold pulses", "blowdown"
+
+
+def thrust_laws(spacecraft: Spacecraft) -> Iterator[str]:
+    """What lets commands of a spacecraft give something else than rectangles of the thrust of the file, in words."""
+    if any(channel.valve is not None for channel in spacecraft.channels):
+        yield VALVES
+    if spacecraft.cold is not None:
+        yield COLD
+    if spacecraft.tank is not None:
+        yield BLOWDOWN
+
+
+def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
+    """The body without one ``law`` of `thrust_laws`, and what the commands of ``schedule`` give then."""
+    if law == VALVES:
+        channels = tuple(
+            replace(channel, thrusters=tuple(replace(one, valve=None) for one in channel.thrusters))
+            for channel in spacecraft.channels
+        )
+        body = replace(spacecraft, channels=channels)
+    else:
+        body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=None)
+    known = {channel.name: channel for channel in body.channels}
+    fired = [
+        commanded(known[pulse.channel], *pulse.loaded) if pulse.channel in known and pulse.torque is not None else pulse
+        for pulse in schedule
+    ]
+    return body, Schedule(supplied(body, fired))

@@ -1,0 +1,217 @@
+"""Plans through valves: what is commanded, flown by an integrator that knows nothing but the level of the thrust."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference
+from builders import aimed, channel, cross, spinner
+
+from nutdamp import planning
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.flown import RealWidths
+from nutdamp.dispersion.kernel import ClosedForm
+from nutdamp.flight import by_impulses, flown
+from nutdamp.limits import breaches
+from nutdamp.physics.feed import Cold
+from nutdamp.physics.valve import Measured, Trapezoid, Valve
+from nutdamp.remarks import infeasibility
+from nutdamp.schedule import Schedule, commanded
+from nutdamp.schemes.options import FourPulseOptions, RhumbLineOptions
+from nutdamp.spacecraft import Channel, Limits, Spacecraft
+from nutdamp.verification import verify
+
+MICRODEGREE = math.radians(1e-6)
+
+LATE = Trapezoid(0.015, 0.015)
+SLOW = Trapezoid(0.015, 0.012, 0.005, 0.010)
+EFFECTIVE = replace(SLOW, effective=True)
+MEASURED = Measured(((0.005, 0.003, 0.009), (0.02, 0.017, 0.02), (0.05, 0.049, 0.037), (0.9, 0.902, 0.465)))
+VALVES = {"late": LATE, "slow": SLOW, "effective": EFFECTIVE, "measured": MEASURED}
+
+
+def through(valve: Valve | None, body: Spacecraft) -> Spacecraft:
+    """The body with this valve on all its thrusters."""
+
+    def with_valve(one: Channel) -> Channel:
+        return replace(one, thrusters=tuple(replace(thruster, valve=valve) for thruster in one.thrusters))
+
+    return replace(body, channels=tuple(map(with_valve, body.channels)))
+
+
+def short_pulses(degrees: float = 0.4, *, axial: float = 0.0, longest: float = 0.05) -> Spacecraft:
+    """Pulses of about 50 ms across a body at 30 rpm."""
+    torques = ((8.0, 0.0), (-8.0, 0.0), (0.0, 8.0), (0.0, -8.0))
+    channels = tuple(
+        channel(f"C{number}", *torque, axial, min_on_time=0.005, max_on_time=longest, isp=220.0, thrust=10.0)
+        for number, torque in enumerate(torques)
+    )
+    return spinner(spin=math.pi, degrees=degrees, channels=channels, limits=Limits(horizon=200.0))
+
+
+CASES = {
+    "one-pulse": short_pulses(),
+    "one-pulse, axial torque": short_pulses(axial=0.3),
+    "two-pulse": spinner(degrees=2.0, channels=cross(8.0, max_on_time=0.9), limits=Limits(horizon=200.0)),
+    "four-pulse": short_pulses(),
+    "rhumb-line": aimed(short_pulses(0.0), 1.0, 40.0),
+    "optimal": short_pulses(),
+}
+"""The scheme up to the comma, and a body in which it leaves no nutation."""
+
+
+def levels(made: Schedule, body: Spacecraft) -> Iterable[reference.Swell]:
+    """The thrust of commands through the valves of `Trapezoid`, from start and on-time as loaded alone."""
+    channels = {one.name: one for one in body.channels}
+    for pulse in made:
+        valve = channels[pulse.channel].valve
+        assert isinstance(valve, Trapezoid)
+        assert pulse.torque is not None
+        start, on_time = pulse.loaded
+        yield from reference.through_valve(
+            start,
+            on_time,
+            pulse.torque,
+            opening=valve.open_delay,
+            closing=valve.close_delay,
+            rise=valve.rise_time,
+            fall=valve.fall_time,
+        )
+
+
+def left(made: Schedule, body: Spacecraft) -> float:
+    """What commands leave, rad, by the reference: nutation, or with a target the way to it, whichever is more."""
+    moments = body.inertia.moments
+    motion = reference.fly(moments, body.omega0, levels(made, body), made.end + 0.01)
+    nutation = reference.nutation(moments, motion.rates, 1.0)
+    if body.goal.axis is None:
+        return nutation
+    return max(nutation, reference.angle(reference.momentum(moments, motion), body.goal.axis))
+
+
+def made_by(scheme: str, body: Spacecraft) -> Schedule:
+    found = planning.plan(body, scheme.partition(",")[0])
+    assert found.feasible, infeasibility(found)
+    assert found.flown is not None
+    assert found.flown.nutation < MICRODEGREE
+    assert list(breaches(body, found.pulses)) == []
+    return found.pulses
+
+
+@pytest.mark.parametrize("valve", [LATE, SLOW], ids=["late", "slow"])
+@pytest.mark.parametrize("scheme", CASES)
+def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, valve: Trapezoid) -> None:
+    body = CASES[scheme]
+    late = through(valve, body)
+    made = made_by(scheme, late)
+    assert left(made, late) < MICRODEGREE
+    channels = {one.name: one for one in late.channels}
+    unaware = made_by(scheme, body)
+    fired = Schedule(tuple(commanded(channels[one.channel], *one.loaded) for one in unaware))
+    assert left(fired, late) > 1000.0 * MICRODEGREE
+
+
+@pytest.mark.parametrize("valve", VALVES.values(), ids=VALVES)
+@pytest.mark.parametrize("scheme", CASES)
+def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valve) -> None:
+    body = through(valve, CASES[scheme])
+    made = made_by(scheme, body)
+    assert by_impulses(body, made).residual.nutation < MICRODEGREE
+    some = Schedule(made.pulses[:-1])  # so that much is left to compare
+    nominal = flown(body, some).residual.nutation
+    assert nominal > 100.0 * MICRODEGREE
+    assert by_impulses(body, some).residual.nutation == pytest.approx(nominal, abs=1e-13)
+    model = Model(body, some)
+    for fly in (RealWidths(model), ClosedForm(model)):
+        ends = fly(model.cases({"timing pulse 1": np.zeros(3)}))
+        across = np.hypot(ends.momentum[0], ends.momentum[1])
+        allowed = 1e-13 if isinstance(fly, RealWidths) else 1e-8
+        assert np.arctan2(across, ends.momentum[2]) == pytest.approx(nominal, abs=allowed)
+
+
+def test_commands_are_those_of_the_valve_and_effective_ones_of_the_impulse() -> None:
+    for valve in (SLOW, EFFECTIVE):
+        made = made_by("optimal", through(valve, short_pulses()))
+        for pulse in made:
+            start, on_time = pulse.loaded
+            acts = valve.thrust(on_time)
+            assert pulse.on_time == pytest.approx(acts.on_time, rel=1e-12)
+            assert pulse.t == pytest.approx(start + acts.centroid, rel=1e-12)
+            assert 0.005 <= on_time <= 0.05
+            assert pulse.torque is not None
+            assert pulse.impulse == pytest.approx(pulse.torque * pulse.on_time)
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", "optimal"])
+def test_ticks_are_those_of_the_command(scheme: str) -> None:
+    body = through(SLOW, short_pulses())
+    body = replace(body, limits=replace(body.limits, tick=0.001))
+    made = planning.plan(body, scheme)
+    assert made.feasible, infeasibility(made)
+    for pulse in made.pulses:
+        for time in pulse.loaded:
+            assert time / 0.001 == pytest.approx(round(time / 0.001), abs=1e-6)
+    assert left(made.pulses, body) < math.radians(0.02)
+
+
+def test_limits_hold_for_the_command_and_until_the_thrust_is_over() -> None:
+    body = through(Trapezoid(0.1, 0.2, 0.05, 0.3), short_pulses(2.0))
+    limits = Limits(horizon=60.0, earliest=1.0, gap=0.4, blackout=((4.0, 6.0), (9.0, 9.5)))
+    body = replace(body, limits=limits)
+    for scheme in ("one-pulse", "four-pulse"):
+        made = planning.plan(body, scheme)
+        assert made.feasible, infeasibility(made)
+        over = -math.inf
+        for pulse in made.pulses:
+            start, ends = pulse.loaded[0], pulse.thrust[1]
+            assert start >= max(1.0, over + 0.4) - 1e-9
+            assert ends <= 60.0
+            assert all(ends <= begin + 1e-9 or start >= end - 1e-9 for begin, end in limits.blackout)
+            over = ends
+
+
+def test_a_requested_on_time_is_a_command() -> None:
+    body = through(SLOW, short_pulses())
+    found = planning.plan(body, "four-pulse", FourPulseOptions(on_time=0.03))
+    assert [pulse.loaded[1] for pulse in found.pulses][:-1] == pytest.approx([0.03] * (len(found.pulses) - 1))
+    train = planning.plan(
+        aimed(through(SLOW, short_pulses(0.0)), 1.0, 40.0), "rhumb-line", RhumbLineOptions(on_time=0.03)
+    )
+    assert train.feasible, infeasibility(train)
+    on_times = [pulse.loaded[1] for pulse in train.pulses]
+    assert on_times[:9] == pytest.approx([0.03] * 9, rel=1e-9)
+    assert all(0.027 - 0.0005 <= on_time <= 0.033 + 1e-9 for on_time in on_times)  # what closes the train differs
+
+
+@pytest.mark.parametrize("valve", [None, SLOW], ids=["cold alone", "through valves"])
+@pytest.mark.parametrize("scheme", CASES)
+def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
+    cold = Cold(0.9, 4.0)
+    body = replace(through(valve, CASES[scheme]), cold=cold)
+    made = made_by(scheme, body)
+    fired: dict[str, int] = {}
+    channels = {one.name: one for one in body.channels}
+    for pulse in made:
+        before = fired.setdefault(pulse.channel, 0)
+        assert pulse.torque == pytest.approx(cold.factor(before) * channels[pulse.channel].torque, rel=1e-12)
+        fired[pulse.channel] += 1
+    if valve is not None:
+        assert left(made, body) < MICRODEGREE
+    model = Model(body, made)
+    ends = RealWidths(model)(model.cases({"timing pulse 1": np.zeros(2)}))
+    assert np.hypot(ends.momentum[0], ends.momentum[1]) / ends.momentum[2] == pytest.approx(0.0, abs=MICRODEGREE)
+
+
+def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
+    body = replace(through(SLOW, short_pulses()), cold=Cold(0.9, 4.0))
+    made = made_by("optimal", body)
+    found = verify(body, made)
+    budget = {row.name: row.nutation for row in found.budget}
+    assert found.agree
+    assert budget["all: as flown"] < MICRODEGREE
+    assert budget["without valves"] > 1000.0 * MICRODEGREE
+    assert budget["without cold pulses"] > 1000.0 * MICRODEGREE
