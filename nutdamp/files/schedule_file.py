@@ -110,16 +110,16 @@ class _Reader:
         timing = self._timing(line, cells, channel)
         if timing is None:
             return None
-        t, on_time, lead = timing
+        t, on_time, start = timing
         if channel is not None and on_time > 0.0:
             self.commanded[line] = cells
-            return channel_pulse(channel, t, on_time) if lead is None else commanded(channel, t - lead, on_time)
+            return channel_pulse(channel, t, on_time) if start is None else commanded(channel, start, on_time)
         return self._as_given(line, cells, name, t, on_time)
 
     def _timing(self, line: int, cells: Cells, channel: Channel | None) -> tuple[float, float, float | None] | None:
         """Centre and on-time, s; the start rules where there is one.
 
-        Through a valve the centre is the centroid of the thrust; how long it comes after the start is the third, s.
+        Through a valve the centre is the centroid of the thrust, and the third is the start of the command, s.
         """
         column = next((column for column in STARTS if cells.get(column)), None)
         if column is None:
@@ -146,7 +146,8 @@ class _Reader:
             return None
         meant = f"start_s + on_time_s/2 = {t:g}" if lead is None else f"the centroid of the thrust, {t:g}"
         self._compare(line, cells, (STARTS[1],), [t], meant, scale=max(t, on_time))
-        return t, on_time, lead
+        begins = max(start, 0.0) if column == STARTS[0] else t - centre
+        return t, on_time, None if lead is None else begins
 
     def _lead(self, line: int, channel: Channel, on_time: float) -> float | None:
         """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""

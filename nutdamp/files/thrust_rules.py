@@ -23,14 +23,15 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
     for key in THRUST_KEYS:
         if facts.has(key) and not thrusters:
             yield Finding((key,), "is of thrusters, and the file has none; leave it out", True)
-    named = thrusts(facts)
+    named, said = thrusts(facts), set[KeyPath]()
     for index in thrusters:
         path: KeyPath = ("thrusters", index)
         if facts.has(*path, "valve") and facts.has(*path, "impulse_bit"):
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
         if valve is not None:
-            yield from _opens(facts, path, valve)
+            yield from (one for one in _opens(facts, path, valve) if one.path not in said)
+            said.add((*valve, "open_delay"))
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
     yield from _alike(facts)
@@ -95,7 +96,8 @@ def _alike(facts: Facts) -> Iterator[Finding]:
     """Thrusters of one channel that make different pulses of a command."""
     kinds = {facts.text("thrusters", index, "name"): _kind(facts, index) for index, _ in facts.children("thrusters")}
     for channel, node in facts.children("channels"):
-        members = [str(entry.value) for _, entry in node.children() if entry.value in kinds]
+        listed = [entry.value for _, entry in node.children() if isinstance(entry.value, str)]
+        members = [name for name in listed if name in kinds]
         other = next((name for name in members if kinds[name] != kinds[members[0]]), None)
         if other is not None:
             problem = f"{members[0]} and {other} make different pulses of a command, by valve or impulse_bit"
