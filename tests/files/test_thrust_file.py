@@ -102,7 +102,7 @@ def test_faults_of_valve_and_cold(lines: str, expected: str) -> None:
     ("table", "expected"),
     [
         ("impulse_bit: [[20 ms, 0.15 N s, 16 ms]]", "expected 2 entries, got 1"),
-        ("impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]", "missing"),
+        ("impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]", "expected 3 entries, got 2"),
         ("impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]", "is a mass; expected an impulse"),
         ("impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]", "on-time 0.02 s is not above"),
         ("impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]", "impulse 0.36 N s is not above"),
