@@ -7,6 +7,7 @@ impulses. `flown` is the judge: real widths, true moments. Both give legs that t
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -200,9 +201,9 @@ class Flight(Tabled):
     def around_pulses(self) -> tuple[Track, Track]:
         """The motion just before and just after each pulse, one row a pulse; cone angles as in `Residual`."""
         before, after = [], []
+        starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
         for begins, ends in self.spans:
-            first = next(leg for leg in self.legs if leg.end >= begins)
-            last = next(leg for leg in reversed(self.legs) if leg.start <= ends)
+            first, last = self.legs[bisect_left(overs, begins)], self.legs[bisect_right(starts, ends) - 1]
             before.append((begins, *first.path.motion(np.array([begins]))))
             after.append((ends, *last.path.motion(np.array([ends]))))
         return self._rows(before, 0), self._rows(after, 1)

@@ -6,6 +6,8 @@ import math
 from itertools import accumulate
 from pathlib import Path
 
+import numpy as np
+
 from nutdamp.commands import Block
 from nutdamp.errors import nearest
 from nutdamp.files.output import csv_text, number
@@ -33,8 +35,11 @@ HEADER = (
 COUNTS = 1e-6
 """Share of a step by which a time may be off the commands that there are: the rounding of files."""
 
-MOST_FIRED = 100_000
-"""Pulses that the blocks of a file may fire."""
+MOST_FIRED = 5_000
+"""Pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds."""
+
+LATEST = 100_000
+"""Number of the last Sun pulse that may fire a block."""
 
 
 def blocks_csv(flown: Flight) -> str:
@@ -74,11 +79,13 @@ def _counts(time: float, step: float | None) -> str:
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
 
-    Needed are channel, first_sun_pulse, delay_s, width_s and count; every is 1 where it is left out. What else `HEADER`
-    names is not looked at. Raises CannotRead, and FaultyFile with every fault of the file.
+    Needed are channel, first_sun_pulse, count, delay_s and width_s; delay_counts and width_counts do for the last two
+    where the spacecraft file has the steps. every is 1 where it is left out. What else `HEADER` names is not looked at.
+    Raises CannotRead, and FaultyFile with every fault of the file.
     """
     table = Table(path, HEADER, "blocks")
-    table.expect("channel", "first_sun_pulse", "delay_s", "width_s", "count")
+    times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
+    table.expect("channel", "first_sun_pulse", *times, "count")
     blocks: list[Block] = []
     for line, row in table.rows:
         cells = table.cells(line, row)
@@ -93,9 +100,28 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
         _against_commands(table, line, cells, block, spacecraft)
         blocks.append(block)
     if sum(block.count for block in blocks) > MOST_FIRED:
-        table.fault(1, "count", f"the blocks fire more than {MOST_FIRED} pulses")
+        fired = sum(block.count for block in blocks)
+        table.fault(1, "count", f"the blocks fire {fired} pulses; expected at most {MOST_FIRED}")
     table.check()
     return tuple(blocks), table.warned
+
+
+TIMES = ("delay", "width")
+
+
+def _step(spacecraft: Spacecraft, name: str) -> float | None:
+    """The step (s) in which delay or width is commanded; None where there is none."""
+    commands = spacecraft.commands
+    return None if commands is None else commands.delay_step if name == "delay" else commands.width_step
+
+
+def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
+    """Whether delay or width of the blocks is given by counts alone, of steps that the spacecraft file has."""
+    alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
+    if alone and _step(spacecraft, name) is None:
+        problem = f"the spacecraft file has no step of the {name} to count; expected the column {name}_s"
+        table.fault(1, f"{name}_counts", problem)
+    return alone
 
 
 def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Block | None:
@@ -106,28 +132,41 @@ def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Blo
         close = nearest(name, channels)
         cure = f"did you mean {shown(close)}?" if close else f"it has {', '.join(map(shown, channels)) or 'none'}"
         table.fault(line, "channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
-    delay, width = (_time(table, line, cells, column) for column in ("delay_s", "width_s"))
+    delay, width = (_time(table, line, cells, spacecraft, name) for name in TIMES)
     if width == 0.0:
-        table.fault(line, "width_s", "0 s fires nothing; expected a time above 0")
-    first, count = (_whole(table, line, cells, column) for column in ("first_sun_pulse", "count"))
-    every = _whole(table, line, cells, "every") if cells.get("every") else 1
+        column = "width_s" if "width_s" in cells else "width_counts"
+        table.fault(line, column, "0 s fires nothing; expected a time above 0")
+    first, count = (_whole(table, line, cells, *one) for one in (("first_sun_pulse", LATEST), ("count", MOST_FIRED)))
+    every = _whole(table, line, cells, "every", LATEST) if cells.get("every") else 1
     if len(table.faults) > faults or None in (delay, width, first, count, every):
         return None
     return Block(name, first or 1, delay or 0.0, width or 0.0, count or 1, every or 1)
 
 
-def _time(table: Table, line: int, cells: Cells, column: str) -> float | None:
+def _time(table: Table, line: int, cells: Cells, spacecraft: Spacecraft, name: str) -> float | None:
+    """A delay or width, s: as it is given, or so many steps."""
+    column = f"{name}_s" if f"{name}_s" in cells else f"{name}_counts"
     value = table.number(line, cells, column)
-    if value is not None and value < 0.0:
-        table.fault(line, column, f"{value:g} s is negative; expected a time of at least 0")
+    if value is None:
         return None
-    return value
+    if value < 0.0:
+        unit = " s" if column.endswith("_s") else ""
+        table.fault(
+            line, column, f"{value:g}{unit} is negative; expected {'a time' if unit else 'a number'} of at least 0"
+        )
+        return None
+    if column.endswith("_s"):
+        return value
+    if not value.is_integer():
+        table.fault(line, column, f"expected a whole number of steps, got {cells[column]}")
+        return None
+    return value * (_step(spacecraft, name) or 0.0)
 
 
-def _whole(table: Table, line: int, cells: Cells, column: str) -> int | None:
+def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int | None:
     value = table.number(line, cells, column)
-    if value is not None and not (value.is_integer() and 1 <= value <= MOST_FIRED):
-        table.fault(line, column, f"expected a whole number from 1 to {MOST_FIRED}, got {cells[column]}")
+    if value is not None and not (value.is_integer() and 1 <= value <= most):
+        table.fault(line, column, f"expected a whole number from 1 to {most}, got {cells[column]}")
         return None
     return None if value is None else int(value)
 
@@ -137,17 +176,25 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
     commands = spacecraft.commands
     if commands is None:
         return
-    steps = block.delay / commands.delay_step
+    longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + COUNTS)) * commands.delay_step
+    nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
+    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
+    allowed = ", ".join(map(str, commands.every))
     off = {
-        "delay_s": abs(steps - round(steps)) > COUNTS or block.delay > commands.delay_max * (1.0 + COUNTS),
-        "width_s": bool(abs(commands.widths - block.width).min() > COUNTS * block.width),
-        "count": block.count > commands.max_count,
-        "every": block.every not in commands.every,
+        "delay_s": (block.delay, nearest_delay, COUNTS * commands.delay_step),
+        "width_s": (block.width, nearest_width, COUNTS * block.width),
     }
-    for name, time, step in (("delay", block.delay, commands.delay_step), ("width", block.width, commands.width_step)):
-        given = cells.get(f"{name}_counts", "")
-        if given and step is not None and given != _counts(time, step):
-            text = f"{name}_counts = {given} contradicts {name}_s = {time:g}, which is {_counts(time, step)}: ignored"
+    for column, (given, near, slack) in off.items():
+        if abs(given - near) > slack:
+            text = f"{column} = {given:.6g} s cannot be commanded, {near:.6g} s is the nearest: flown as given"
+            table.warn(line, column, text)
+    if block.count > commands.max_count:
+        text = f"count = {block.count} cannot be commanded, {commands.max_count} is the most: flown as given"
+        table.warn(line, "count", text)
+    if block.every not in commands.every:
+        table.warn(line, "every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
+    for name, time in (("delay", block.delay), ("width", block.width)):
+        counts, step = cells.get(f"{name}_counts", ""), _step(spacecraft, name)
+        if counts and step is not None and f"{name}_s" in cells and counts != _counts(time, step):
+            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {_counts(time, step)}: ignored"
             table.warn(line, f"{name}_counts", text)
-    for column in (column for column, is_off in off.items() if is_off):
-        table.warn(line, column, f"{column} is none of the commands of the spacecraft file: flown as given")

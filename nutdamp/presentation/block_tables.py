@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import accumulate
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -13,6 +14,7 @@ from nutdamp.physics import attitude
 from nutdamp.presentation.end_tables import spin_text
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import degrees, mass, moment
+from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 
 
@@ -40,6 +42,21 @@ def _blocks(flown: Flight) -> Table:
             str(block.every),
         )
     return table
+
+
+TOLD = 8
+"""Pulses of a block that a screen shows, at most: the first, the last, and every so many between."""
+
+
+def shown_pulses(made: Schedule) -> list[int]:
+    """Which pulses (from 0) a screen shows: all, but of long blocks only some."""
+    if not made.blocks:
+        return list(range(len(made)))
+    shown: list[int] = []
+    for last, block in zip(accumulate(block.count for block in made.blocks), made.blocks, strict=True):
+        step = max(math.ceil((block.count - 1) / (TOLD - 1)), 1)
+        shown += sorted({*range(last - block.count, last, step), last - 1})
+    return [index for index in shown if index < len(made)]  # a track may end before the last one
 
 
 def _effects(flown: Flight) -> Table:

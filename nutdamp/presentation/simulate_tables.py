@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -9,7 +11,7 @@ from rich.text import Text
 from nutdamp.aspect import aspects
 from nutdamp.decision import Decision
 from nutdamp.flight import Flight
-from nutdamp.presentation.block_tables import blocks_screen
+from nutdamp.presentation.block_tables import blocks_screen, shown_pulses
 from nutdamp.presentation.decisions import decision_table, requirement
 from nutdamp.presentation.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
 from nutdamp.presentation.layout import columns, facts
@@ -34,7 +36,10 @@ def simulation_screen(
     if flight.schedule.blocks:
         parts += [Text(), blocks_screen(flight)]
     if len(flight.schedule):
-        parts += [Text(), _pulses(flight)]
+        shown = shown_pulses(flight.schedule)
+        parts += [Text(), _pulses(flight, shown)]
+        if len(shown) < len(flight.schedule):
+            parts.append(Text(f"{len(shown)} of {len(flight.schedule)} pulses; --json writes all.", style="dim"))
     parts += [Text(), _ends(impulses, flown, found.until)]
     if flight.spacecraft.attitude is None:
         parts.append(Text(f"{FRAME_N}.", style="dim"))
@@ -44,12 +49,13 @@ def simulation_screen(
     return Group(*parts)
 
 
-def _pulses(flight: Flight) -> Table:
+def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
     before, after = flight.around_pulses()
     names = ("pulse", "centre", "on-time", "channel", "", "nutation", "body cone", "space cone")
     units = ("", "s", "s", "", "", "deg", "deg", "deg")
     table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
-    for index, pulse in enumerate(flight.schedule):
+    for index in shown:
+        pulse = flight.schedule.pulses[index]
         on_time = "ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}"
         what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
         for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):

@@ -59,9 +59,48 @@ def test_an_edited_block_is_fired_and_what_cannot_be_commanded_is_named(run: Run
     (tmp_path / "blocks.csv").write_text(TOP + "T1,3,1.001,0.1,4\nT1,20,1.5,0.1,300\n")
     done = run("simulate", "-", "--blocks", "blocks.csv", stdin=FILE)
     assert done.returncode == 0
-    assert "blocks.csv:2: delay_s is none of the commands of the spacecraft file: flown as given" in done.stderr
-    assert "blocks.csv:3: count is none of the commands" in done.stderr
-    assert "304" in done.stdout
+    assert "blocks.csv:2: delay_s = 1.001 s cannot be commanded, 1 s is the nearest: flown as given" in done.stderr
+    assert "blocks.csv:3: count = 300 cannot be commanded, 255 is the most: flown as given" in done.stderr
+    assert "of 304 pulses; --json writes all" in done.stdout
+    assert sum(line.split()[:1] in (["1"], ["4"], ["304"]) for line in done.stdout.splitlines()) >= 3
+    assert len(done.stdout.splitlines()) < 100
+    assert "Requirement:" in done.stdout
+
+
+def test_counts_alone_are_read_where_the_spacecraft_file_has_the_steps(tmp_path: Path) -> None:
+    path = tmp_path / "blocks.csv"
+    path.write_text("channel,first_sun_pulse,delay_counts,width_counts,count\nT1,3,500,12,4\n")
+    (block,), warned = read_blocks(path, CRAFT)
+    assert [block.delay, block.width] == pytest.approx([1.0, 0.12], rel=1e-12)
+    assert not warned
+    path.write_text("channel,first_sun_pulse,delay_s,width_s,count,every\nT1,3,4.899,0.153,4,3\n")
+    assert [text.partition(": ")[2] for text in read_blocks(path, CRAFT)[1]] == [
+        "delay_s = 4.899 s cannot be commanded, 4.9 s is the nearest: flown as given",
+        "width_s = 0.153 s cannot be commanded, 0.15 s is the nearest: flown as given",
+        "every = 3 cannot be commanded, only 1, 2: flown as given",
+    ]
+
+
+def test_faults_of_counts(tmp_path: Path) -> None:
+    top = "channel,first_sun_pulse,delay_counts,width_counts,count\n"
+    assert problems(top + "T1,3,-4,0,4\nT1,9,2.5,3,4\n", tmp_path) == [
+        "2: delay_counts: -4 is negative; expected a number of at least 0",
+        "2: width_counts: 0 s fires nothing; expected a time above 0",
+        "3: delay_counts: expected a whole number of steps, got 2.5",
+    ]
+    path = tmp_path / "blocks.csv"
+    listed = read_spacecraft(FILE.replace("{step: 10 ms, min: 100 ms, max: 500 ms}", "[0.2 s]"), "f.yaml")
+    with pytest.raises(FaultyFile, match="no step of the width to count; expected the column width_s"):
+        read_blocks(path, listed)
+
+
+def test_very_many_pulses_are_refused_at_once(tmp_path: Path) -> None:
+    assert problems(TOP + "T1,1,1,0.1,3000\nT1,3001,1,0.1,3000\n", tmp_path) == [
+        "1: count: the blocks fire 6000 pulses; expected at most 5000"
+    ]
+    assert problems(TOP + "T1,1,1,0.1,100000\n", tmp_path) == [
+        "2: count: expected a whole number from 1 to 5000, got 100000"
+    ]
 
 
 def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, tmp_path: Path) -> None:
@@ -86,7 +125,7 @@ def test_all_faults_of_a_file_are_listed(tmp_path: Path) -> None:
         "3: delay_s: -1 s is negative; expected a time of at least 0",
         "3: width_s: 0 s fires nothing; expected a time above 0",
         "3: first_sun_pulse: expected a whole number from 1 to 100000, got 0",
-        "3: count: expected a whole number from 1 to 100000, got 1.5",
+        "3: count: expected a whole number from 1 to 5000, got 1.5",
         "5: first_sun_pulse: Sun pulse 8 comes before the block before is over; expected 14 or later",
         "6: delay_s: 'x' is not a number",
     ]
