@@ -59,7 +59,8 @@ def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
     table.add_row("spin axis ends at", direction_text(body, final.axis))
     table.add_row("H ends at", direction_text(body, final.momentum))
     if body.goal.axis is not None:
-        table.add_row("target", direction_text(body, body.goal.axis))
+        off = degrees(flown.residual.axis_error)
+        table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
     table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
     lasting = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
     if lasting:

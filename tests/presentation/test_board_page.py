@@ -122,7 +122,7 @@ def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
 def test_a_verification_names_what_it_takes_to_pass() -> None:
     rows = {row[0]: row for row in table(ace(), "Checks")}
     check = rows["DOP853, full tensor"]
-    assert check[2] == "1e-09 rad, of itself"
+    assert check[2] == "1e-09 rad; rates 1e-09 of their size"
     assert float(check[3]) <= 1e-9
     assert check[4] == "pass"
     assert rows["|H| on coasts"][4] == "pass"
@@ -206,3 +206,54 @@ def test_a_pdf_does_not_say_when_it_was_printed() -> None:
     assert first == second
     assert len(first) == len(printed[0])
     assert first.endswith(b"(node00000001) (node00000002) (node00000001)")
+
+
+def test_with_three_moments_each_nutation_angle_is_named() -> None:
+    """The file's 0.6° is that of t = 0; the angle that pulses are measured by is the largest on the arc."""
+    assert ace().all("h1")[0].text == "ACE: damping 0.6 deg of nutation"
+    rows = {row[0]: row[1] for row in table(ace(), "Where it points")}
+    assert rows["nutation at that time"] == "0.6 deg"
+    assert rows["largest nutation from then on, without pulses"] == "0.6015 deg"
+    assert "nutation" not in rows
+
+
+@cache
+def turned(horizon: str) -> Node:
+    """A body that is to turn to a target 10° away, within a horizon."""
+    body = nutdamp.example().with_(goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": horizon})
+    made = report_page(compare(body, ["rhumb-line"]), Repeat("", "", ""), pictured=False)
+    return parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+
+
+def cards(tree: Node) -> dict[str, list[str]]:
+    """The tiles: what stands below the name of each."""
+    tiles = [tile for one in tree.all("dl") if one.attributes.get("class") == "figures" for tile in one.all("div")]
+    return {tile.all("dt")[0].text: [one.text for one in tile.all("dd")] for tile in tiles}
+
+
+def test_impulses_are_compared_with_what_the_symbols_explain() -> None:
+    heads, row, *_ = table(turned("300 s"), "What each scheme costs")
+    shown = dict(zip(heads, row, strict=True))
+    symbols = facts(turned("300 s"), "Symbols")
+    for name in ("A|ω0|", "C|ω3|β"):
+        whole, _, said = symbols[name].partition(" N m s, ")
+        assert float(shown["impulse N m s"]) / float(whole) == pytest.approx(
+            float(shown[f"impulse × {name}"]), rel=1e-3
+        )
+        assert said.endswith("no schedule that does so takes less")
+    assert facts(ace(), "Symbols")["A|ω0|"].endswith("no floor here, with I1 ≠ I2")
+
+
+def test_the_target_stands_beside_where_it_ends() -> None:
+    shown = cards(turned("300 s"))
+    for name in ("spin axis ends at", "H ends at"):
+        value, note = shown[name]
+        assert value == "tilt 10.0000 deg, azimuth 45.0000 deg"
+        assert note.startswith("target: tilt 10.0000 deg, azimuth 45.0000 deg; ")
+        assert note.endswith(" deg off")
+
+
+def test_without_a_plan_the_tiles_say_what_was_required() -> None:
+    shown = cards(turned("9 s"))
+    assert shown["requirement"][0] == "NOT met: no scheme is feasible"
+    assert shown["target"] == ["tilt 10.0000 deg, azimuth 45.0000 deg", "10 deg from H at t = 0"]
