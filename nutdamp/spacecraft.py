@@ -27,6 +27,7 @@ from nutdamp.demands import Limits as Limits
 from nutdamp.demands import Requirement as Requirement
 from nutdamp.epoch import DIGITS, Epoch
 from nutdamp.errors import BadRequest
+from nutdamp.loop_settings import Loop as Loop
 from nutdamp.physics import attitude, cones, inertia
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.cones import Cones
@@ -180,6 +181,7 @@ class Spacecraft(views.Shown):
     ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun,
     where it is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of
     ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not;
+    ``loop`` damps by what a sensor shows;
     ``source`` is what it was read from, None once a field is replaced.
     """
 
@@ -204,6 +206,7 @@ class Spacecraft(views.Shown):
     commands: Commands | None = None
     cold: Cold | None = None
     tank: Tank | None = None
+    loop: Loop | None = None
     source: Source | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:

@@ -1,7 +1,8 @@
 """Units of the files and of the command line: one small table that leads from "60 rpm" to 6.283… rad/s.
 
 A quantity is a number, which is SI, or a text with a unit. What is not in the table is refused with the units
-that are: Hz and revolutions are left out on purpose, since nobody can tell whether they count turns or radians.
+that are: revolutions are left out on purpose, and Hz is for sampling rates alone, since nobody can tell whether they
+count turns or radians.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ KINDS: dict[str, Kind] = {
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3}),
     "pressure": Kind("a pressure", {"Pa": 1.0, "bar": 1e5}),
     "impulse": Kind("an impulse", {"N s": 1.0}),
+    "acceleration": Kind("an acceleration", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
+    "frequency": Kind("a sampling rate", {"Hz": 1.0}),
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }
@@ -119,7 +122,7 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     if not unit:
         raise ValueError(f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out")
     found = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
-    if found is None:
+    if found is None or (found[0] == "frequency" and kind != "frequency"):
         noun = expected.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""

@@ -36,6 +36,10 @@ dispersions:
   omega0: {normal: 0.1 deg/s}
   thrust: {normal: 2 %}
   timing: {uniform: 5 ms}
+loop:
+  sensor: {kind: gyro, rate: 50 Hz, noise: 0.005 deg/s}
+  start: 0.5 deg
+  stop: 0.1 deg
 """
 
 BROKEN = "name: Broken\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 0]\npaintwork: red\n"
@@ -78,6 +82,9 @@ disperse smoke.yaml --samples 3000 --resume study.npz
 disperse smoke.yaml --schedule pulses.csv --samples 2000 --flown
 disperse smoke.yaml --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
+loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png --map map.png
+loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
+loop ace.yaml; 2
 report smoke.yaml -o report.html
 report -o report.md --disperse 2000; 0 4
 animate smoke.yaml --seconds 0.5 --fps 8 --width 320 -o film.gif

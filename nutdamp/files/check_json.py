@@ -89,6 +89,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
             }
             for found in survey.consequences(spacecraft)
         ],
+        **_loop_json(spacecraft),
         "dispersions": _dispersions_json(spacecraft),
         "two_pulse": {
             "mounting_angle_deg": math.degrees(survey.mounting_angle(spacecraft)),
@@ -153,6 +154,16 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
             for one in survey.turns(spacecraft)
         ],
     }
+
+
+def _loop_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """How far the channels of a loop are from feeding the nutation; nothing for a file without one."""
+    if spacecraft.loop is None:
+        return {}
+    from nutdamp.files.loop_json import margins_json  # few files have one
+    from nutdamp.loop.stability import margins
+
+    return {"loop": margins_json(margins(spacecraft, spacecraft.loop))}
 
 
 def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:

@@ -34,6 +34,10 @@ def read_contents(
     root, unplaced = overlay(root, settings)
     faults += unplaced
     found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
+    if root.get("loop") is not None:
+        from nutdamp.files.loop_rules import loop_findings  # few files have one
+
+        found += loop_findings(root)
     problems: Problems = []
     contents = SpacecraftFile.read(root.plain(), problems)
     judged = {finding.path for finding in found if not finding.at_key}

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.files.dispersion_models import DispersionsSection
 from nutdamp.files.fields import OrWord
+from nutdamp.files.loop_models import LoopSection
 from nutdamp.files.quantities import (
     AcuteAngle,
     Angle,
@@ -367,6 +368,11 @@ class SpacecraftFile(Section):
         examples=[
             {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}}
         ],
+    )
+    loop: LoopSection | None = Field(
+        default=None,
+        description="A closed loop that damps by what a sensor shows.",
+        examples=[{"sensor": {"kind": "gyro", "rate": "100 Hz"}, "start": "0.5 deg", "stop": "0.05 deg"}],
     )
     dispersions: DispersionsSection | None = Field(
         default=None,

@@ -42,7 +42,7 @@ def findings(root: Node) -> Iterator[Finding]:
         _goal,
     ):
         yield from rule(facts)
-    yield from sky_findings(facts, spin_of(facts), _spin_axis(facts))
+    yield from sky_findings(facts, spin_of(facts), spin_axis(facts))
 
 
 def symmetric(tensor: Vector) -> Vector:
@@ -162,7 +162,7 @@ def _motion(facts: Facts) -> Iterator[Finding]:
             yield Finding(path, "the spin is zero; expected a rate about axis 3; nothing nutates without it")
 
 
-def _spin_axis(facts: Facts) -> Vector:
+def spin_axis(facts: Facts) -> Vector:
     """Principal axis 3 in the axes of the file, (3,); the file's third where the tensor cannot be read."""
     tensor = tensor_of(facts)
     if tensor is None or tensor_fault(tensor) is not None:

@@ -15,6 +15,7 @@ from nutdamp.epoch import Epoch
 from nutdamp.errors import Fault
 from nutdamp.files.dispersion_models import dispersions
 from nutdamp.files.faults import read_contents
+from nutdamp.files.loop_models import LoopSection
 from nutdamp.files.models import (
     AttitudeSection,
     DisturbanceSection,
@@ -31,6 +32,7 @@ from nutdamp.files.settings import Setting
 from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
 from nutdamp.files.thruster_rules import CANCELLED, force_vector
 from nutdamp.files.yaml_tree import read_text
+from nutdamp.loop_settings import Loop, Sensor
 from nutdamp.physics import attitude, sun
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import (
@@ -108,6 +110,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         keep=tuple(_keep(entry, sunward) for entry in contents.keep),
         sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
         commands=_commands(contents.commands),
+        loop=_loop(contents.loop, inertia.axes),
     )
 
 
@@ -273,6 +276,36 @@ def _commands(section: CommandsSection | None) -> Commands | None:
         widths = given.min + step * np.arange(math.floor((given.max - given.min) / step * (1.0 + 1e-12)) + 1)
     every = tuple(sorted(set(section.every)))
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
+
+
+def _loop(section: LoopSection | None, axes: Vector) -> Loop | None:
+    if section is None:
+        return None
+    given = section.sensor
+    along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
+    sensor = Sensor(
+        kind=given.kind,
+        rate=given.rate,
+        quantisation=given.quantisation,
+        noise=given.noise,
+        bias=given.bias,
+        scale=given.scale,
+        delay=given.delay,
+        low_pass=given.low_pass,
+        position=axes.T @ np.array(given.position or (0.0, 0.0, 0.0)),
+        axis=axes.T @ (along / math.hypot(*along)),
+    )
+    return Loop(
+        sensor=sensor,
+        law=section.law,
+        start=section.start,
+        stop=section.stop,
+        settle=section.settle,
+        min_interval=section.min_interval,
+        predict=section.predict,
+        on_time=section.on_time,
+        reversed=() if section.faults is None else tuple(section.faults.reversed),
+    )
 
 
 def _limits(section: LimitsSection | None) -> Limits:

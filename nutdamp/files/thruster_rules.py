@@ -63,18 +63,18 @@ def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     direction = facts.vector("number", 3, *path, "direction")
     if direction is not None and norm(direction) < SMALLEST:
         yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
-    elif _cancel([_torque(facts, path)]):
+    elif _cancel([torque_of(facts, path)]):
         if facts.has(*path, "torque"):
             yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
         else:
             problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
             yield Finding((*path, "position"), problem)
-    least, most = _on_times(facts, path)
+    least, most = on_times_of(facts, path)
     if least > most:
         yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; expected at most {most:g} s")
 
 
-def _torque(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
+def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
     """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be read."""
     torque = facts.vector("torque", 3, *path, "torque")
     if torque is not None:
@@ -96,7 +96,7 @@ def _cancel(torques: Sequence[tuple[Vector, float] | None]) -> bool:
     return total <= max(SMALLEST, CANCELLED * sum(size for _, size in known))
 
 
-def _on_times(facts: Facts, path: KeyPath) -> tuple[float, float]:
+def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
     """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
     least = facts.number("time", *path, "min_on_time")
     most = facts.number("time", *path, "max_on_time")
@@ -134,9 +134,9 @@ def instead(name: str, names: list[str]) -> str:
 
 
 def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
-    if len(members) > 1 and _cancel([_torque(facts, member) for member in members]):
+    if len(members) > 1 and _cancel([torque_of(facts, member) for member in members]):
         yield Finding(path, "the torques of these thrusters cancel; let them fire in channels of their own")
-    times = [_on_times(facts, member) for member in members]
+    times = [on_times_of(facts, member) for member in members]
     least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
     if least > most and all(shortest <= longest for shortest, longest in times):
         problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"

@@ -29,8 +29,9 @@ def units_topic() -> Topic:
                     Rows(rows),
                     "Blanks within a unit may be left out or written as * or ·, and ^2 as ²: kgm², N*m. degrees, "
                     "degree and ° are read as deg, sec as s, hour as hours, rpm in any case. A unit of another kind, "
-                    "or one that is not listed, is an error that names those allowed; Hz and revolutions are no rates "
-                    "here, since nobody can tell whether they count turns or radians.",
+                    "or one that is not listed, is an error that names those allowed; Hz is for sampling rates "
+                    "alone, and revolutions are no unit here, since nobody can tell whether they count turns or "
+                    "radians.",
                     "Reports show degrees, CSV and JSON name the unit in the column or key, such as t_s, nutation_deg.",
                 ),
             ),

@@ -33,6 +33,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
+    if spacecraft.loop is not None:
+        parts += [Text(), *_loop(spacecraft)]
     if spacecraft.dispersions is not None:
         parts += [Text(), *_dispersions(spacecraft)]
     return Group(*parts)
@@ -169,6 +171,18 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
     if idle:
         lines.append(f"Never fired for damping, more axial than transverse: {', '.join(idle)}.")
     return Text("\n".join(lines))
+
+
+def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
+    """What the loop is, how far its channels are from feeding the nutation, and what feeds it already."""
+    from nutdamp.loop.stability import margins  # few files have a loop
+    from nutdamp.presentation.loop_tables import described, margin_table, warnings
+
+    assert spacecraft.loop is not None
+    yield Text(described(spacecraft.loop))
+    yield margin_table(margins(spacecraft, spacecraft.loop))
+    for warning in warnings(spacecraft):
+        yield Text.assemble(("Warning: ", "bold red"), f"{warning}.")
 
 
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:

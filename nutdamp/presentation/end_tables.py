@@ -64,8 +64,9 @@ def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
     table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
     lasting = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
     if lasting:
-        end = moment(flown.schedule.end)
-        table.add_row("", f"as the last pulse ends, at {end}; changed further by {' and '.join(lasting)}")
+        end = "as the last pulse ends, at " + moment(flown.schedule.end)
+        end = end if flown.until is None else f"at {moment(flown.until)}"
+        table.add_row("", f"{end}; changed further by {' and '.join(lasting)}")
     add_aspects(table, watched)
     if body.attitude is None:
         table.add_row("", FRAME_N)

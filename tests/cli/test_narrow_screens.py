@@ -21,6 +21,7 @@ COMMANDS = [
     ("verify", "--scheme", "two-pulse"),
     ("disperse", "--scheme", "two-pulse", "--samples", "1e3", "--worst", "2"),
     ("trade", "--points", "2"),
+    ("loop", str(CONFIGS / "upper-stage.yaml"), "--until", "400s"),
 ]
 
 

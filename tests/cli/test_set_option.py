@@ -14,6 +14,7 @@ COMMANDS = {
     "trade": (),
     "disperse": ("--samples", "10"),
     "verify": (),
+    "loop": (),
     "report": ("-o", "-"),
     "animate": ("-o", "x.gif"),
     "check": (),

@@ -35,6 +35,9 @@ from nutdamp.units import KINDS, LARGEST, parse, pattern, shown
         ("180 deg/s", "rate", math.pi),
         ("60 rpm", "rate", 2 * math.pi),
         ("2 %", "ratio", 0.02),
+        ("2 m/s^2", "acceleration", 2.0),
+        ("2 mm/s²", "acceleration", 0.002),
+        ("100 Hz", "frequency", 100.0),
     ],
 )
 def test_every_unit_of_the_table(text: str, kind: str, value: float) -> None:
@@ -44,7 +47,7 @@ def test_every_unit_of_the_table(text: str, kind: str, value: float) -> None:
 
 def test_the_table_holds_nothing_else() -> None:
     units = {unit for kind in KINDS.values() for unit in kind.factors}
-    assert len(units) == 27
+    assert len(units) == 30
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,75 @@
+"""What ``loop --json`` gives, and the map of delays and C/A as CSV."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.files.output import csv_text, number
+from nutdamp.files.plan_json import (
+    final_json,
+    pulses_json,
+    requirement_json,
+    residual_json,
+    spacecraft_json,
+    target_json,
+)
+from nutdamp.loop.plan import LoopPlan
+from nutdamp.loop.stability import Map, Margin
+
+MAP_HEADER = ("delay_s", "c_over_a", "factor", "damps")
+
+
+def loop_json(plan: LoopPlan) -> dict[str, Any]:
+    """Firings with what was seen, how it ends, the dead band, and how far each channel is from feeding."""
+    run, body = plan.flown_run, plan.spacecraft
+    seen = [{"decided_s": one.decided, "seen_deg": math.degrees(one.seen)} for one in run.fired]
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(body),
+        "law": run.loop.law,
+        "seed": run.seed,
+        "until_s": run.until,
+        "stopped": run.stop.name.lower(),
+        "channel": run.channel,
+        "meets_requirement": False if run.stop.fault else plan.meets_requirement,
+        "requirement": requirement_json(plan),
+        "quiet_s": list(run.quiet),
+        "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
+        "dead_band_deg": math.degrees(plan.band.most),
+        "pulses": [{**pulse, **more} for pulse, more in zip(pulses_json(run.flight), seen, strict=True)],
+        "total_impulse_Nms": plan.total_impulse,
+        "propellant_kg": plan.propellant,
+        "end_s": plan.end,
+        "flown": residual_json(plan.flight.residual),
+        "final": final_json(plan.flight),
+        "target": target_json(body),
+        "margins": margins_json(plan.margins),
+    }
+
+
+def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
+    """How far each channel is from feeding the nutation, at the start threshold."""
+    return [
+        {
+            "channel": one.channel,
+            "late_deg": math.degrees(one.late),
+            "gain": one.gain,
+            "growth": one.growth,
+            "delay_margin_s": one.delay if math.isfinite(one.delay) else None,
+            "damps": one.damps,
+            "reversed": one.cause.turned,
+        }
+        for one in found
+    ]
+
+
+def map_csv(found: Map) -> str:
+    """One row for each delay and C/A; ``factor`` and ``damps`` are empty where no law is."""
+    rows = []
+    for ratio, factors in zip(found.ratios.tolist(), found.factor.tolist(), strict=True):
+        for delay, factor in zip(found.delays.tolist(), factors, strict=True):
+            damps = "" if math.isnan(factor) else str(factor < 1.0).lower()
+            rows.append((number(delay), number(ratio), "" if math.isnan(factor) else number(factor), damps))
+    return csv_text(MAP_HEADER, rows)

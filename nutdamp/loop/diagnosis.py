@@ -1,0 +1,127 @@
+"""Whether firings do what they shall: what each added to the rate that is seen, against what it was to add."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from nutdamp.loop.law import ComplexArray
+from nutdamp.spacecraft import Vector
+
+HALF = 0.5
+"""Share of what it was to add above which a firing works, and below whose negative it works backwards."""
+
+SIGMAS = 5.0
+"""A firing is judged by what so many sigma of the noise leave open."""
+
+
+class Stop(Enum):
+    """Why the loop was flown no further, or that it was flown to the end."""
+
+    END = "the end of the time"
+    FULL = "limits.max_pulses"
+    SENSOR = "the sensor is reversed"
+    CHANNEL = "a channel is wired backwards"
+    UNCLEAR = "a channel is wired backwards, or the sensor is reversed"
+    IDLE = "a channel does nothing"
+    FEEDS = "the firings come at the wrong time"
+
+    @property
+    def fault(self) -> bool:
+        """Whether the loop was stopped before it could feed the nutation."""
+        return self not in (Stop.END, Stop.FULL)
+
+
+@dataclass(slots=True)
+class Glimpse:
+    """The mean of the rates z seen on one coast, carried to the centre of a firing by the nutation ``rate`` (1/s)."""
+
+    z: complex
+    samples: int
+
+    @classmethod
+    def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse | None:
+        """None where nothing was seen; ``rate`` is complex where the nutation grows."""
+        known = ~np.isnan(best)
+        if not known.any():
+            return None
+        carried = best[known] * np.exp(1j * rate * (times[known] - centre))
+        return cls(complex(carried.mean()), int(known.sum()))
+
+
+@dataclass(slots=True)
+class Effect:
+    """What the firings of one channel have added, as a factor on what they were to add: least squares over them."""
+
+    did: complex = 0.0
+    wanted: float = 0.0
+    noise: float = 0.0
+    offset: float = 0.0
+
+    def add(self, change: complex, expected: complex, noise: float, offset: float) -> None:
+        """A firing that changed z by ``change`` and was to by ``expected``, known to ``noise`` (sigma), ``offset``."""
+        size = abs(expected) ** 2
+        self.did += change * expected.conjugate()
+        self.wanted += size
+        self.noise += size * noise * noise
+        self.offset += abs(expected) * offset
+
+    @property
+    def factor(self) -> complex:
+        """1 for what works, -1 for what works backwards, 0 for what does nothing."""
+        return self.did / self.wanted
+
+    @property
+    def known(self) -> bool:
+        """Whether noise and bias leave no doubt which."""
+        return SIGMAS * math.sqrt(self.noise) + self.offset < HALF * self.wanted
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
+
+    Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
+    """
+
+    period: float
+    effects: dict[str, Effect] = field(default_factory=dict)
+    suspect: str | None = None
+    deadline: float = math.inf
+
+    def judge(
+        self, channel: str, centre: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
+    ) -> tuple[Stop, str] | None:
+        """Why to stop after a firing of ``channel`` that was to add ``expected``, and the channel to name; else None.
+
+        ``doubt``: sigma of ``before`` and of ``after``, and by how much each may be off in any case.
+        """
+        first, second, offset = doubt
+        effect = self.effects.setdefault(channel, Effect())
+        effect.add(after.z - before.z, expected, math.hypot(first, second), 2.0 * offset)
+        if not effect.known:
+            return None
+        factor = effect.factor.real
+        if factor <= -HALF:
+            if self.suspect not in (None, channel):
+                return Stop.SENSOR, channel
+            if self.suspect is None:
+                self.suspect, self.deadline = channel, centre + self.period
+            return None
+        if self.suspect is not None:
+            return Stop.CHANNEL, self.suspect
+        if abs(effect.factor) < HALF:
+            return Stop.IDLE, channel
+        believed = abs(abs(before.z) - abs(expected))  # by a firing that comes at its moment
+        grown = abs(after.z) - abs(before.z)
+        lowers = abs(before.z) - believed > HALF * abs(expected)
+        if lowers and grown > SIGMAS * math.hypot(first, second) + 2.0 * offset + 1e-9 * abs(before.z):
+            return Stop.FEEDS, channel
+        return None
+
+    def overdue(self, now: float) -> tuple[Stop, str] | None:
+        """That no other channel has fired in time to tell which of the two it is."""
+        return None if self.suspect is None or now <= self.deadline else (Stop.UNCLEAR, self.suspect)

@@ -1,0 +1,125 @@
+"""The pictures of ``loop``: what the sensor shows, the nutation between its thresholds, the firings; the map."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.loop.plan import LoopPlan
+from nutdamp.loop.sensor import Signal
+from nutdamp.loop.stability import Map
+from nutdamp.loop_settings import GYRO
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.history import TIME, firings
+from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
+from nutdamp.spacecraft import Vector
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SAMPLES = 3000
+"""Samples of the sensor that are drawn, at most."""
+
+BLOCK = 4096
+"""Samples that are worked out together."""
+
+DECADES = 5.0
+"""Of the nutation shown on its log axis, at most."""
+
+
+@style.styled
+def loop_figure(plan: LoopPlan) -> Figure:
+    """Signal of the sensor, nutation with thresholds, and firings, over the whole run."""
+    run = plan.flown_run
+    names = len({one.pulse.channel for one in run.fired})
+    figure = style.sheet(7.4, 5.6 + 0.2 * names)
+    grid = figure.add_gridspec(3, 1, height_ratios=[2.2, 2.2, 0.8 + 0.25 * names])
+    signal = figure.add_subplot(grid[0])
+    nutation = figure.add_subplot(grid[1], sharex=signal)
+    fired = figure.add_subplot(grid[2], sharex=signal)
+    for axes in (signal, nutation):
+        axes.tick_params(labelbottom=False)
+    _signal(signal, plan)
+    _nutation(nutation, plan)
+    firings(fired, run.flight, run.until, brief=True)
+    fired.set_xlabel(TIME)
+    style.legend(figure, [signal, nutation])
+    return figure
+
+
+def _signal(axes: Axes, plan: LoopPlan) -> None:
+    run = plan.flown_run
+    sensor = run.loop.sensor
+    if sensor.rate is None:
+        times = np.linspace(0.0, run.until, SAMPLES)
+        values = Signal(plan.spacecraft, sensor, run.seed).shown(run.flight.motion(times)[0])
+    else:
+        times, values = _samples(plan, sensor.rate)
+    scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
+    labels = ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
+    for column, (label, colour) in enumerate(zip(labels, (MOTION, PULSE), strict=False)):
+        axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=label)
+    axes.set_ylabel("signal, deg/s" if sensor.kind == GYRO else "signal, m/s²")
+    axes.grid()
+
+
+def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
+    """Some of the samples, evenly, with the noise that the loop saw; those within firings are left out."""
+    run = plan.flown_run
+    count = math.floor(run.until * rate) + 1
+    wanted = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
+    signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.seed), [], []
+    for block in range(0, count, BLOCK):
+        numbers = wanted[(wanted >= block) & (wanted < block + BLOCK)]
+        if len(numbers):
+            times.append(np.asarray(numbers / rate, dtype=np.float64))
+            values.append(signal.sampled(numbers, signal.shown(run.flight.motion(times[-1])[0])))
+    found, shown = np.concatenate(times), np.concatenate(values)
+    quiet = np.ones(len(found), dtype=bool)
+    for one in run.fired:
+        quiet &= (found < one.pulse.start) | (found > one.pulse.end)
+    return found[quiet], shown[quiet]
+
+
+def _nutation(axes: Axes, plan: LoopPlan) -> None:
+    """Nutation on a log axis, thresholds, and what was seen as each firing was decided on."""
+    run = plan.flown_run
+    track = run.flight.sampled(SAMPLES, run.until)
+    angles = np.degrees(track.nutation)
+    start, stop = math.degrees(run.loop.start), math.degrees(run.loop.stop)
+    most = max(float(angles.max()), start)
+    low = max(0.5 * min(float(angles.min()), stop or start), most * 10.0**-DECADES)
+    axes.plot(track.t, np.maximum(angles, 0.1 * low), color=INK, label="nutation")
+    seen = [max(math.degrees(one.seen), low) for one in run.fired]
+    axes.plot([one.pulse.t for one in run.fired], seen, "x", color=PULSE, markersize=4, label="seen at a firing")
+    axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
+    if stop > 0.0:
+        axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
+    axes.set_yscale("log")
+    axes.set_ylim(low, 2.0 * most)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("")
+    axes.set_ylabel("nutation, deg (log)")
+    axes.grid()
+
+
+@style.styled
+def map_figure(found: Map, ratio: float) -> Figure:
+    """Where the loop damps and where it feeds, over unforeseen delay and C/A; ``ratio`` is that of the file."""
+    from matplotlib.colors import BoundaryNorm
+
+    figure = style.sheet(7.4, 4.8)
+    axes = figure.subplots()
+    levels = [0.0, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.5, 2.0]
+    norm = BoundaryNorm(levels, 256, extend="max")
+    mesh = axes.pcolormesh(found.delays, found.ratios, found.factor, cmap="RdBu_r", norm=norm, shading="nearest")
+    axes.contour(found.delays, found.ratios, found.factor, levels=[1.0], colors=INK, linewidths=1.2)
+    axes.axhline(ratio, color=INK, linewidth=0.9, linestyle="--", label="C/A of the file")
+    axes.set_xlabel("delay that the law does not reckon with, s")
+    axes.set_ylabel("C/A")
+    figure.colorbar(mesh, ax=axes, label="nutation left by a firing and a period: below 1 it damps")
+    style.legend(figure, [axes])
+    return figure

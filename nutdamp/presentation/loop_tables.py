@@ -1,0 +1,137 @@
+"""The screen of ``loop``, and what ``check`` says of a loop: verdict, firings, dead band, how far from feeding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.decision import Decision
+from nutdamp.loop.diagnosis import Stop
+from nutdamp.loop.plan import LoopPlan
+from nutdamp.loop.run import Run
+from nutdamp.loop.stability import SURELY, Margin, dead_band, margins
+from nutdamp.loop_settings import GYRO, Loop
+from nutdamp.presentation.decisions import cost, decision_table, requirement
+from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.plan_tables import header
+from nutdamp.presentation.text import degrees, duration, moment, most
+from nutdamp.spacecraft import Spacecraft
+
+SHOWN = 40
+"""Firings in the table, at most."""
+
+
+def loop_screen(plan: LoopPlan) -> RenderableType:
+    """Everything that ``loop`` shows."""
+    run, decision = plan.flown_run, Decision(plan)
+    parts: list[RenderableType] = [header(plan.spacecraft), Text(), Text(described(run.loop), style="bold")]
+    why = stopped(run)
+    if why:
+        parts.append(Text.assemble(("Stopped: ", "bold red"), f"{why}."))
+    else:
+        parts += list(requirement(decision))
+    parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
+    parts += [Text(), decision_table(decision), Text(), _outcome(plan)]
+    if run.fired:
+        parts += [Text(), _firings(run)]
+        if len(run.fired) > SHOWN:
+            parts.append(Text(f"{len(run.fired) - SHOWN} more firings: --csv writes all", style="dim"))
+    parts += [Text(), margin_table(plan.margins), Text(), end_table(plan.flight, plan.aspects)]
+    return Group(*parts)
+
+
+def described(loop: Loop) -> str:
+    """The loop in a line: law, sensor, thresholds."""
+    sensor = loop.sensor
+    kind = "gyros" if sensor.kind == GYRO else "an accelerometer"
+    rate = "a continuous signal" if sensor.rate is None else f"{sensor.rate:g} Hz"
+    timing = "firings centred on their moments" if loop.predict else "firings begun as the sensor shows their moment"
+    return f"Loop: {loop.law}, from {kind} ({rate}); fires from {most(loop.start)} down to {most(loop.stop)}; {timing}"
+
+
+def stopped(run: Run) -> str:
+    """Why the loop was stopped; empty where it was flown to its end."""
+    if not run.stop.fault:
+        return ""
+    count, after = len(run.fired), ""
+    if run.fired:
+        after = f"after {count} firing{'s' * (count != 1)}, at {moment(run.fired[-1].pulse.end)}: "
+    name = run.channel
+    said = {
+        Stop.SENSOR: "the sensor is reversed: firings of two channels changed what it shows against what they should",
+        Stop.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
+        Stop.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
+        Stop.IDLE: f"channel {name} does nothing, or much less than its torque should",
+        Stop.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
+    }
+    return after + said[run.stop]
+
+
+def warnings(spacecraft: Spacecraft) -> Iterator[str]:
+    """What of the loop in the file will feed the nutation, or wastes propellant: before it is flown."""
+    loop = spacecraft.loop
+    if loop is None:
+        return
+    found = margins(spacecraft, loop)
+    turned = [one.channel for one in found if one.cause.turned]
+    if turned and len(turned) == len(found) and loop.sensor.scale < 0.0:
+        scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
+        yield f"{scale} is a reversed sensor: every firing feeds the nutation"
+    elif turned:
+        how = "is" if len(turned) == 1 else "are"
+        yield f"loop: {' and '.join(turned)} {how} wired backwards against the sensor, and feed the nutation"
+    if not all(one.damps for one in found):
+        from nutdamp.loop.plan import too_late
+
+        yield too_late(next(one for one in found if not one.damps))
+    band = dead_band(spacecraft, loop)
+    if band.step > loop.start * (1.0 + 1e-9):
+        yield (
+            f"loop.start is below {degrees(band.step)}, which the smallest pulse takes away: such a firing leaves "
+            "up to as much as it found; a start above it needs less propellant"
+        )
+    if band.noise > loop.stop > 0.0:
+        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.stop"
+
+
+def _outcome(plan: LoopPlan) -> Table:
+    run, band = plan.flown_run, plan.band
+    table = facts()
+    settled = "never down to the stop threshold" if run.settled is None else f"at {moment(run.settled)}"
+    table.add_row("first quiet", settled)
+    if run.settled is not None:
+        largest, when = plan.largest
+        table.add_row("largest nutation since", f"{degrees(largest)} at {moment(when)}")
+    table.add_row("dead band", f"at most {degrees(band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet")
+    for name, value in cost(Decision(plan)):
+        table.add_row(name, value)
+    table.add_row("flown", f"0 to {moment(run.until)}, noise of seed {run.seed}")
+    return table
+
+
+def _firings(run: Run) -> Table:
+    names = ("firing", "start", "on-time", "channel", "nutation seen", "before", "after")
+    units = ("", "s", "s", "", "deg", "deg", "deg")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    before, after = run.flight.around_pulses()
+    for index, one in enumerate(run.fired[:SHOWN]):
+        angles = (one.seen, float(before.nutation[index]), float(after.nutation[index]))
+        shown = (degrees(angle).removesuffix(" deg") for angle in angles)
+        pulse = one.pulse
+        table.add_row(str(index + 1), f"{pulse.start:.4f}", f"{pulse.on_time:.4f}", pulse.channel, *shown)
+    return table
+
+
+def margin_table(found: tuple[Margin, ...]) -> Table:
+    """How far each channel is from feeding the nutation."""
+    table = columns("channel\n", "late\ndeg", "a firing leaves\n%", "growth in a period\n%", "delay margin\n")
+    for one in found:
+        margin = "none" if one.delay < 0.0 else duration(one.delay)
+        growth = f"{100.0 * (one.growth - 1.0):.3g}"
+        table.add_row(one.channel, f"{math.degrees(one.late):.4g}", f"{100.0 * one.gain:.4g}", growth, margin)
+    return table

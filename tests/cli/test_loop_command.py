@@ -1,0 +1,131 @@
+"""``nutdamp loop`` as a process: what it shows, writes, refuses and names."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from process import Run
+
+BODY = """
+name: Upper
+inertia: {A: 100 kg m^2, C: 70 kg m^2}
+omega0: [0.042 rad/s, 0.036 rad/s, 3 rad/s]
+thrusters:
+  - {name: +M1, torque: [ 20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
+  - {name: -M1, torque: [-20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
+  - {name: +M2, torque: [0,  20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
+  - {name: -M2, torque: [0, -20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
+requirement: {nutation: 0.3 deg}
+"""
+LOOP = """
+loop:
+  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, bias: 0.02 deg/s, delay: 20 ms}
+  start: 0.2 deg
+  stop: 0.05 deg
+  min_interval: 0.5 s
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> str:
+    (tmp_path / "craft.yaml").write_text(BODY + LOOP)
+    return "craft.yaml"
+
+
+def test_a_loop_is_flown_and_written(run: Run, file: str, tmp_path: Path) -> None:
+    done = run("loop", file, "--json", "loop.json", "--csv", "pulses.csv", "--track", "track.csv", "--map", "map.csv")
+    assert done.returncode == 0, done.stderr
+    for text in ("Loop: four-pulse, from gyros (100 Hz)", "met with nominal values", "first quiet", "dead band"):
+        assert text in done.stdout
+    found = json.loads((tmp_path / "loop.json").read_text())
+    assert found["stopped"] == "end"
+    assert found["channel"] is None
+    assert found["meets_requirement"] is True
+    assert found["quiet_s"][0] > found["pulses"][-1]["start_s"]
+    assert found["largest_since_quiet_deg"] <= found["dead_band_deg"]
+    assert {one["damps"] for one in found["margins"]} == {True}
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "pulses.csv").read_text())))
+    assert [row["channel"] for row in rows] == [one["channel"] for one in found["pulses"]]
+    track = list(csv.DictReader(io.StringIO((tmp_path / "track.csv").read_text())))
+    assert float(track[-1]["nutation_deg"]) == pytest.approx(found["flown"]["nutation_deg"])
+    mapped = list(csv.DictReader(io.StringIO((tmp_path / "map.csv").read_text())))
+    assert {row["damps"] for row in mapped} == {"true", "false", ""}
+
+
+def test_the_pulses_fired_again_give_the_same_flight(run: Run, file: str) -> None:
+    flown = json.loads(run("loop", file, "--until", "40s", "--csv", "p.csv", "--json", "-").stdout)
+    again = json.loads(run("simulate", file, "--schedule", "p.csv", "--flown", "--until", "40s", "--json", "-").stdout)
+    assert again["flown"]["nutation_deg"] == pytest.approx(flown["flown"]["nutation_deg"], rel=1e-9)
+    for one, other in zip(again["pulses"], flown["pulses"], strict=True):
+        assert one["nutation_after_deg"] == pytest.approx(other["nutation_after_deg"], rel=1e-9)
+
+
+def test_seeds_are_other_noise(run: Run, file: str) -> None:
+    one, same, other = (run("loop", file, "-q", "--csv", "-", "--seed", seed).stdout for seed in ("3", "3", "4"))
+    assert one == same
+    assert one != other
+
+
+@pytest.mark.parametrize(
+    ("setting", "named"),
+    [
+        ("loop.faults.reversed=[+M1]", "channel +M1 is wired backwards"),
+        ("loop.sensor.scale=-100%", "the sensor is reversed"),
+    ],
+)
+def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, setting: str, named: str) -> None:
+    done = run("loop", file, "--set", setting, "--json", "loop.json")
+    assert done.returncode == 3
+    assert named in done.stderr
+    assert "Stopped: after" in done.stdout
+    checked = run("check", file, "--set", setting)
+    assert checked.returncode == 0
+    assert "Warning: loop" in checked.stdout
+    assert json.loads((tmp_path / "loop.json").read_text())["meets_requirement"] is False
+
+
+def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
+    late = ("--set", "loop.predict=false", "--set", "loop.sensor.delay=2s")
+    done = run("loop", file, *late)
+    assert (done.returncode, done.stdout) == (3, "")
+    assert "deg late; shorten the delays by 0.85" in done.stderr
+    checked = " ".join(run("check", file, *late).stdout.split())
+    assert "Warning: the loop feeds the nutation" in checked
+    found = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
+    assert {one["damps"] for one in found} == {False}
+    assert found[0]["delay_margin_s"] < 0.0
+
+
+def test_a_requirement_that_is_missed_is_said(run: Run, file: str) -> None:
+    done = run("loop", file, "--set", "requirement.nutation=1e-4 deg")
+    assert done.returncode == 4
+    assert "NOT met" in done.stdout
+
+
+def test_a_file_without_a_loop_is_told_what_to_write(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "bare.yaml").write_text(BODY)
+    done = run("loop", "bare.yaml")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "sensor: {kind: gyro" in done.stderr
+    assert run("loop", "bare.yaml", "--until", "-1s").returncode == 2
+    assert run("loop", "bare.yaml", "--plot", "x.txt").returncode == 2
+
+
+def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> None:
+    done = run("loop", file, "--set", "loop.start=0.02deg", "--set", "loop.stop=0.001deg")
+    shown = " ".join(done.stdout.split())
+    assert "loop.start is below 0.02728 deg, which the smallest pulse takes away" in shown
+    assert "noise, bias and steps of the sensor" in shown
+
+
+@pytest.mark.parametrize("sensor", ["{kind: gyro}", "{kind: accelerometer, rate: 20 Hz, position: [1, 0, 0]}"])
+def test_pictures(run: Run, file: str, tmp_path: Path, sensor: str) -> None:
+    done = run("loop", file, "--set", f"loop.sensor={sensor}", "--plot", "l.svg", "--map", "m.svg")
+    assert done.returncode == 0, done.stderr
+    picture, mapped = ((tmp_path / name).read_text() for name in ("l.svg", "m.svg"))
+    assert "start" in picture
+    assert "C/A" in mapped
