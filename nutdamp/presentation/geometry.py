@@ -10,7 +10,7 @@ import numpy as np
 
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude, triaxial
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.track import Track
 
@@ -28,6 +28,12 @@ LEAST = 1e-9
 
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
+
+CLOSE = 1.0 / 125.0
+"""Part of the time shown below which firings that follow each other cannot be told apart: 4 points on a sheet."""
+
+MANY = 3
+"""Firings that are drawn as one, at least."""
 
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not distinguished from its axis."""
@@ -94,6 +100,45 @@ def stretches(flight: Flight, track: Track) -> Iterator[Stretch]:
         now = until
     if now < last:
         yield Stretch(now, last, None)
+
+
+class Block(NamedTuple):
+    """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it something fires."""
+
+    first: int
+    last: int
+    many: int
+    begins: float
+    ends: float
+    on: float
+
+    @property
+    def name(self) -> str:
+        """Its numbers."""
+        if self.many == 1:
+            return str(self.first)
+        return f"{self.first}{'–' if self.many == self.last - self.first + 1 else ' … '}{self.last}"
+
+
+def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Block]:
+    """The firings of a channel, or of all, up to ``until`` s; those that could not be told apart are one.
+
+    These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
+    """
+    groups: list[list[tuple[int, Pulse]]] = []
+    for number, pulse in enumerate(flight.schedule, start=1):
+        if pulse.start > until or channel not in (None, pulse.channel):
+            continue
+        if groups and pulse.start - groups[-1][-1][1].start < CLOSE * until:
+            groups[-1].append((number, pulse))
+        else:
+            groups.append([(number, pulse)])
+    found = []
+    for group in groups:
+        for part in [group] if len(group) >= MANY else [[one] for one in group]:
+            ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
+            found.append(Block(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+    return found
 
 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
@@ -190,7 +235,8 @@ class Cones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
     ``axis`` spin axis, ``momentum`` direction of H, ``rotation`` of ω, (3,); ``body`` and ``space`` (n, 3) are the
-    rims of the cones, which touch along ``rotation``. A rim is empty where there is no cone.
+    rims of the cones, which touch along ``rotation``. A rim is empty where there is no cone. ``swept`` (m, 3) is the
+    circle that the space cone fills: its rim, and where I1 ≠ I2 the one about a rim that never closes.
     """
 
     axis: Vector
@@ -198,6 +244,7 @@ class Cones(NamedTuple):
     rotation: Vector
     body: Vector
     space: Vector
+    swept: Vector
 
 
 def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
@@ -212,17 +259,17 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
     momentum = attitude.rotate(quaternion, moments * rates)
     rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
     if moments[0] == moments[1]:
-        return Cones(axis, direction, rotation, around(axis, rotation), around(direction, rotation))
+        space = around(direction, rotation)
+        return Cones(axis, direction, rotation, around(axis, rotation), space, space)
     period = triaxial.nutation_period(flight.moments, rates)
     if not math.isfinite(period):
-        return Cones(axis, direction, rotation, np.empty((0, 3)), np.empty((0, 3)))
+        return Cones(axis, direction, rotation, *np.empty((3, 0, 3)))
     times = np.linspace(0.0, period, 4 * RIM)
     polhode = triaxial.free_rates(flight.moments, rates, times)
     turns = triaxial.free_attitude(flight.moments, rates, quaternion, times)
     size = np.linalg.norm(polhode, axis=1, keepdims=True)
-    return Cones(
-        axis, direction, rotation, attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
-    )
+    body, space = attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
+    return Cones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
 
 
 def body_mark(found: Cones, quaternion: Vector) -> Vector:

@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import aimed, cross, fan, spinner
+from colours import check_colours, contrast, pages
 from layout import check_layout, texts
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Annotation
@@ -27,13 +28,12 @@ from scipy.spatial import ConvexHull
 import nutdamp.library.views  # noqa: F401 - figures of flights are declared there
 from nutdamp import flight, planning
 from nutdamp.presentation import figures, geometry
-from nutdamp.presentation.figures import sphere
-from nutdamp.presentation.figures.style import GREY, INK
+from nutdamp.presentation.figures import sphere, style
+from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse
-from nutdamp.spacecraft import Attitude, Limits, Requirement, Spacecraft, Steerable
+from nutdamp.spacecraft import Attitude, Limits, Requirement, Spacecraft, Steerable, Vector
 
 NAMES = ("overview", "motion", "sphere", "history", "timeline")
-PAGE = Path(figures.__file__).parents[1] / "page" / "page.css"
 
 TORQUER = Steerable(50.0)
 BODY = spinner(channels=cross(20.0), requirement=Requirement(0.01, 0.005))
@@ -123,6 +123,22 @@ def test_titles_name_scheme_model_and_result(by_impulses: bool, model: str) -> N
         assert re.search(r"nutation 5 deg → < 1e-9 deg, shift of H \S+", heading)
 
 
+def test_titles_of_a_turn_say_how_far_to_which_target_and_the_pictures_mark_it() -> None:
+    """It is 110 degrees: nutation alone would be a word about the least of it."""
+    for name in NAMES:
+        lines = drawn(name, "far target").get_suptitle().splitlines()
+        assert lines[1] == "H turned 110 deg to the target, tilt 110.0000 deg, azimuth 20.0000 deg"
+        assert re.fullmatch(r"nutation \S+ deg → .* deg, H off the target .* deg", lines[2])
+    for name, panels in (("overview", (1, 2)), ("motion", (1,)), ("sphere", (0,))):
+        for panel in panels:
+            axes = drawn(name, "far target").axes[panel]
+            (mark,) = (one for one in axes.lines if one.get_label() == "target")
+            assert mark.get_marker() == "*"
+            (x, y) = np.asarray(mark.get_xydata())[0]
+            assert axes.get_xlim()[0] < x < axes.get_xlim()[1]
+            assert axes.get_ylim()[0] < y < axes.get_ylim()[1]
+
+
 @pytest.mark.parametrize("case", ["celestial", "three moments"])
 def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
     right = "east" if case == "celestial" else "x of N"
@@ -197,6 +213,94 @@ def test_steering_angles_are_those_of_the_table_and_say_from_where() -> None:
     assert angles == expected
 
 
+def joined_to(axes: Axes, note: Annotation, figure: Figure) -> Vector:
+    """Where in its panel a label points: the end of its line, else the middle of the label itself; pixels."""
+    box = note.get_window_extent()
+    for one in axes.lines:
+        if one.get_label() == "_leader":
+            ends = np.asarray(axes.transData.transform(one.get_xydata()))
+            if np.hypot(*np.maximum(np.maximum(box.p0 - ends[1], ends[1] - box.p1), 0.0)) < 1.0:
+                return np.asarray(ends[0])
+    return np.array([0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)])
+
+
+def test_each_direction_is_named_at_the_tip_of_its_own_arrow() -> None:
+    """In its colour; by a thin line where the tips lie close together."""
+    for case in ODD:
+        for name, panels in (("overview", [2]), ("sphere", [0, 1])):
+            figure = drawn(name, case)
+            figure.draw_without_rendering()
+            for panel in panels:
+                axes = figure.axes[panel]
+                notes = {n.get_text(): n for n in bar_labels(axes) if n.get_text() in ("H", "ω", "spin axis")}
+                assert len(notes) == 3, (case, name)
+                assert [to_hex(notes[text].get_color()) for text in ("ω", "spin axis")] == [INK, MOTION.lower()]
+                tips = {text: np.asarray(axes.transData.transform(note.xy)) for text, note in notes.items()}
+                for text, note in notes.items():
+                    away = {other: np.hypot(*(joined_to(axes, note, figure) - tip)) for other, tip in tips.items()}
+                    assert away[text] <= min(away.values()) + 1.0, (case, name, text)
+
+
+@pytest.mark.parametrize("case", ["one pulse", "oblate", "celestial", "blackouts", "120 pulses", "16 channels"])
+def test_each_number_belongs_to_its_own_stretch_of_the_path(case: str) -> None:
+    body, pulses = ODD[case]
+    made, track = figures.shown(planning.Plan(body, "trial", pulses))
+    track = geometry.drawn(made, track)
+    figure = drawn("motion", case)
+    figure.draw_without_rendering()
+    paths = (geometry.pole_path(track), geometry.sky_paths(made, track)[0])
+    firings = {part.pulse + 1: part for part in geometry.stretches(made, track) if part.pulse is not None}
+    for axes, path in zip(figure.axes[:2], paths, strict=True):
+        notes = [note for note in bar_labels(axes) if note.get_text().isdigit()]
+        if len(pulses) <= 10:
+            assert sorted(int(note.get_text()) for note in notes) == list(range(1, len(pulses) + 1))
+        for note in notes:
+            place = joined_to(axes, note, figure)
+            away = {}
+            for number, part in firings.items():
+                ends = path[part.first : part.last + 1]
+                between = np.linspace(0.0, len(ends) - 1.0, 200)
+                fine = [np.interp(between, np.arange(len(ends)), column) for column in ends.T]
+                rows = axes.transData.transform(np.transpose(fine))
+                away[number] = float(np.hypot(*(rows - place).T).min())
+            assert away[int(note.get_text())] <= min(away.values()) + 3.0, (case, note.get_text())
+
+
+# --- many pulses -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("count", "most"), [(1, 17), (10, 17), (34, 17), (120, 17), (457, 24), (2, 3), (1000, 3)])
+def test_of_many_the_first_the_last_and_round_numbers_are_shown(count: int, most: int) -> None:
+    shown = [number + 1 for number in style.thinned(count, most)]
+    assert shown[0] == 1
+    assert shown[-1] == count
+    assert len(shown) <= most
+    assert shown == sorted(set(shown))
+    steps = set(np.diff(shown[1:-1]).tolist())
+    assert len(steps) <= 1
+    if count <= most - 1:
+        assert shown == list(range(1, count + 1))
+
+
+def test_firings_that_cannot_be_told_apart_are_drawn_as_one() -> None:
+    """120 firings of 10 ms, 0.4 s apart, over a minute: bars thinner than a pixel would alias. Nothing is lost."""
+    body, pulses = ODD["120 pulses"]
+    made, track = figures.shown(planning.Plan(body, "trial", pulses))
+    until = float(track.t[-1])
+    every = geometry.blocks(made, until)
+    assert [(block.first, block.last, block.many) for block in every] == [(1, 120, 120)]
+    assert every[0].on == pytest.approx(1.2)
+    assert (every[0].begins, every[0].ends) == pytest.approx((pulses.pulses[0].start, pulses.end))
+    axes = drawn("history", "120 pulses").axes[0]
+    assert len([patch for patch in axes.patches if to_hex(patch.get_facecolor()) == PULSE.lower()]) == 1
+    apart = ODD["16 channels"]
+    made, track = figures.shown(planning.Plan(apart[0], "trial", apart[1]))
+    assert [block.many for block in geometry.blocks(made, float(track.t[-1]))] == [1] * 32
+    # Two close together are still two bars.
+    pair = replace(made, schedule=Schedule(kicks(BODY, 2, 0.01, 0.005).pulses))
+    assert [block.many for block in geometry.blocks(pair, 100.0)] == [1, 1]
+
+
 # --- cones -----------------------------------------------------------------------------------------------------------
 
 
@@ -220,8 +324,8 @@ def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None
     axes = drawn("sphere", case).axes[0]
     filled = [patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3]
     assert len(filled) == 2
-    for patch, rim in zip(filled, (found.space, found.body), strict=True):
-        points = np.vstack([looked.seen(rim)[0], [[0.0, 0.0]]])
+    for patch, rim, within in zip(filled, (found.space, found.body), (found.swept, found.body), strict=True):
+        points = np.vstack([looked.seen(rim)[0], looked.seen(within)[0], [[0.0, 0.0]]])
         edges = np.diff(patch.get_xy(), axis=0)
         to_points = points[:, None, :] - patch.get_xy()[None, :-1, :]
         cross_product = edges[:, 0] * to_points[..., 1] - edges[:, 1] * to_points[..., 0]
@@ -282,31 +386,11 @@ def test_where_h_moves_little_it_is_shown_enlarged() -> None:
 # --- colours and files -----------------------------------------------------------------------------------------------
 
 
-def contrast(one: str, other: str) -> float:
-    """Ratio of WCAG 2.1."""
-    bright = []
-    for colour in (one, other):
-        parts = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
-        bright.append(float(np.dot(parts, (0.2126, 0.7152, 0.0722))))
-    return (max(bright) + 0.05) / (min(bright) + 0.05)
-
-
+@pytest.mark.parametrize("case", ["reversed", "far target", "120 pulses"])
 @pytest.mark.parametrize("name", NAMES)
-def test_all_text_can_be_read_on_white_and_in_the_dark(name: str) -> None:
-    css = PAGE.read_text(encoding="utf-8")
-    papers = re.findall(r"--paper: (#\w+)", css)
-    inks = re.findall(r"--ink: (#\w+)", css)
-    assert len(papers) == len(inks) == 2
-    assert all(contrast(ink, paper) > 4.5 for ink, paper in zip(inks, papers, strict=True))
-    lighter: dict[str, str] = {}
-    for selectors, colour in re.findall(r"^\s*(\[style[^{]*)\{ fill: (#\w+) !important", css, re.MULTILINE):
-        lighter |= dict.fromkeys(re.findall(r"fill: (#\w+)", selectors), colour)
-    for text, _ in texts(drawn(name, "reversed")):
-        colour = to_hex(text.get_color())
-        assert contrast(colour, "#ffffff") >= 4.5, text.get_text()
-        if colour != INK:  # which becomes that of the page
-            assert contrast(lighter[colour], papers[1]) >= 4.5, text.get_text()
-    assert contrast(GREY, "#ffffff") > 3.0
+def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case: str) -> None:
+    check_colours(drawn(name, case))
+    assert all(contrast(GREY, paper) > 3.0 for paper, _ in pages())
 
 
 def test_svg_has_its_text_as_text() -> None:

@@ -202,3 +202,24 @@ def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
     made = flight.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
     found = list(geometry.stretches(made, made.sampled(20, 1.0)))
     assert [one.pulse for one in found] == [0, None]
+
+
+def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
+    """The space cone of I1 ≠ I2 over a long time reaches as far as it does in one period, all around."""
+    body = spinner(moments=(120.0, 100.0, 80.0), degrees=25.0)
+    made = flight.flown(body, Schedule(), 600.0)
+    found = geometry.cones(made, body.initial.rates, body.initial.quaternion)
+    away = angle_between(found.swept, found.momentum)
+    assert np.ptp(away) < 1e-9
+    assert angle_between(found.space, found.momentum).max() == pytest.approx(away[0])
+    motion = reference.fly((120.0, 100.0, 80.0), body.omega0, [], 97.3, attitude.matrix(body.initial.quaternion))
+    assert (
+        angle_between(motion.rotation @ (motion.rates / np.linalg.norm(motion.rates)), found.momentum) <= away[0] + 1e-9
+    )
+    assert np.array_equal(
+        geometry.cones(*_still(BODIES["oblate"])).swept, geometry.cones(*_still(BODIES["oblate"])).space
+    )
+
+
+def _still(body: Spacecraft) -> tuple[Flight, Vector, Vector]:
+    return flight.flown(body, Schedule(), 1.0), body.initial.rates, body.initial.quaternion

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from builders import aimed, cross, spinner
+from colours import check_colours
 from dispersed import normal
 from layout import check_layout, texts
 from matplotlib.axes import Axes
@@ -463,3 +464,13 @@ def test_points_close_together_keep_numbers_that_can_be_read() -> None:
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
     check_layout(figure)
     assert {str(count) for count in range(1, 81)} <= {text.get_text() for text, _ in texts(figure)}
+
+
+# --- colours ---------------------------------------------------------------------------------------------------------
+
+
+def test_studies_can_be_seen_on_white_and_in_the_dark() -> None:
+    for name in NAMES:
+        check_colours(drawn(name))
+    check_colours(figures.schemes_figure(compared()))
+    check_colours(figures.trade_figure(BODY, traded(), compared().recommended))

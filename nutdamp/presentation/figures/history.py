@@ -29,6 +29,9 @@ DECADES = 4.0
 EDGE = 0.012
 """Room before t = 0, as a part of the time shown: what happens at once must be seen."""
 
+FULL, PALE = 0.9, 0.35
+"""Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
+
 BAR = 0.46
 """Height of a bar; the distance between two rows is 1."""
 
@@ -134,20 +137,31 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
                 linewidth=0.0, alpha=0.5, label=named,
             )  # fmt: skip
             named = ""
-    for number, pulse in enumerate(flight.schedule, start=1):
-        row = rows[pulse.channel]
-        if pulse.start > until:
-            break
-        bar = (row - 0.5 * BAR, BAR)
-        axes.broken_barh([(pulse.start, pulse.on_time)], bar, facecolor=PULSE, edgecolor=PULSE, linewidth=0.8)
-        text = str(number) if brief else _firing(number, pulse, flight)
-        style.label(axes, text, np.array([pulse.t, row + 0.5 * BAR]), INK, role="bar", short=str(number))
+    bars = ((block, row) for name, row in rows.items() for block in geometry.blocks(flight, until, name))
+    for block, row in sorted(bars):
+        _bar(axes, flight, block, row, brief=brief)
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
     steered = any(pulse.channel == STEERABLE for pulse in flight.schedule)
     axes.set_title("Firings" + (", direction of the torque from body axis +1" if steered and not brief else ""))
     if not names:
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")
+
+
+def _bar(axes: Axes, flight: Flight, block: geometry.Block, row: int, *, brief: bool) -> None:
+    """The bar of a firing, or of several that cannot be told apart: paler where they do not fill it."""
+    size = block.ends - block.begins
+    dense = block.many == 1 or block.on > FULL * size
+    axes.broken_barh(
+        [(block.begins, size)], (row - 0.5 * BAR, BAR), facecolor=PULSE if dense else (PULSE, PALE), edgecolor=PULSE,
+        linewidth=0.8, label=None if dense else "many firings, too close to be told apart",
+    )  # fmt: skip
+    text = block.name
+    if not brief:
+        pulse = flight.schedule.pulses[block.first - 1]
+        text = _firing(block.first, pulse, flight) if block.many == 1 else f"{text}: {block.on:.3g} s in all"
+    place = np.array([block.begins + 0.5 * size, row + 0.5 * BAR])
+    style.label(axes, text, place, INK, role="bar", short=block.name)
 
 
 def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
@@ -179,11 +193,10 @@ def _finish(axes: Axes, flight: Flight, track: Track, values: np.ndarray, name: 
     half = half if half > 1e-9 else 1.0
     axes.set_ylim(0.5 * (low + high) - half, 0.5 * (low + high) + half)
     axes.set_xlim(-EDGE * float(track.t[-1]), float(track.t[-1]))
-    for pulse in flight.schedule:
-        if pulse.start <= track.t[-1]:
-            axes.axvspan(
-                pulse.start, pulse.end, facecolor=PULSE, edgecolor=PULSE, linewidth=0.6, alpha=0.25, zorder=0.5,
-                label="firing" if pulse is flight.schedule.pulses[0] else None,
-            )  # fmt: skip
+    for number, block in enumerate(geometry.blocks(flight, float(track.t[-1]))):
+        axes.axvspan(
+            block.begins, block.ends, facecolor=(PULSE, 0.25), edgecolor=PULSE, linewidth=0.6, zorder=0.5,
+            label=None if number else "firing",
+        )  # fmt: skip
     axes.set_ylabel(name)
     axes.grid()

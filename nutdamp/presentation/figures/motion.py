@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
+from nutdamp.presentation.end_tables import direction_text
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, Meant
 from nutdamp.presentation.text import degrees, moment
 from nutdamp.spacecraft import Channel, Vector
 from nutdamp.track import Track
@@ -21,6 +23,12 @@ if TYPE_CHECKING:
 
 ALIKE = math.radians(2.0)
 """Channels whose torques point within this angle share one arrow."""
+
+NUMBERED = 17
+"""Pulses of a path that are numbered, and have arrowheads, at most."""
+
+SPARSE = 40
+"""Pulses of which each has a dot."""
 
 LONGEST_NAME = 40
 """Characters of a name that fit above a picture."""
@@ -47,10 +55,16 @@ def title(flight: Flight) -> str:
     left, count = flight.residual, len(flight.schedule)
     how = " ".join(filter(None, (flight.scheme, f"by {flight.model}")))
     swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
-    aim = "shift of H" if flight.spacecraft.goal.axis is None else "off the target"
+    goal = flight.spacecraft.goal.axis
+    aim = "shift of H" if goal is None else "H off the target"
     pulses = "no pulse" if not count else f"{count} pulse{'s' * (count > 1)} until {moment(flight.schedule.end)}"
     result = f"nutation {swings}{degrees(flight.spacecraft.nutation)} → {degrees(left.nutation)}"
-    return f"{short_name(flight)}: {how}, {pulses}\n{result}, {aim} {degrees(left.axis_error)}"
+    turn = (
+        ""
+        if goal is None
+        else f"H turned {degrees(flight.spacecraft.to_turn)} to the target, {direction_text(flight.spacecraft, goal)}\n"
+    )
+    return f"{short_name(flight)}: {how}, {pulses}\n{turn}{result}, {aim} {degrees(left.axis_error)}"
 
 
 def short_name(flight: Flight) -> str:
@@ -83,7 +97,7 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     target = geometry.sky_target(flight, track)
     if len(target):
-        axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none", label="target")
+        axes.plot(*target.T, label="target", **style.TARGET)
     sky = geometry.sky_names(flight)
     style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")
@@ -92,11 +106,12 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
 def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small: Vector) -> None:
     """Where H goes, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
     stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
-    for number in style.thinned(len(flight.schedule), 16):
-        style.label(axes, str(number + 1), stations[number + 1], FIRED)
+    for number in style.thinned(len(stations) - 1, NUMBERED):
+        others = np.delete(stations, number + 1, axis=0)
+        style.label(axes, str(number + 1), stations[number + 1], FIRED, meant=Meant(stations[[number + 1]], others))
     style.label(axes, "t = 0", stations[0], INK, role="vital")
     target = geometry.sky_target(flight, track)
-    axes.plot(*target.T, "*", color=INK, markersize=9, markerfacecolor="none")
+    axes.plot(*target.T, **style.TARGET)
     style.square(axes, small, margin=0.25)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     space.plot([left, right, right, left, left], [low, low, high, high, low], color=INK, linewidth=THIN)
@@ -109,42 +124,55 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
     """The path of H, (n, 2) degrees, with its places at first and after each pulse, which are returned."""
     axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
     stations = [momentum[:1]]
+    numbered = style.thinned(len(flight.schedule), NUMBERED)
     for stretch in geometry.stretches(flight, track):
         if stretch.pulse is not None:
             moved = _refined(momentum[stretch.first : stretch.last + 1])
             stations.append(moved[-1:])
-            if np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
+            if stretch.pulse in numbered and np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
                 style.heads(axes, moved, _halfway(moved), MOMENTUM)
     places = np.vstack(stations)
-    axes.plot(*places.T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
+    marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
+    axes.plot(*places[marked].T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
     return places
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     """A path (n, 2) with its beginning, its sense, and its pulses: numbered where there is room."""
-    coasts, firings = [], []
+    coasts: list[Vector] = []
+    firings: list[Vector] = []
     width = float(np.ptp(points, axis=0).max())
-    numbered = style.thinned(len(flight.schedule), 16)
+    numbered = style.thinned(len(flight.schedule), NUMBERED)
     for stretch in geometry.stretches(flight, track):
         rows = points[stretch.first : stretch.last + 1]
         if stretch.pulse is None:
             coasts.append(rows)
-            style.heads(axes, rows, _halfway(rows), MOTION)
+            if len(firings) in numbered or len(firings) == len(flight.schedule):
+                style.heads(axes, rows, _halfway(rows), MOTION)
             continue
         firings.append(rows)
-        fine = _refined(rows)
-        if np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
+        if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
+            fine = _refined(rows)
             style.heads(axes, fine, [len(fine) - 1], PULSE)
-        if stretch.pulse in numbered:
-            style.label(axes, str(stretch.pulse + 1), fine[len(fine) // 2], FIRED)
+    _number(axes, [_refined(rows) for rows in firings])
     thin = style.thickness(points) / style.LINE
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
         axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
-        axes.plot(*np.array([rows[0] for rows in firings]).T, ".", color=PULSE, markersize=5)
+        begins = [rows[0] for number, rows in enumerate(firings) if len(firings) <= SPARSE or number in numbered]
+        axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
     style.label(axes, "t = 0", points[0], INK, role="vital")
+
+
+def _number(axes: Axes, firings: Sequence[Vector]) -> None:
+    """Numbers of pulses beside their stretches of a path, (n, 2) each."""
+    some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
+    for number in style.thinned(len(firings), NUMBERED):
+        others = [rows for other, rows in enumerate(some) if other != number]
+        meant = Meant(some[number], np.vstack([np.empty((0, 2)), *others]))
+        style.label(axes, str(number + 1), firings[number][len(firings[number]) // 2], FIRED, meant=meant)
 
 
 def _refined(rows: Vector) -> Vector:

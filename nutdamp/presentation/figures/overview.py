@@ -19,10 +19,11 @@ def flight_figure(name: str, flight: Flight, track: Track) -> Figure:
     seen = geometry.drawn(flight, track)
     figure = DRAWN[name](flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
+    cut = until < 0.99 * end
     for axes in figure.axes:
-        if axes.get_xlabel() == history.TIME and until < end:
+        if axes.get_xlabel() == history.TIME and cut:
             axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
-    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < end else ""
+    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if cut else ""
     figure.suptitle(motion.title(flight) + part)
     style.settle(figure)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED, Meant
 from nutdamp.presentation.geometry import Cones
 from nutdamp.spacecraft import Vector
 from nutdamp.track import Track
@@ -64,7 +65,7 @@ def view(flight: Flight, track: Track) -> View:
     plane = geometry.sky_plane(flight, track.momentum[0])
     first = geometry.cones(flight, track.rates[0], track.quaternion[0])
     local = first.axis @ plane.T
-    shown = np.vstack([track.axis, track.momentum, first.body, first.space])
+    shown = np.vstack([track.axis, track.momentum, first.body, first.space, *aimed(flight)])
     angles = np.radians(np.hypot(*geometry.on_sky(plane, shown).T))
     return View(plane, math.atan2(local[1], local[0]) - ASIDE, magnification(float(angles.max())))
 
@@ -94,10 +95,12 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     draw_ground(axes, looked, track)
     draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, found)
-    for direction, _, name in _directions(found):
-        style.label(axes, name, looked.seen(direction)[0][0], role="vital")
+    target = flight.spacecraft.goal.axis
+    if target is not None:
+        axes.plot(*looked.seen(target)[0].T, label="target", **style.TARGET)
+    _name_tips(axes, found, lambda direction: looked.seen(direction)[0][0])
     name_lines(axes, found, pulses=bool(len(flight.schedule)))
-    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum]))
+    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
     axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
 
@@ -126,9 +129,9 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
 
 def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
     """Space cone, body cone, and the three directions that lie in one plane."""
-    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
+    for rim, within, colour, alpha in _rims(found):
         if len(rim):
-            _cone(axes, looked, rim, colour, alpha)
+            _cone(axes, looked, rim, within, (colour, alpha))
     for direction, colour, _ in _directions(found):
         tip = looked.seen(direction)[0][0]
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
@@ -138,8 +141,8 @@ def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
 def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(found.body):
-        axes.fill([], [], facecolor=MOMENTUM, alpha=SPACE, label="space cone")
-        axes.fill([], [], facecolor=MOTION, alpha=BODY, label="body cone")
+        axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
+        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label="body cone")
     axes.plot([], [], color=MOTION, linewidth=1.0, label="path")
     if pulses:
         axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
@@ -157,12 +160,30 @@ def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
     return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
 
 
-def _cone(axes: Axes, looked: View, rim: Vector, colour: str, alpha: float) -> None:
+def aimed(flight: Flight) -> Vector:
+    """(n, 3): the target axis, or none."""
+    return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
+
+
+def _name_tips(axes: Axes, found: Cones, place: Callable[[Vector], Vector]) -> None:
+    """The names of the three directions at the tips of their arrows, each in the colour of its own."""
+    named = _directions(found)
+    tips = np.array([place(direction) for direction, _, _ in named])
+    for number, (_, colour, name) in enumerate(named):
+        meant = Meant(tips[[number]], np.delete(tips, number, axis=0))
+        style.label(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
+
+
+def _rims(found: Cones) -> tuple[tuple[Vector, Vector, str, float], ...]:
+    """Rim, circle about it, colour and density of the cones."""
+    return (found.space, found.swept, MOMENTUM, SPACE), (found.body, found.body, MOTION, BODY)
+
+
+def _cone(axes: Axes, looked: View, rim: Vector, within: Vector, filled: tuple[str, float]) -> None:
     """A cone from the centre to its rim: what it covers on paper filled and outlined, rim drawn."""
-    points, _ = looked.seen(rim)
-    covered = geometry.hull(np.vstack([points, [[0.0, 0.0]]]))
-    axes.fill(*covered.T, facecolor=(colour, alpha), edgecolor=colour, linewidth=0.8)
-    axes.plot(*points.T, color=colour, linewidth=1.0)
+    covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
+    axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=0.8)
+    axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=1.0)
 
 
 def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
@@ -193,8 +214,7 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     plane = geometry.sky_plane(flight, track.momentum[0])
     found = geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_circles(axes, plane, found)
-    for direction, _, name in _directions(found):
-        style.label(axes, name, geometry.on_sky(plane, direction[None])[0])
+    _name_tips(axes, found, lambda direction: geometry.on_sky(plane, direction[None])[0])
     shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
     style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
     sky = geometry.sky_names(flight)
@@ -203,11 +223,11 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
 
 def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
     """Rims of the cones with their axes and where they touch, on the sky."""
-    for rim, colour, alpha in ((found.space, MOMENTUM, SPACE), (found.body, MOTION, BODY)):
+    for rim, within, colour, alpha in _rims(found):
         if len(rim):
-            ring = geometry.on_sky(plane, rim)
-            axes.fill(*geometry.hull(ring).T, facecolor=colour, alpha=alpha, edgecolor="none")
-            axes.plot(*ring.T, color=colour, linewidth=1.0)
+            filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
+            axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
+            axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8)
     for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):

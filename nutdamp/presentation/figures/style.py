@@ -7,7 +7,8 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -30,14 +31,22 @@ MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
 FIRED = "#B34700"
 """Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 asks for 4.5:1)."""
 
+TURNED = "#007a58"
+"""Words about H: as `MOMENTUM`, dark enough to be read on white (5.3:1)."""
+
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
 """Text and ω; marks; the circles of the sphere."""
+
+TARGET: dict[str, Any] = {
+    "marker": "*", "color": INK, "markersize": 12, "markerfacecolor": "none", "linestyle": "", "zorder": 4
+}  # fmt: skip
+"""Mark of the target axis: larger than the marks of what ends there, and over them."""
 
 PAPER = "#fefefe"
 """What lies under a hollow mark; in a page, its background."""
 
-LINE, THIN = 1.3, 0.7
-"""Line widths, points."""
+LINE, THIN, LEADER = 1.3, 0.7, 0.5
+"""Line widths, points; the last is that from a label to what it is of."""
 
 SMALL = 7.5
 """Size of labels inside a panel, points."""
@@ -143,12 +152,32 @@ def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -
     axes.grid()
 
 
-def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str = "label", short: str = "") -> None:
+class Meant(NamedTuple):
+    """What a label is of, (n, 2), and what it must not be taken for, (m, 2): points in the units of its panel."""
+
+    own: Vector
+    others: Vector
+
+
+_MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()
+"""By label, until it is settled."""
+
+
+def label(
+    axes: Axes,
+    text: str,
+    place: Vector,
+    colour: str = INK,
+    *,
+    role: str = "label",
+    short: str = "",
+    meant: Meant | None = None,
+) -> None:
     """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
 
     ``label`` goes anywhere around its point and may be left out; ``number`` stays where it is put, along the edge of a
     panel; ``vital`` is never left out; ``bar`` is above the bar of a firing, and reads ``short`` where not all of
-    them have room.
+    them have room. What is ``meant`` is nearest to the label, or joined to it by a thin line.
     """
     note = axes.annotate(
         text,
@@ -162,7 +191,12 @@ def label(axes: Axes, text: str, place: Vector, colour: str = INK, *, role: str 
         annotation_clip=False,
     )
     note.set_label(f"_{role}{short}")  # begins so that no legend shows it
+    if meant is not None:
+        _MEANT[note] = meant
 
+
+PASSES = 8
+"""Of the layout at most, until panels of equal scales move by less than a pixel."""
 
 BAR_GAP = 2.0
 """Points between a bar and its label."""
@@ -185,13 +219,20 @@ _OFFSETS = {
 FAR = 15.0
 """Points from which a line leads from a label to its point."""
 
-_COVERED = {"_vital": np.inf, "_label": 12.0, "_number": np.inf}
+_COVERED = {"_vital": np.inf, "_label": 14.0, "_number": np.inf}
 """Points of curves, 4 pixels apart, that a label may cover."""
 
 
 def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
-    figure.draw_without_rendering()
+    before = np.zeros(1)
+    for _ in range(PASSES):
+        figure.draw_without_rendering()
+        now = np.array([axes.get_window_extent().extents for axes in figure.axes])
+        if now.shape == before.shape and np.abs(now - before).max(initial=0.0) < 1.0:
+            break
+        before = now
+    figure.set_layout_engine("none")  # labels are put where panels are now
     order = list(_OFFSETS)
     for axes in figure.axes:
         notes: list[Any] = sorted(
@@ -202,8 +243,10 @@ def settle(figure: Figure) -> None:
         taken: list[Bbox] = []
         window, points = axes.get_window_extent(), figure.dpi / 72.0
         for note in notes:
-            _settle(note, taken, curves, window, points)
-            _lead(axes, note, points)
+            box = _settle(note, taken, curves, window, points)
+            if box is not None:
+                curves = np.vstack([curves, _lead(note, box, points)])
+            _MEANT.pop(note, None)
         bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
         if bars:
             _settle_bars(bars, window, points)
@@ -236,12 +279,13 @@ def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annota
     return fitting
 
 
-def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> None:
-    """One label; ``window`` is that of its panel, ``points`` how many pixels a point is."""
+def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> Bbox | None:
+    """Where one label is put; ``window`` is that of its panel, ``points`` how many pixels a point is."""
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
     best, least = None, np.inf
-    for x, y in _OFFSETS[role]:
+    led = note in _MEANT
+    for x, y in [*_AROUND, *_FAR] if led else _OFFSETS[role]:
         # Sideways offsets are counted from the edge of the text, so that long names stand as near as short ones.
         offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
         box = here.translated(offset[0] * points, offset[1] * points)
@@ -249,6 +293,8 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
         covered = float(np.count_nonzero(inside)) + 0.04 * float(np.hypot(x, y))
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
         out = 0.0 if role == "_number" else out
+        if led and not _nearest(note, box, points):
+            covered += 3.0 if np.hypot(x, y) > FAR else 1e3
         if out > 0.0 or any(box.overlaps(other) for other in taken):
             if role != "_vital":
                 continue
@@ -257,18 +303,46 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
             best, least = (offset, box), covered
     if best is None:
         note.set_visible(False)
-        return
+        return None
     note.set_position(best[0])
     taken.append(best[1])
+    return best[1]
 
 
-def _lead(axes: Axes, note: Annotation, points: float) -> None:
-    """A thin line from a label that stands far from its point."""
-    box, (x, y) = note.get_window_extent(), axes.transData.transform(note.xy)
-    aside, above = max(box.x0 - x, x - box.x1, 0.0), max(box.y0 - y, y - box.y1, 0.0)
-    if note.get_visible() and math.hypot(aside, above) > FAR * points:
-        look = {"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 3.0}
-        axes.annotate("", note.xy, note.get_position(), textcoords="offset points", arrowprops=look)
+NEARER, NEAR = 0.45, 8.0
+"""What a label is of is nearer to it than this share of the distance to anything it could be taken for, and than this
+many points."""
+
+
+def _nearest(note: Annotation, box: Bbox, points: float) -> bool:
+    """Whether a label in a ``box`` of pixels is clearly that of what it is meant for."""
+    axes: Any = note.axes
+    if note not in _MEANT:
+        return _away(box, axes.transData.transform([note.xy])) <= FAR * points
+    own, others = (_away(box, np.asarray(axes.transData.transform(part))) for part in _MEANT[note])
+    return own < min(NEARER * others, NEAR * points)
+
+
+def _away(box: Bbox, places: Vector) -> float:
+    """Distance of the nearest of some ``places`` (n, 2) from a box; infinite where there are none."""
+    beyond = np.maximum(np.maximum([box.x0, box.y0] - places, places - [box.x1, box.y1]), 0.0)
+    return float(np.hypot(*beyond.T).min(initial=np.inf))
+
+
+def _lead(note: Annotation, box: Bbox, points: float) -> Vector:
+    """The points, 4 pixels apart, of a thin line from a label to what it is of; none where that is nearest anyhow."""
+    axes: Any = note.axes
+    if _nearest(note, box, points):
+        return np.empty((0, 2))
+    tip = np.asarray(axes.transData.transform(note.xy))
+    inner = box.padded(-1.5 * points)
+    edge = np.clip(tip, [inner.x0, inner.y0], [inner.x1, inner.y1])
+    ends = np.asarray(axes.transData.inverted().transform([tip, edge]))
+    limits = axes.get_xlim(), axes.get_ylim()
+    axes.plot(*ends.T, color=note.get_color(), linewidth=LEADER, label="_leader", zorder=2.5)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    steps = np.linspace(0.0, 1.0, max(int(np.hypot(*(edge - tip)) / 4.0), 2))[:, None]
+    return np.asarray(tip + steps * (edge - tip))
 
 
 def thickness(path: Vector, turns: float | None = None) -> float:
@@ -317,6 +391,8 @@ def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -
         )  # fmt: skip
 
 
-def thinned(count: int, most: int = 60) -> range:
-    """Which of ``count`` numbered things to try a label for; those that find no room are left out by `settle`."""
-    return range(0, count, max(1, -(-count // most)))
+def thinned(count: int, most: int = 24) -> list[int]:
+    """Which of ``count`` things to number, from 0: the first, the last, and between them those of round numbers."""
+    steps = (many * 10**power for power in range(10) for many in (1, 2, 5))
+    step = next(step for step in steps if count <= step * (most - 1))
+    return [n - 1 for n in range(1, count + 1) if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)]

@@ -37,7 +37,8 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
         scheme = guide.found(chosen.scheme)
         lines += _listed(scheme, _formulas(scheme)[0])
     yield Listing("Equations", "\n".join(lines))
-    yield Facts("Symbols", (*_symbols(topics, chosen), *_floors(compared.spacecraft)))
+    symbols = _symbols(topics, chosen, " ".join(lines))
+    yield Facts("Symbols", (*symbols, *_floors(compared.spacecraft)))
     yield Points(guide.SOURCES[:1])
 
 
@@ -50,14 +51,14 @@ def _listed(topic: Topic, formula: Formula) -> list[str]:
     return [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in formula.lines), ""]
 
 
-def _symbols(topics: list[Topic], chosen: Plan | None) -> Iterator[tuple[str, str]]:
-    """Each symbol of the equations once, and those of the formula of the scheme, as its topic explains them."""
+def _symbols(topics: list[Topic], chosen: Plan | None, listed: str) -> Iterator[tuple[str, str]]:
+    """Each symbol of the equations that are ``listed`` once, and those of the formula of the scheme, as it has them."""
     seen: dict[str, str] = {}
     for topic in topics:
         for part in topic.parts:
             for block in part.blocks:
                 if isinstance(block, Rows):
-                    seen.update(block.rows)
+                    seen.update((symbol, text) for symbol, text in block.rows if symbol.removesuffix(")") in listed)
     yield from seen.items()
     for part in () if chosen is None else guide.found(chosen.scheme).parts:
         if any(isinstance(block, Formula) for block in part.blocks):
