@@ -169,7 +169,7 @@ class Plan(views.Tabled):
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        return flight.momentum_gained(self.flight) / mass
+        return flight.momentum_gained(_lightening(self.flight)) / mass
 
     @cached_property
     def left_if_symmetric(self) -> float | None:
@@ -195,6 +195,20 @@ class Plan(views.Tabled):
         """What keeps the plan from leaving less nutation."""
         left = self.flight.residual.nutation
         return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
+
+
+def _lightening(flown: Flight) -> Flight:
+    """The flight with forces that grow as the mass at t = 0 falls with the propellant of a tank."""
+    body = flown.spacecraft
+    if body.tank is None or body.mass is None:
+        return flown
+    used, pulses = 0.0, []
+    for pulse in flown.schedule:
+        taken = pulse.propellant or 0.0
+        scale = body.mass / (body.mass - used - 0.5 * taken)
+        pulses.append(replace(pulse, force=None if pulse.force is None else pulse.force * scale))
+        used += taken
+    return replace(flown, schedule=Schedule(tuple(pulses)))
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) -> Plan:

@@ -33,6 +33,7 @@ class Supply:
     def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
         """The pulse as strong as it really is, taken into account for those after it."""
         if channel is None or pulse.torque is None or self.steady:
+            self.used += pulse.propellant or 0.0
             return pulse
         level, tank = self.level(channel.name), self.spacecraft.tank
         isp = None if tank is None else tank.isp_after(min(self.used, tank.propellant))

@@ -10,7 +10,7 @@ from nutdamp import __version__, survey
 from nutdamp.aspect import at_start
 from nutdamp.errors import CannotRead, Fault, FaultyFile, printable
 from nutdamp.files.plan_json import aspects_json, spacecraft_json
-from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.spacecraft import Channel, Spacecraft, Tank
 
 
 def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
@@ -74,6 +74,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
             }
             for steps in survey.channel_steps(spacecraft)
         ],
+        **_tank_json(spacecraft.tank),
         "spin_axis": _spin_axis_json(spacecraft),
         **aspects_json(at_start(spacecraft)),
         "sun_pulses": _sun_pulses_json(spacecraft),
@@ -115,6 +116,22 @@ def _valve_json(channel: Channel, spacecraft: Spacecraft) -> dict[str, Any]:
             if one.channel is channel
         ]
     }
+
+
+def _tank_json(tank: Tank | None) -> dict[str, Any]:
+    """Pressure and thrust of a tank full, half used and empty; nothing without one."""
+    if tank is None:
+        return {}
+    rows = [
+        {
+            "used_kg": used,
+            "pressure_Pa": tank.pressure_after(used),
+            "thrust_factor": tank.thrust_factor(used),
+            "isp_s": tank.isp_after(used),
+        }
+        for used in (0.0, 0.5 * tank.propellant, tank.propellant)
+    ]
+    return {"tank": rows}
 
 
 def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:

@@ -40,7 +40,7 @@ from nutdamp.files.quantities import (
 )
 from nutdamp.files.sections import Field, Length, Section
 from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
-from nutdamp.files.thrust_models import ColdSection, ImpulseBits, ValveSection
+from nutdamp.files.thrust_models import ColdSection, ImpulseBits, TankSection, ValveSection
 
 
 def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
@@ -327,6 +327,11 @@ class SpacecraftFile(Section):
         default=None,
         description="Cold nozzles, which make the first pulses of each channel weaker.",
         examples=[{"first": "90 %", "pulses": 4}],
+    )
+    tank: TankSection | None = Field(
+        default=None,
+        description="The tank in blowdown, whose pressure the thrust goes with.",
+        examples=[{"propellant": "30 kg", "pressure": "22 bar", "final_pressure": "8 bar"}],
     )
     disturbances: list[DisturbanceSection] = Field(
         default=[],

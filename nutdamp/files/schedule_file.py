@@ -81,6 +81,10 @@ class _Reader:
             if line in self.commanded:
                 self._expect(line, self.commanded[line], fired)
             yield fired
+        tank = self.spacecraft.tank
+        if tank is not None and supply.used > tank.propellant:
+            text = f"takes {supply.used:.4g} kg of propellant in all, and the tank has {tank.propellant:.4g} kg"
+            self.table.warn(pulses[-1][0], "tank", text)
 
     def _instead(self, name: str) -> str:
         """The channel that a name not in the file may stand for, or all there are."""

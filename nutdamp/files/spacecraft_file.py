@@ -50,11 +50,12 @@ from nutdamp.spacecraft import (
     Spacecraft,
     Steerable,
     SunSensor,
+    Tank,
     Thruster,
 )
 
 if TYPE_CHECKING:
-    from nutdamp.files.thrust_models import ValveSection
+    from nutdamp.files.thrust_models import TankSection, ValveSection
     from nutdamp.physics.valve import Valve
 
 __all__ = ["load_spacecraft", "read_spacecraft"]
@@ -101,6 +102,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         object_id=contents.object_id,
         orbit=_orbit(contents.orbit),
         cold=None if contents.cold is None else Cold(contents.cold.first, contents.cold.pulses),
+        tank=_tank(contents.tank),
     )
     sunward = _sun(contents)
     return replace(
@@ -168,6 +170,13 @@ def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None) 
         position=None if position is None else axes.T @ position,
         valve=valve,
     )
+
+
+def _tank(section: TankSection | None) -> Tank | None:
+    if section is None:
+        return None
+    isp = None if section.isp is None else tuple((pressure, value) for pressure, value in section.isp)
+    return Tank(section.propellant, section.pressure, section.final_pressure, section.exponent, isp)
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:

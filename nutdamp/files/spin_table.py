@@ -45,13 +45,13 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     ``phase_deg`` is how much of its spin is over when a pulse begins. Without an epoch ``start_utc`` is empty. Raises
     BadRequest for more than `MOST_SPINS`, Infeasible where the sensor does not see the Sun.
     """
-    last = max(until, max((pulse.start for pulse in schedule), default=0.0))
+    last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
         raise BadRequest(f"the table would have more than {MOST_SPINS} spins; let it end earlier")
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
-    starts = sorted(schedule, key=lambda pulse: pulse.start)
-    for pulse, index in zip(starts, np.searchsorted(begins, [one.start for one in starts], "right"), strict=True):
+    starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])
+    for pulse, index in zip(starts, np.searchsorted(begins, [one.loaded[0] for one in starts], "right"), strict=True):
         fired.setdefault(max(int(index) - 1, 0), []).append(pulse)
     rows = []
     spins = pairwise(begins[: int(np.searchsorted(begins, last, "right")) + 1].tolist())
@@ -59,7 +59,7 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         firing = fired.get(index, [])
         # Spin 0 is what is left of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
-        phases = [360.0 * (1.0 - (end - pulse.start) / period) for pulse in firing]
+        phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
         several = ([one.channel for one in firing], map(_number, phases), (_number(one.on_time) for one in firing))
         times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
         rows.append([str(first + index), *times, *map(BETWEEN.join, several)])

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from nutdamp.files.fields import Quantity
-from nutdamp.files.quantities import PositiveTime, Time
+from nutdamp.files.quantities import Mass, PositiveTime, Time
 from nutdamp.files.sections import Field, Length, Section
 
+Pressure = Annotated[float, Quantity("pressure", exclusiveMinimum=0)]
 Impulse = Annotated[float, Quantity("impulse", exclusiveMinimum=0)]
 
 ImpulseBits = Annotated[list[tuple[PositiveTime, Impulse, PositiveTime]], Length(2)]
@@ -34,6 +35,22 @@ class ValveSection(Section):
         description="What on-times are that are loaded: the length of the command (default), or impulse over full "
         "thrust, which the electronics of the valve turns into one.",
         examples=["command"],
+    )
+
+
+class TankSection(Section):
+    """A tank in blowdown: the gas expands as the propellant is used, and pressure and thrust fall."""
+
+    propellant: Mass = Field(description="Propellant in it at t = 0, kg.", examples=["30 kg"])
+    pressure: Pressure = Field(description="Pressure at t = 0, Pa.", examples=["22 bar"])
+    final_pressure: Pressure = Field(description="Pressure with nothing left, Pa.", examples=["8 bar"])
+    exponent: Annotated[float, Quantity("number", minimum=0)] = Field(
+        default=1.0, description="Power of the pressure that the thrust goes with; default 1.", examples=[1]
+    )
+    isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
+        default=None,
+        description="Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters.",
+        examples=[[["8 bar", "215 s"], ["22 bar", "228 s"]]],
     )
 
 

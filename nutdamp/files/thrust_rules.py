@@ -12,12 +12,12 @@ from nutdamp.files.yaml_tree import KeyPath, Node
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
 
-THRUST_KEYS = ("valve", "cold")
+THRUST_KEYS = ("valve", "cold", "tank")
 """At the root of the file."""
 
 
 def thrust_findings(root: Node) -> Iterator[Finding]:
-    """Everything wrong with ``valve``, ``impulse_bit`` and ``cold``."""
+    """Everything wrong with ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
     facts = Facts(root)
     thrusters = [index for index, _ in facts.children("thrusters")]
     for key in THRUST_KEYS:
@@ -35,6 +35,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
     yield from _alike(facts)
+    if facts.has("tank") and thrusters:
+        yield from _tank(facts, named)
 
 
 def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
@@ -102,6 +104,30 @@ def _alike(facts: Facts) -> Iterator[Finding]:
         if other is not None:
             problem = f"{members[0]} and {other} make different pulses of a command, by valve or impulse_bit"
             yield Finding(("channels", channel), f"{problem}; let them fire in channels of their own")
+
+
+def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
+    """What is wrong with the tank; ``named`` are the thrusts of the thrusters, N."""
+    full, empty = (facts.number("pressure", "tank", key) for key in ("pressure", "final_pressure"))
+    if full is not None and empty is not None and empty > full > 0.0:
+        problem = f"{empty:g} Pa exceeds pressure: it falls as propellant is used; expected at most {full:g} Pa"
+        yield Finding(("tank", "final_pressure"), problem)
+    mass, propellant = facts.number("mass", "mass"), facts.number("mass", "tank", "propellant")
+    if mass is not None and propellant is not None and propellant >= mass > 0.0:
+        yield Finding(("tank", "propellant"), f"{propellant:g} kg is not less than the mass, {mass:g} kg")
+    rows = [facts.number("pressure", "tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
+    for number, (before, pressure) in enumerate(pairwise(rows), start=1):
+        if before is not None and pressure is not None and pressure <= before:
+            problem = f"{pressure:g} Pa is not above that of the row before, {before:g} Pa; expected rising pressures"
+            yield Finding(("tank", "isp", number, 0), problem)
+    for index, _ in facts.children("thrusters"):
+        name = facts.text("thrusters", index, "name") or ""
+        if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):
+            problem = "missing; tank needs to know the propellant that is used, by isp here or in tank"
+            yield Finding(("thrusters", index, "isp"), problem)
+        if named.get(name, 0.0) is None and not facts.has("thrusters", index, "force"):
+            problem = "missing; tank needs to know the propellant that is used, and so the thrust"
+            yield Finding(("thrusters", index, "lever_arm"), problem)
 
 
 def _kind(facts: Facts, index: str | int) -> tuple[float | str | None, ...]:

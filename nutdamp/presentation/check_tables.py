@@ -13,7 +13,7 @@ from nutdamp import survey
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import degrees, duration, moment, quantity, vector
-from nutdamp.spacecraft import Channel, Cold, Spacecraft, SunSensor
+from nutdamp.spacecraft import Channel, Cold, Spacecraft, SunSensor, Tank
 from nutdamp.words import listed
 
 
@@ -30,6 +30,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
         parts += [Text(), valve_table(spacecraft)]
     if spacecraft.cold is not None:
         parts += [Text(), Text(_cold(spacecraft.cold))]
+    if spacecraft.tank is not None:
+        parts += [Text(), Text(_tank(spacecraft.tank))]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -146,6 +148,18 @@ def valve_table(spacecraft: Spacecraft) -> Table:
 def _cold(cold: Cold) -> str:
     levels = ", ".join(f"{100.0 * cold.factor(before):.4g}" for before in range(3))
     return f"Cold nozzles: the first pulses of a channel have {levels} % … of the thrust."
+
+
+def _tank(tank: Tank) -> str:
+    empty = tank.pressure_after(tank.propellant)
+    levels = "; ".join(
+        f"{1e-5 * tank.pressure_after(used):.4g} bar and {100.0 * tank.thrust_factor(used):.4g} % of the thrust with "
+        f"{used:.4g} kg used"
+        for used in (0.5 * tank.propellant, tank.propellant)
+    )
+    isp = tank.isp_after(0.0), tank.isp_after(tank.propellant)
+    falls = "" if None in isp else f" Specific impulse: {isp[0]:.4g} s full, {isp[1]:.4g} s at {1e-5 * empty:.4g} bar."
+    return f"Tank: {1e-5 * tank.pressure:.4g} bar full; {levels}.{falls}"
 
 
 def _on_times(channel: Channel) -> str:

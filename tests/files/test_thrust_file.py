@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nutdamp import planning
@@ -12,10 +13,12 @@ from nutdamp.errors import FaultyFile
 from nutdamp.files.pulses_csv import EFFECTIVE, pulses_csv
 from nutdamp.files.schedule_file import read_pulses
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics.feed import Cold
+from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid
-from nutdamp.schedule import Schedule
+from nutdamp.remarks import infeasibility
+from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Spacecraft
+from nutdamp.supply import supplied
 
 BODY = """\
 name: Sat
@@ -29,6 +32,8 @@ thrusters:
 """
 
 VALVE = "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"
+
+TANK = "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n"
 
 TABLE = "impulse_bit: [[20 ms, 0.15 N s, 16 ms], [40 ms, 0.36 N s, 30 ms]]"
 
@@ -90,7 +95,15 @@ def test_cold_nozzles() -> None:
         ("cold: {first: -10 %, pulses: 4}\n", "9:15: cold.first: '-10 %' is out of range"),
         ("cold: {first: 90 %}\n", "9:1: cold.pulses: missing"),
         ("cold: {first: 90 %, pulses: 0}\n", "9:29: cold.pulses: 0 is out of range"),
-        ("tank: {propellant: 30 kg}\n", "9:1: tank: unknown key"),
+        (
+            "tank: {propellant: 30 kg, pressure: 8 bar, final_pressure: 22 bar}\n",
+            "9:60: tank.final_pressure: 2.2e+06 Pa",
+        ),
+        ("tank: {propellant: 30 kg, pressure: 8 N, final_pressure: 8 bar}\n", "9:37: tank.pressure: '8 N' is a force"),
+        (TANK.replace("}", ", exponent: -1}"), "9:78: tank.exponent: -1 is out of range"),
+        (TANK.replace("}", ", isp: [[8 bar, 215 s], [8 bar, 228 s]]}"), "9:91: tank.isp[1][0]: 800000 Pa is not above"),
+        (TANK + "mass: 20 kg\n", "9:20: tank.propellant: 30 kg is not less than the mass, 20 kg"),
+        (TANK.replace("30 kg", "0"), "9:20: tank.propellant: 0 is out of range"),
     ],
 )
 def test_faults_of_valve_and_cold(lines: str, expected: str) -> None:
@@ -130,6 +143,59 @@ def test_a_valve_without_thrusters() -> None:
     bare = "".join(BODY.splitlines(keepends=True)[:3])
     found = faults(VALVE, "cold: {first: 90 %, pulses: 4}\n", body=bare)
     assert [one.partition(": is of thrusters")[0] for one in found] == ["4:1: valve", "5:1: cold"]
+
+
+def test_a_tank_needs_to_know_what_is_used() -> None:
+    found = faults(TANK, body=BODY.replace(", lever_arm: 0.8, isp: 220, min", ", min", 1))
+    assert [one.partition(";")[0] for one in found] == [
+        "5:5: thrusters[0].isp: missing",
+        "5:5: thrusters[0].lever_arm: missing",
+    ]
+    by_pressure = TANK.replace("}", ", isp: [[8 bar, 215 s], [22 bar, 228 s]]}")
+    assert read(by_pressure, body=BODY.replace(", isp: 220", "")).tank == Tank(
+        30.0, 22e5, 8e5, 1.0, ((8e5, 215.0), (22e5, 228.0))
+    )
+
+
+def test_a_plan_in_blowdown_leaves_nothing_and_says_the_pressure() -> None:
+    body = read(VALVE, "mass: 40 kg\n", TANK.replace("30 kg", "5 g"))
+    made = planning.plan(body, "optimal")
+    assert made.flown is not None
+    assert made.flown.nutation < math.radians(1e-6)
+    assert body.tank is not None
+    used = 0.0
+    for pulse in made.pulses:
+        assert pulse.torque is not None
+        assert np.linalg.norm(pulse.torque) == pytest.approx(8.0 * body.tank.thrust_factor(used), rel=1e-12)
+        used += pulse.propellant or 0.0
+    assert 15.0 < 1e-5 * body.tank.pressure_after(used) < 17.0
+    assert any(note.startswith("tank pressure falls from 22 to 16.") for note in made.pulses.notes)
+
+
+def test_more_propellant_than_the_tank_has(tmp_path: Path) -> None:
+    body = read(TANK.replace("30 kg", "0.1 g"))
+    made = planning.plan(body, "one-pulse")
+    assert not made.feasible
+    assert "of propellant, and the tank has 0.0001 kg" in infeasibility(made)
+    _, warnings = read_rows(tmp_path, body, "1.0,0.05,a", "2.0,0.05,a")
+    assert any("kg of propellant in all, and the tank has 0.0001 kg" in warning for warning in warnings)
+
+
+def test_velocity_grows_as_the_mass_falls() -> None:
+    """The rocket equation: one long pulse along the spin axis."""
+    text = BODY.replace("state: {spin: 30 rpm, nutation: 0.4 deg, phase: 40 deg}", "omega0: [0.001, 0, 3]\nmass: 10 kg")
+    pushed = text.split("thrusters:")[0] + (
+        "thrusters:\n  - {name: a, position: [0.001, 0, 0], direction: [0, 0, 1], force: 100, isp: 200}\n"
+        "tank: {propellant: 5 kg, pressure: 1e6, final_pressure: 1e6}\n"
+    )
+    body = read_spacecraft(pushed, "sat.yaml")
+    thrown = tuple(channel_pulse(body.channels[0], 0.05 + 0.1 * number, 0.1) for number in range(400))
+    gained = planning.Plan(body, "file", Schedule(supplied(body, thrown))).delta_v
+    assert gained is not None
+    used = math.fsum(pulse.propellant or 0.0 for pulse in thrown)
+    rocket = 200.0 * 9.80665 * math.log(10.0 / (10.0 - used))
+    assert float(np.linalg.norm(gained)) == pytest.approx(rocket, rel=1e-4)
+    assert rocket > 1.1 * 100.0 * 40.0 / 10.0
 
 
 def test_csv_has_commands_and_effective_times_and_is_read_back(tmp_path: Path) -> None:

@@ -25,6 +25,9 @@ from nutdamp.supply import Supply, supplied
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
 """What the reasons of schemes, which know nothing of valves, are about."""
 
+ROUNDING = 1e-12
+"""Share by which an on-time may pass its bounds."""
+
 PLANS = 4
 """Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
 
@@ -102,17 +105,23 @@ class Correct(Protocol):
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
     """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `commanded`."""
     weakest = strongest = 1.0
+    made: Schedule | None = None
     for _ in range(PLANS):
         try:
             made = plan(plain(spacecraft, weakest, strongest))
         except TooShort as short:
-            raise TooShort(short.why + EFFECTIVE, short.cure) from None
-        except Infeasible as reason:
-            raise Infeasible(f"{reason}{EFFECTIVE}") from None
-        levels = _levels(spacecraft, made)
-        if weakest <= min(levels, default=1.0) and max(levels, default=1.0) <= strongest:
+            if made is None:
+                raise TooShort(short.why + EFFECTIVE, short.cure) from None
             break
-        weakest, strongest = min([weakest, *levels]), max([strongest, *levels])
+        except Infeasible as reason:
+            if made is None:
+                raise Infeasible(f"{reason}{EFFECTIVE}") from None
+            break
+        too_weak, too_strong = _outside(spacecraft, made)
+        if not too_weak and not too_strong:
+            break
+        weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
+    assert made is not None
     return commanded(spacecraft, made, correct)
 
 
@@ -123,33 +132,53 @@ def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Sched
     """
     first = replace(made.without_proof, pulses=_translated(spacecraft, made))
     tank = spacecraft.tank
-    if tank is not None and (first.propellant or 0.0) > tank.propellant:
-        raise Infeasible(f"takes {first.propellant:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
+    if tank is not None and first.pulses:
+        left = tank.pressure_after(first.propellant or 0.0)
+        note = f"tank pressure falls from {1e-5 * tank.pressure:.4g} to {1e-5 * left:.4g} bar"
+        first = replace(first, notes=(*first.notes, note))
     if spacecraft.limits.tick is None or not first.pulses:
         return correct(spacecraft, first, TAIL)
     return _on_ticks(spacecraft, first, correct)
 
 
-def _translated(spacecraft: Spacecraft, made: Schedule) -> tuple[Pulse, ...]:
-    """Each pulse as the command that has its impulse and its centroid."""
+def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = False) -> tuple[Pulse, ...]:
+    """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
+
+    Raises Infeasible where the propellant does not last.
+    """
     supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
     for pulse in made:
         channel = channels.get(pulse.channel)
-        if channel is not None:
-            on_time = pulse.on_time / supply.level(channel.name)
-            pulse = supply.fire(channel_pulse(channel, pulse.t, on_time), channel)
-        pulses.append(pulse)
+        if channel is None:
+            pulses.append(supply.fire(pulse, None))
+            continue
+        on_time = pulse.on_time / supply.level(channel.name)
+        given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
+        pulses.append(supply.fire(given, channel))
+    tank = spacecraft.tank
+    if tank is not None and supply.used > tank.propellant:
+        raise Infeasible(f"takes {supply.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
     return tuple(pulses)
 
 
-def _levels(spacecraft: Spacecraft, made: Schedule) -> list[float]:
-    """How strong each pulse of a channel is, over the thrust of the file."""
+def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[float]]:
+    """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
+
+    Raises Infeasible where the propellant does not last.
+    """
     channels = {one.name: one for one in spacecraft.channels}
-    return [
-        float(np.linalg.norm(pulse.torque) / np.linalg.norm(channels[pulse.channel].torque))
-        for pulse in _translated(spacecraft, made)
-        if pulse.torque is not None and pulse.channel in channels
-    ]
+    weak, strong = [], []
+    for pulse in _translated(spacecraft, made, unbounded=True):
+        channel = channels.get(pulse.channel)
+        if channel is None or pulse.torque is None:
+            continue
+        least, most = effective_on_times(channel)
+        level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
+        if pulse.on_time > most * (1.0 + ROUNDING):
+            weak.append(level)
+        if pulse.on_time < least * (1.0 - ROUNDING):
+            strong.append(level)
+    return weak, strong
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:

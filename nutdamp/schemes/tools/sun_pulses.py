@@ -30,7 +30,7 @@ EXACT = 1e-13
 FIRED = 1.0
 """Units of `work` of a pulse that is fired."""
 
-ONLY_PLAIN = "command blocks are planned and fired for full thrust at once: leave valve, impulse_bit and cold out"
+ONLY_PLAIN = "command blocks are planned and fired for full thrust at once: leave valve, impulse_bit, cold and tank out"
 """Why there are none for a spacecraft with valves or cold nozzles."""
 
 
