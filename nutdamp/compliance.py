@@ -19,6 +19,9 @@ DAMPED_SHARE = 0.01
 DAMPED_ANGLE = math.radians(1e-3)
 """rad that may be left in any case."""
 
+SAME_COST = 1e-3
+"""Costs that differ by less, relatively, are equal: then other things decide."""
+
 NEGLIGIBLE = math.radians(1e-9)
 """rad below which angles are rounding, and shown as nothing."""
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from nutdamp import work
 from nutdamp.comparison import compare, usual
-from nutdamp.compliance import Part
+from nutdamp.compliance import SAME_COST, Part
 from nutdamp.planning import Plan, plan
-from nutdamp.recommendation import SAME_COST, by_propellant
+from nutdamp.recommendation import by_propellant
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Bounds
 from nutdamp.schemes.optimal.problem import LEFT

@@ -9,12 +9,13 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from nutdamp.limits import rounded_off
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Spacecraft
 
-RESOLVED = 0.1
-"""Share of the nutation below which what is left may be what the resolution of commands leaves."""
+WORST = math.hypot(1.0, 1.5)
+"""What ticks leave at worst, over what chance leaves: the centre is off by half the on-time's error and the start's."""
 
 
 class Obstacle(Enum):
@@ -23,7 +24,7 @@ class Obstacle(Enum):
     UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
     STEADY_TILT = "disturbances, under which a tilt stays"
     MAX_PULSES = "limits.max_pulses"
-    RESOLUTION = "limits.tick, or the shortest pulse"
+    RESOLUTION = "limits.tick"
     LIMITS = "limits of the file that bind"
     SCHEME = "the scheme"
 
@@ -47,7 +48,7 @@ class Hindrance:
             return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
         if len(self.pulses) == limits.max_pulses:
             return Obstacle.MAX_PULSES
-        if limits.tick is not None and self.nutation < RESOLVED * body.nutation:
+        if self.nutation <= self.rounding:
             return Obstacle.RESOLUTION
         return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
 
@@ -87,6 +88,11 @@ class Hindrance:
         """Whether less than one nutation period is left of the horizon after the last pulse."""
         body = self.spacecraft
         return body.horizon - self.pulses.end < body.nutation_period
+
+    @property
+    def rounding(self) -> float:
+        """The most, rad, that starts and on-times half a tick off leave, to first order; 0 without ticks."""
+        return WORST * math.fsum(rounded_off(self.spacecraft, self.pulses))
 
     @property
     def steady_tilt(self) -> float:

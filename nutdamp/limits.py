@@ -172,6 +172,14 @@ def commandable_widths(commands: Commands, channel: Channel) -> Vector:
     return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
 
 
+def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
+    """What a start and an on-time half a tick off leave of each pulse, rad, as chance adds them up; without ticks 0."""
+    body, half = spacecraft, 0.5 * (spacecraft.limits.tick or 0.0)
+    rate, size = max(1.0, abs(body.inertia.a)) * abs(body.spin), body.inertia.C * abs(body.spin)
+    lengths = ((one.magnitude, 1.0 / one.on_time if one.on_time > 0.0 else 0.0) for one in pulses)
+    return [half * magnitude * math.hypot(share, rate) / size for magnitude, share in lengths]
+
+
 def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
     """Shortest on-time that can be commanded, s: the min_on_time, on ticks rounded up to one and not less than one."""
     tick = spacecraft.limits.tick

@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
-from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, Part, missed, required
+from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 from nutdamp.flight import Residual
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft
-
-SAME_COST = 1e-3
-"""Costs that differ by less, relatively, are equal."""
 
 SAME_ANGLE = 1e-9
 """rad by which shifts of H may differ and be equal: the rounding of a flight."""

@@ -150,7 +150,7 @@ def obstacle(plan: Plan) -> str:
         Obstacle.UNPLANNED_DISTURBANCES: "the plan was made without the disturbances (--with-disturbances)",
         Obstacle.STEADY_TILT: f"under the disturbances a steady tilt of {_degrees(found.steady_tilt)} stays",
         Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} allows no more pulses",
-        Obstacle.RESOLUTION: "limits.tick and the shortest on-times allow no less",
+        Obstacle.RESOLUTION: f"rounding to limits.tick can leave up to {_degrees(found.rounding)}",
         Obstacle.LIMITS: f"{plan.scheme} {_limited(found)}",
         Obstacle.SCHEME: f"with these channels {plan.scheme} takes out no more",
     }[found.obstacle]

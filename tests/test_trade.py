@@ -20,7 +20,7 @@ from process import Run
 
 import nutdamp
 from nutdamp import fronts, planning, work
-from nutdamp.recommendation import SAME_COST
+from nutdamp.compliance import SAME_COST
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Spacecraft
 

@@ -11,7 +11,7 @@ from nutdamp import flight, work
 from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
-from nutdamp.limits import usable
+from nutdamp.limits import rounded_off, usable
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes.optimal import bounds, residual_equations
 from nutdamp.schemes.optimal.bounds import Allowed
@@ -142,11 +142,8 @@ class Problem:
         return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
     def rounded(self, made: Schedule) -> float:
-        """What starts and on-times on ticks can leave, rad: half a tick of each, added up as chance does; else zero."""
-        body, half = self.spacecraft, 0.5 * (self.spacecraft.limits.tick or 0.0)
-        rate = max(1.0, abs(body.inertia.a)) * abs(body.spin)
-        each = [pulse.magnitude * math.hypot(1.0 / pulse.on_time, rate) for pulse in made if pulse.on_time > 0.0]
-        return half * math.hypot(*each) / (body.inertia.C * abs(body.spin))
+        """What starts and on-times on ticks can leave, rad, added up as chance does; without ticks zero."""
+        return math.hypot(*rounded_off(self.spacecraft, made))
 
     def not_found(self) -> str:
         """Why no schedule was found although the program has solutions: the limits that it does not know of."""

@@ -24,6 +24,7 @@ from nutdamp.limits import keeps_limits
 from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
 from nutdamp.schemes.optimal.columns import Burn
+from nutdamp.schemes.optimal.hasten import hastened
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, Problem
 from nutdamp.schemes.optimal.refine import refine
@@ -168,7 +169,12 @@ class _Search(Problem):
             best = self.cheaper(best, kept.cheapest(kept.program().solve()))
         if best is None:
             raise Infeasible(self.cure() if UNMET < first.unmet < math.inf else self.not_found())
-        return self.with_bounds(best, first)
+        return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+
+    def within_shorter(self, horizon: float) -> Schedule | None:
+        """The cheapest schedule found within ``horizon`` s."""
+        shorter = _Search(self.within(horizon), self.options)
+        return shorter.cheapest(shorter.program().solve())
 
     @property
     def looser(self) -> bool:

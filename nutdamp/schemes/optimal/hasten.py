@@ -1,0 +1,80 @@
+"""An earlier end at the same cost: costs that are equal for a recommendation are so for the scheme optimal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from nutdamp import work
+from nutdamp.compliance import DAMPED_ANGLE, SAME_COST
+from nutdamp.schedule import Schedule
+from nutdamp.schemes.optimal.linear_program import Solution
+from nutdamp.schemes.optimal.problem import Problem
+from nutdamp.schemes.optimal.repair import UNMET
+
+CLEARLY = 0.8
+"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for."""
+
+ABOUT = 0.002
+"""Share by which their cost may be more: it is not that of the true motion."""
+
+BISECTIONS = 3
+"""Steps in which the earliest end is found that they allow."""
+
+ROUNDS = 3
+"""Earlier ends that are looked for one after the other."""
+
+EARLIER = 300.0
+"""Units of `work` after which no other one is looked for."""
+
+MOST = 600.0
+"""Units that may be spent on all of them."""
+
+
+def hastened(
+    problem: Problem, best: Schedule, first: Solution, cheapest: Callable[[float], Schedule | None]
+) -> Schedule:
+    """``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
+
+    ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest schedule found within a
+    horizon, s. By how much earlier an end may be small angles tell; the horizon that is tried lies halfway from there.
+    """
+    if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
+        return best
+    begin, dearest = problem.spacecraft.limits.earliest, problem.price(best) * (1.0 + SAME_COST)
+    small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
+    left = problem.left(problem.flown(best)) + DAMPED_ANGLE
+    with work.budget("an earlier end", MOST) as spent:
+        for _ in range(ROUNDS):
+            span = best.end - begin
+            if not len(best) or work.exhausted() or spent.done > EARLIER:
+                break
+            share = _least_share(problem, span, small_angles)
+            made = None if share is None else cheapest(begin + 0.5 * (share + 1.0) * span)
+            if made is None or made.end >= best.end or len(made) > len(best):
+                break
+            if problem.price(made) > dearest or problem.left(problem.flown(made)) > left:
+                break
+            best = made
+    return best
+
+
+def _least_share(problem: Problem, span: float, most: float) -> float | None:
+    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`.
+
+    Nor may it cost them more than `ABOUT` over what they cost in all of the span.
+    """
+
+    def cost(share: float) -> float:
+        horizon = problem.spacecraft.limits.earliest + share * span
+        solution = problem.program(problem.within(horizon)).solve()
+        return solution.cost if solution.unmet <= UNMET else math.inf
+
+    clearly = cost(CLEARLY)
+    if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
+        return None
+    low, high = 0.0, CLEARLY
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if cost(middle) <= most else (middle, high)
+    return high
