@@ -26,7 +26,7 @@ from builders import (
 
 import nutdamp
 from nutdamp import compliance, planning, schemes
-from nutdamp.comparison import compare, usual
+from nutdamp.comparison import compare
 from nutdamp.compliance import Part
 from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.planning import Plan
@@ -167,11 +167,11 @@ def test_the_warning_names_what_stands_in_the_way(
 
 
 def test_no_scheme_is_said_to_leave_the_least_where_another_leaves_less() -> None:
-    """ACE: all schemes end on ticks, two-pulse leaves least; each names what rounding can leave, which is more."""
+    """ACE: all of them end on ticks, one leaves least; each names what rounding can leave, which is more."""
     body = nutdamp.load(Path(__file__).parent.parent / "configs" / "ace.yaml")
-    compared = compare(body, usual(body))
+    compared = compare(body, ("two-pulse", "four-pulse", "optimal"))
     left = {plan.scheme: plan.flight.residual.nutation for plan in compared if plan.feasible}
-    assert max(left.values()) > 1.5 * min(left.values())
+    assert max(left.values()) > 1.2 * min(left.values())
     for plan in compared:
         assert plan.hindrance.obstacle is Obstacle.RESOLUTION
         assert left[plan.scheme] <= plan.hindrance.rounding
