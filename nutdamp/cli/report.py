@@ -117,7 +117,7 @@ def command(
     quiet: bool,
     **control: str | None,
 ) -> None:
-    """Write a report: the decision, spacecraft, method, schemes, schedule, pictures, verification, how to repeat it.
+    """Write a report: decision, spacecraft, method, schemes, schedule, manoeuvre sheet, verification, how to repeat it.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as HTML. Needs the extra plot; a PDF needs Chromium, Chrome or Edge.

@@ -37,7 +37,7 @@ def fly(model: Model, bodies: Bodies, rates: Array, quaternion: Array, cases: Di
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
-    rates, quaternion, sun = rates.copy(), quaternion.copy(), _sun(model, cases, count)
+    rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
     shifts = [start - pulse.start for start, pulse in zip(cases.starts, model.schedule, strict=True)]
     for begin in range(0, count, rigid_cases.BLOCK):
         rows = slice(begin, min(begin + rigid_cases.BLOCK, count))
@@ -58,7 +58,7 @@ def fly(model: Model, bodies: Bodies, rates: Array, quaternion: Array, cases: Di
     return Fired(rates, quaternion, starts, seen)
 
 
-def _sun(model: Model, cases: DispersedCases, count: int) -> Array:
+def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:
     """The direction to the Sun in the true body axes of t = 0, (3, n)."""
     body = model.spacecraft
     assert body.sun is not None

@@ -20,13 +20,19 @@ from nutdamp.spacecraft import Spacecraft, Vector
 
 def blocks_screen(flown: Flight) -> RenderableType:
     """The blocks of a flown schedule, and its figures before and after."""
-    return Group(Text("Command blocks", style="bold"), _blocks(flown), Text(), _effects(flown))
+    return Group(Text("Command blocks", style="bold"), blocks_table(flown), Text(), _effects(flown))
 
 
-def _blocks(flown: Flight) -> Table:
+def blocks_table(flown: Flight, *, named: bool = False) -> Table:
+    """One row a block, as it is loaded: times in s and in counts of the steps of the commands.
+
+    ``named``: every column has a name, for pages; on screens those of one quantity share it.
+    """
     body, commands = flown.spacecraft, flown.spacecraft.commands
-    names = ("block", "channel", "first Sun", "delay", "", "", "width", "", "pulses", "every")
-    units = ("", "", "pulse", "s", "counts", "deg", "s", "counts", "", "spin")
+    names = ["block", "channel", "first Sun", "delay", "", "", "width", "", "pulses", "every"]
+    units = ["", "", "pulse", "s", "counts", "deg", "s", "counts", "", "spin"]
+    if named:
+        names[2], units[2], names[4:6], names[7] = "first Sun pulse", "", ["delay", "delay"], "width"
     table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
     for index, block in enumerate(flown.schedule.blocks, start=1):
         table.add_row(

@@ -34,6 +34,7 @@ from nutdamp.presentation.page.document import (
     blocks_of,
     sheet_of,
 )
+from nutdamp.presentation.page.manoeuvre import manoeuvre_section
 from nutdamp.presentation.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.presentation.page.moving import moving_of
 from nutdamp.presentation.page.pictures import (
@@ -95,6 +96,7 @@ def report_page(
     if decided is not None:
         chosen = decided.plan
         sections.append(_schedule(chosen))
+        sections.append(manoeuvre_section(chosen, flown.get(chosen.scheme)))
         if pictured:
             sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
         sections.append(_verification(chosen))

@@ -55,11 +55,11 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     assert body.sun is not None
     times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
-    ahead = _ahead(flown, times)
+    ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     found = times[index] + ahead[index] * turn / (2.0 * math.pi)
     for _ in range(ITERATIONS):
-        off = (_ahead(flown, np.minimum(found, until)) + math.pi) % (2.0 * math.pi) - math.pi
+        off = (to_sun_pulse(flown, np.minimum(found, until)) + math.pi) % (2.0 * math.pi) - math.pi
         found += off * turn / (2.0 * math.pi)
         if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
@@ -78,7 +78,7 @@ def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
         )
 
 
-def _ahead(flown: Flight, times: Vector) -> Vector:
+def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
     """By what angle (n,) in [0, 2π) the body has to turn until the Sun passes the sensor."""
     body = flown.spacecraft
     assert body.sun_sensor is not None

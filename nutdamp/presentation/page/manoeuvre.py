@@ -1,0 +1,179 @@
+"""The manoeuvre sheet: what operators load, what gyros and Sun sensor should show, and when to abort."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.flight import Flight
+from nutdamp.outcome import spin_phases
+from nutdamp.physics import attitude, cones
+from nutdamp.planning import Plan
+from nutdamp.presentation import verdicts
+from nutdamp.presentation.block_tables import blocks_table
+from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
+from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
+from nutdamp.presentation.text import MISSING, degrees, longitude, moment
+from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
+from nutdamp.spacecraft import Spacecraft, Vector
+
+if TYPE_CHECKING:  # few reports disperse
+    from nutdamp.dispersion.study import Results
+
+CHECKED = 8
+"""Pulses after which there are abort criteria, at most."""
+
+RPM = 30.0 / math.pi
+
+
+def manoeuvre_section(plan: Plan, dispersed: Results | None) -> Section:
+    """The sheet of a plan; with its ``dispersed`` cases there are abort criteria."""
+    return Section("manoeuvre", f"Manoeuvre sheet: {plan.scheme}", tuple(_blocks(plan, dispersed)))
+
+
+def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
+    flown, body = plan.flight, plan.spacecraft
+    if not len(plan.pulses):
+        yield Prose("No pulse is needed.")
+        return
+    if plan.pulses.blocks:
+        yield sheet_of("Command blocks to load", blocks_table(flown, named=True))
+    yield _firing(flown)
+    yield Prose(
+        "Spin phase: the angle by which the body has turned about axis 3 since t = 0. Sun phase: the angle by which it "
+        "has turned since the Sun passed the sensor. Both at the commanded start."
+        if _senses(body)
+        else "Spin phase: the angle by which the body has turned about axis 3 since t = 0, at the commanded start."
+    )
+    yield _signature(flown)
+    yield Prose(
+        "Gyro, square to axis 3: the largest transverse rate on the coast; it comes and goes with the period in the "
+        "body. Gyro, axis 3: the spin. The Sun angle is that of H; the spin axis swings about it by the nutation."
+        if body.sun is not None
+        else "Gyro, square to axis 3: the largest transverse rate on the coast; it comes and goes with the period in "
+        "the body. Gyro, axis 3: the spin."
+    )
+    if dispersed is not None:
+        yield from _criteria(flown, dispersed)
+        return
+    how = "report --disperse flies them" if body.dispersions is not None else "the file gives no dispersions"
+    yield Facts("Abort criteria", (("not known", f"they come from dispersed cases; {how}"),))
+
+
+def _senses(body: Spacecraft) -> bool:
+    return body.sun is not None and body.sun_sensor is not None
+
+
+def _firing(flown: Flight) -> Sheet:
+    """One row a pulse: when, at what phases, how long, by what."""
+    body, pulses = flown.spacecraft, flown.schedule.pulses
+    starts = np.array([pulse.loaded[0] for pulse in pulses])
+    columns: list[tuple[Column, list[str]]] = [
+        (Column("pulse"), [str(index + 1) for index in range(len(pulses))]),
+        *_when(body, starts),
+        (Column("spin phase", "deg"), _angles(spin_phases(flown, starts))),
+    ]
+    if _senses(body):
+        columns.append((Column("Sun phase", "deg"), _angles(-to_sun_pulse(flown, starts))))
+    columns += [
+        (Column("on-time", "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]),
+        (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
+    ]
+    return _sheet("Pulses to fire", columns)
+
+
+def _signature(flown: Flight) -> Sheet:
+    """One row before the first pulse, and one after each pulse or block: what gyros and Sun sensor should show."""
+    body, made = flown.spacecraft, flown.schedule
+    before, after = flown.around_pulses()
+    counts = np.cumsum([block.count for block in made.blocks]) if made.blocks else np.arange(1, len(made) + 1)
+    rows = counts - 1
+    names = [f"{'block' if made.blocks else 'pulse'} {index}" for index in range(1, len(counts) + 1)]
+
+    def states(name: str) -> Vector:
+        return np.concatenate([getattr(before, name)[:1], getattr(after, name)[rows]])
+
+    spins, nutation = states("rates")[:, 2], states("nutation")
+    across = np.abs(spins) * np.tan(states("body_cone"))
+    moments = body.inertia
+    inertial = [cones.inertial_period(moments.A, moments.C, *one) for one in zip(across, spins, strict=True)]
+    in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
+    periods = [f"{time:.4g}" if math.isfinite(time) else MISSING for time in in_body]
+    columns: list[tuple[Column, list[str]]] = [
+        (Column("after", number=False), ["start", *names]),
+        *_when(body, states("t")),
+        (Column("gyro, axis 3", "rpm"), [f"{spin * RPM:.5g}" for spin in spins.tolist()]),
+        (Column("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
+        (Column("its period in the body", "s"), periods),
+        (Column("nutation", "deg"), _plain(nutation)),
+        (Column("nutation period", "s"), [f"{time:.4g}" for time in inertial]),
+    ]
+    if body.sun is not None:
+        columns.append((Column("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
+    return _sheet("What gyros and Sun sensor should show", columns, stacked=True)
+
+
+def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
+    """After some pulses: what most of the dispersed cases do not leave."""
+    from nutdamp.dispersion.milestones import CASES, even, milestones
+
+    body, probability = flown.spacecraft, dispersed.probability
+    counts = even(len(flown.schedule), CHECKED)
+    found = list(milestones(dispersed.study, counts, probability))
+    _, after = flown.around_pulses()
+    rows = np.array(counts) - 1
+    columns: list[tuple[Column, list[str]]] = [
+        (Column("after pulse"), list(map(str, counts))),
+        *_when(body, after.t[rows]),
+        (Column("nutation, nominal", "deg"), _plain(after.nutation[rows])),
+        (Column("nutation: abort above", "deg"), _plain(np.array([one.nutation for one in found]))),
+    ]
+    if body.sun is not None:
+        nominal = attitude.angle_between(after.momentum[rows], body.sun)
+        ranges = np.array([one.sun_angle for one in found if one.sun_angle is not None])
+        columns.append((Column("Sun angle, nominal", "deg"), _plain(nominal)))
+        columns += [
+            (Column(f"Sun angle: abort {side}", "deg"), _plain(ranges[:, index]))
+            for index, side in enumerate(("below", "above"))
+        ]
+    spins = np.array([one.spin for one in found])
+    columns.append((Column("spin, nominal", "rpm"), [f"{spin * RPM:.5g}" for spin in after.rates[rows, 2].tolist()]))
+    columns += [
+        (Column(f"spin: abort {side}", "rpm"), [f"{spin * RPM:.5g}" for spin in spins[:, index].tolist()])
+        for index, side in enumerate(("below", "above"))
+    ]
+    yield _sheet("Abort criteria", columns, stacked=True)
+    share = verdicts.exact_percent(probability)
+    yield Prose(
+        f"Abort, and plan anew from the measured attitude, where after a pulse one of these is exceeded: {share} of "
+        f"{CASES:,} dispersed cases (seed {dispersed.study.seed}) stay within each, those without a fault of thruster, "
+        f"valve or sensor."
+    )
+
+
+def _when(body: Spacecraft, times: Vector) -> list[tuple[Column, list[str]]]:
+    """Columns of times from t = 0, and of dates where there is an epoch."""
+    dates = [body.utc(time, MILLISECONDS) for time in times.tolist()]
+    columns = [(Column("time", "s"), [moment(time).removesuffix(" s") for time in times.tolist()])]
+    return [*columns, (Column("UTC", number=False), [date or MISSING for date in dates])] if any(dates) else columns
+
+
+def _angles(phases: Vector) -> list[str]:
+    """From 0 to below 360."""
+    return [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]
+
+
+def _plain(angles: Vector) -> list[str]:
+    return [degrees(angle).removesuffix(" deg") for angle in angles.tolist()]
+
+
+def _small(value: float) -> str:
+    return f"{value:.4g}" if abs(value) >= 1e-9 else "0"
+
+
+def _sheet(title: str, columns: list[tuple[Column, list[str]]], *, stacked: bool = False) -> Sheet:
+    rows = tuple(zip(*(cells for _, cells in columns), strict=True))
+    return Sheet(title, tuple(column for column, _ in columns), rows, sortable=False, stacked=stacked)

@@ -1,0 +1,140 @@
+"""The manoeuvre sheet: what is loaded, what gyros and Sun sensor should show, and when to abort."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import reference
+from markup import Node, parsed
+from process import Run
+from spinners import FILE
+
+from nutdamp import planning
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.milestones import CASES, even, first_pulses, milestones
+from nutdamp.dispersion.study import Results, run
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.flight import flown
+from nutdamp.physics import attitude
+
+DISPERSED = (
+    FILE
+    + """
+dispersions:
+  A: {normal: 2 %}
+  omega0: [{normal: 0.1 deg/s}, {normal: 0.1 deg/s}, {normal: 0.5 %}]
+  thrust: {normal: 3 %}
+"""
+)
+GOAL = ("--target", "20deg,82deg")
+
+
+def sheet(run: Run, folder: Path, text: str, *options: str) -> Node:
+    """The section of the page that ``report`` writes."""
+    done = run("report", "-", *GOAL, *options, "-o", "page.html", stdin=text)
+    assert done.returncode in (0, 4), done.stderr
+    tree = parsed((folder / "page.html").read_text("utf-8").removeprefix("<!DOCTYPE html>"))
+    (found,) = (one for one in tree.all("section") if one.attributes["id"] == "manoeuvre")
+    return found
+
+
+def rows(found: Node, title: str) -> list[dict[str, str]]:
+    (table,) = (one for one in found.all("table") if one.all("caption")[0].text.startswith(title))
+    heads, *cells = [[cell.text for cell in row if cell.tag in ("th", "td")] for row in table.all("tr")]
+    return [dict(zip(heads, row, strict=True)) for row in cells]
+
+
+def test_blocks_phases_signature_and_criteria(run: Run, tmp_path: Path) -> None:
+    found = sheet(run, tmp_path, DISPERSED, "--scheme", "command-block", "--disperse", "500")
+    body = read_spacecraft(FILE, "f.yaml", ())
+    (block,) = rows(found, "Command blocks to load")
+    fired = rows(found, "Pulses to fire")
+    assert len(fired) == int(block["pulses"])
+    for row in fired:  # without nutation the Sun phase is the delay
+        assert float(row["Sun phase deg"]) == pytest.approx(float(block["delay deg"]), abs=0.3)
+        assert row["UTC"] == body.utc(float(row["time s"]), 3)
+    start, after = rows(found, "What gyros")
+    assert (start["after"], after["after"]) == ("start", "block 1")
+    assert float(start["gyro, axis 3 rpm"]) == pytest.approx(12.0)
+    rate = math.radians(float(after["gyro, square to it deg/s"]))
+    shown = math.degrees(math.atan2(120.0 * rate, 180.0 * 12.0 * math.pi / 30.0))  # tan θ = A|ω|/(C|ω3|)
+    assert float(after["nutation deg"]) == pytest.approx(shown, rel=1e-3)
+    assert float(after["its period in the body s"]) == pytest.approx(10.0)  # 2π/(|a| ω3), a = -1/2
+    criteria = rows(found, "Abort criteria")
+    assert [int(row["after pulse"]) for row in criteria] == even(len(fired), 8)
+    for row in criteria:
+        low, nominal, high = (
+            float(row[name])
+            for name in ("Sun angle: abort below deg", "Sun angle, nominal deg", "Sun angle: abort above deg")
+        )
+        assert low < nominal < high
+        assert float(row["nutation, nominal deg"]) < float(row["nutation: abort above deg"])
+        assert float(row["spin: abort below rpm"]) < 12.0 < float(row["spin: abort above rpm"])
+
+
+def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need(run: Run, tmp_path: Path) -> None:
+    found = sheet(run, tmp_path, FILE, "--scheme", "rhumb-line")
+    fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")
+    assert len(signature) == len(fired) + 1
+    assert signature[-1]["after"] == f"pulse {len(fired)}"
+    assert "the file gives no dispersions" in found.text
+    plain = FILE.partition("sun: epoch")[0]
+    other = sheet(run, tmp_path, plain, "--scheme", "rhumb-line")
+    assert "Sun phase deg" not in rows(other, "Pulses to fire")[0]
+    assert "Sun angle deg" not in rows(other, "What gyros")[0]
+
+
+def test_it_is_in_markdown(run: Run, tmp_path: Path) -> None:
+    done = run("report", "-", *GOAL, "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
+    assert done.returncode in (0, 4), done.stderr
+    text = (tmp_path / "page.md").read_text("utf-8")
+    assert "## Manoeuvre sheet: rhumb-line" in text
+    assert "Sun phase, deg" in text
+
+
+def test_the_signature_is_that_of_the_reference() -> None:
+    """Nutation and Sun angle after each pulse against Euler's equations by DOP853."""
+    body = read_spacecraft(FILE, "f.yaml", ())
+    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(3.0), 0.5)))
+    plan = planning.plan(body, "rhumb-line")
+    assert body.sun is not None
+    _, after = plan.flight.around_pulses()
+    motion = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
+    now, moments = 0.0, np.asarray(body.inertia.moments)
+    for index, pulse in enumerate(plan.pulses):
+        (motion,) = reference.coast(body.inertia.moments, motion, np.zeros(3), np.array([pulse.start - now]))
+        assert pulse.torque is not None
+        (motion,) = reference.coast(body.inertia.moments, motion, pulse.torque, np.array([pulse.on_time]))
+        now = pulse.end
+        momentum = motion.rotation @ (moments * motion.rates)
+        assert float(after.nutation[index]) == pytest.approx(reference.angle(momentum, motion.rotation[:, 2]), abs=1e-7)
+        seen = float(attitude.angle_between(after.momentum[index], body.sun))
+        assert seen == pytest.approx(reference.angle(momentum, body.sun), abs=1e-7)
+
+
+def test_the_last_milestone_is_what_the_study_says_of_the_end() -> None:
+    body = read_spacecraft(DISPERSED, "f.yaml", ())
+    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(5.0), 0.5)))
+    for scheme in ("command-block", "rhumb-line"):
+        study = study_of(body, planning.plan(body, scheme).pulses)
+        results = run(Results(study, CASES))
+        *_, last = milestones(study, [3, len(study.model.schedule)], 0.95)
+        assert results.values is not None
+        left = results.values[0]
+        assert last.nutation == pytest.approx(float(np.quantile(left, 0.95)), rel=1e-9)
+
+
+def test_the_first_pulses_are_those_of_the_first_blocks() -> None:
+    body = read_spacecraft(FILE, "f.yaml", ())
+    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(5.0), 0.5)))
+    made = planning.plan(body, "command-block").pulses
+    part = first_pulses(made, 4)
+    assert [block.count for block in part.blocks] == [4]
+    assert part.pulses == made.pulses[:4]
+    assert flown(body, part).settled.spin == pytest.approx(body.spin)
+    assert even(3, 8) == [1, 2, 3]
+    assert even(57, 8)[-1] == 57
+    assert len(even(57, 8)) == 8
