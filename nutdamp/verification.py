@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nutdamp import basilisk, flight
+from nutdamp import basilisk, dop853, flight
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import Flight, Residual
 from nutdamp.limits import commandable
@@ -19,9 +19,6 @@ from nutdamp.supply import lacking, supplied, thrust_laws
 
 SAMPLES = 201
 """Even times at which two flights are compared, besides the edges of the pulses."""
-
-EVALUATIONS = 200_000
-"""Evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds."""
 
 AGREE = 1e-9
 """rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
@@ -160,92 +157,10 @@ def _closed_form(
     return _method("impulse sum (17), arcs", spacecraft, arcs.residual, (body, quaternion), reference, between)
 
 
-def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
-    """Euler's equations with the full tensor in the axes of the file, and the attitude, by scipy's DOP853.
-
-    Written apart from everything else here, so that it can judge it: cross products, a matrix for the tensor, restarts
-    at every edge. ``times`` (n,) s ascending; returns rates (n, 3) and quaternions (n, 4) in principal axes. Raises
-    Infeasible where that takes more than `EVALUATIONS`.
-    """
-    from scipy.integrate import solve_ivp
-
-    axes = spacecraft.inertia.axes
-    tensor = axes @ np.diag(spacecraft.inertia.moments) @ axes.T
-    inverse = np.linalg.inv(tensor)
-    initial = spacecraft.initial
-    state = np.concatenate([axes @ initial.rates, attitude.multiply(initial.quaternion, _turn(axes.T))])
-    edges = {0.0, float(times[-1]), *times.tolist()}
-    edges |= {edge for pulse in schedule for edge in pulse.edges}
-    knots = sorted(edge for edge in edges if edge <= times[-1])
-    rows, evaluations = {}, 0
-    for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
-        for pulse in schedule:
-            if pulse.on_time == 0.0 and pulse.t == now:
-                state[:3] += inverse @ (axes @ pulse.impulse)
-        rows[now] = state.copy()
-        if end > now:
-            torque = _Torque(spacecraft, schedule, now, end)
-
-            def derivative(t: float, y: Vector, torque: _Torque = torque) -> Vector:
-                nonlocal evaluations
-                evaluations += 1
-                if evaluations > EVALUATIONS:
-                    raise Infeasible(f"the motion takes more than {EVALUATIONS} evaluations of Euler's equations")
-                body, q = y[:3], y[3:]
-                momentum = tensor @ body
-                drive = _sink(spacecraft, momentum)
-                spin = inverse @ (torque(t) + drive - np.cross(body, momentum))
-                # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
-                slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
-                turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
-                return np.concatenate([spin, turning])
-
-            solved = solve_ivp(derivative, (now, end), state, method="DOP853", rtol=1e-13, atol=1e-15)
-            state = solved.y[:, -1]
-    table = np.array([rows[time] for time in times.tolist()])
-    quaternion = table[:, 3:] / np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
-    return table[:, :3] @ axes, attitude.multiply(quaternion, _turn(axes))
-
-
-def _turn(rotation: Vector) -> Vector:
-    return attitude.from_matrix(rotation)
-
-
-class _Torque:
-    """Torque in the axes of the file over one stretch, a function of time."""
-
-    def __init__(self, spacecraft: Spacecraft, schedule: Schedule, start: float, end: float) -> None:
-        self.spacecraft, self.axes, self.start = spacecraft, spacecraft.inertia.axes, start
-        pushes = [push for push in (pulse.push(start, end) for pulse in schedule) if push is not None]
-        self.constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
-        self.slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
-
-    def __call__(self, t: float) -> Vector:
-        total = self.constant + self.slope * (t - self.start)
-        for one in self.spacecraft.disturbances:
-            turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
-            total += (turned.real, turned.imag, one.axial)
-        return np.asarray(self.axes @ total)
-
-
-def _sink(spacecraft: Spacecraft, momentum: Vector) -> Vector:
-    """What energy dissipation adds to dH/dt in the body, (3,) N m in the axes of the file, from H there.
-
-    It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space. So
-    in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to H.
-    """
-    axis, size = spacecraft.inertia.axes[:, 2], float(np.linalg.norm(momentum))
-    if spacecraft.growth == 0.0 or size == 0.0:
-        return np.zeros(3)
-    direction = momentum / size
-    across = direction * (direction @ axis) - axis  # of length sin θ
-    return np.asarray(spacecraft.growth * size * (direction @ axis) * across)
-
-
 def _by_dop853(spacecraft: Spacecraft, schedule: Schedule, times: Vector, reference: tuple[Vector, Vector]) -> Method:
     name = "DOP853, full tensor"
     try:
-        motion = integrate(spacecraft, schedule, times)
+        motion = dop853.integrate(spacecraft, schedule, times)
     except Infeasible as reason:
         return Method(name, missing=str(reason), outside=True)
     return _compared(name, spacecraft, schedule, times, motion, reference)

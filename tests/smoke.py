@@ -85,6 +85,7 @@ verify smoke.yaml --scheme two-pulse --json verify.json
 loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png --map map.png
 loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
+verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
 report smoke.yaml -o report.html
 report -o report.md --disperse 2000; 0 4
 animate smoke.yaml --seconds 0.5 --fps 8 --width 320 -o film.gif

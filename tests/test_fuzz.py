@@ -230,7 +230,7 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
 @pytest.fixture(autouse=True)
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Independent integrations give up sooner than a user's do: those of a thousand turns take most of the time."""
-    monkeypatch.setattr("nutdamp.verification.EVALUATIONS", 20_000)
+    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 20_000)
     monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
 
 

@@ -20,6 +20,7 @@ from samples import some
 from nutdamp import basilisk, flight, planning
 from nutdamp.basilisk import BasiliskFlight
 from nutdamp.cli.root import group
+from nutdamp.dop853 import integrate
 from nutdamp.errors import MissingExtra
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
@@ -28,7 +29,7 @@ from nutdamp.presentation.verify_tables import conservation, verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
-from nutdamp.verification import AGREE, Verification, integrate, verify
+from nutdamp.verification import AGREE, Verification, verify
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 
@@ -256,7 +257,7 @@ def test_a_motion_too_long_to_be_confirmed_is_not_called_confirmed(monkeypatch: 
     """DOP853 had no end: it ran for as long as the motion did."""
     spacecraft = spinner(degrees=5.0)
     schedule = planning.plan(spacecraft, "one-pulse").pulses
-    monkeypatch.setattr("nutdamp.verification.EVALUATIONS", 50)
+    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 50)
     monkeypatch.setattr("nutdamp.verification.basilisk.fly", _missing)
     found = verify(spacecraft, schedule)
     assert found.checks == ()

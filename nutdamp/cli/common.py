@@ -38,6 +38,15 @@ dispersions:
   timing: {uniform: 5 ms}"""
 """What is said of a file that should have dispersions."""
 
+LOOP = """the spacecraft file has no loop: it does not say by what to fire. For example:
+
+loop:
+  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
+  law: four-pulse
+  start: 0.5 deg
+  stop: 0.05 deg"""
+"""What is said of a file that should have a loop."""
+
 File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
 """What `write_whole` takes."""
 
@@ -258,6 +267,14 @@ def require_dispersions(body: Spacecraft) -> None:
 
     if body.dispersions is None:
         raise BadRequest(DISPERSIONS)
+
+
+def require_loop(body: Spacecraft) -> None:
+    """Raises BadRequest, which shows what to write, for a spacecraft without a closed loop."""
+    from nutdamp.errors import BadRequest
+
+    if body.loop is None:
+        raise BadRequest(LOOP)
 
 
 def remarks(quiet: bool) -> Callable[[str], None]:

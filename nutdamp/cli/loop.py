@@ -19,6 +19,7 @@ from nutdamp.cli.common import (
     load,
     quiet_option,
     remarks,
+    require_loop,
     spacecraft_argument,
 )
 from nutdamp.cli.parameters import FILE, Quantity
@@ -27,15 +28,6 @@ from nutdamp.cli.screen import say
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
-
-MISSING = """the spacecraft file has no loop: it does not say by what to fire. For example:
-
-loop:
-  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
-  law: four-pulse
-  start: 0.5 deg
-  stop: 0.05 deg"""
-"""What is said of a file that should have a loop."""
 
 
 @click.command("loop")
@@ -80,12 +72,10 @@ def command(
     expect_places(csv, track, json, plot, mapped)
 
     from nutdamp.cli.progress import working
-    from nutdamp.errors import BadRequest
     from nutdamp.loop.plan import loop_of
     from nutdamp.presentation.loop_tables import loop_screen, stopped, warnings
 
-    if body.loop is None:
-        raise BadRequest(MISSING)
+    require_loop(body)
     with working("flying", quiet=quiet):
         plan = loop_of(body, until, seed=seed)
     run = plan.flown_run

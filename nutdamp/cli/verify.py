@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -29,11 +29,14 @@ from nutdamp.schemes import Options
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from nutdamp.spacecraft import Spacecraft
+
 
 @click.command("verify", cls=PlanningCommand)
 @spacecraft_argument
 @flown_options("Verify")
 @goal_options
+@click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def command(
@@ -41,6 +44,7 @@ def command(
     flown: Flown,
     options: Options,
     aim: Aim,
+    looped: bool,
     json: str | None,
     quiet: bool,
 ) -> None:
@@ -49,9 +53,14 @@ def command(
     Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
     DOP853 and Basilisk are not confirmed: exit status 3.
     """
+    if looped and flown != (None, None):
+        raise click.UsageError("name what to verify: one of --scheme, --schedule and --loop")
     silent = expect_outputs(spacecraft, flown.schedule, json=json)
     body = load(spacecraft, remarks(quiet), aim)
     expect_places(json)
+    if looped:
+        _loop(body, json, silent=silent, quiet=quiet)
+        return
 
     from nutdamp.cli.progress import working
     from nutdamp.library.studies import verify
@@ -74,3 +83,33 @@ def command(
     if not found.checks:
         say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
         sys.exit(INFEASIBLE)
+
+
+def _loop(body: Spacecraft, json: str | None, *, silent: bool, quiet: bool) -> None:
+    """The closed loop of the file against the same by DOP853."""
+    from nutdamp.cli.common import require_loop
+    from nutdamp.cli.progress import working
+
+    require_loop(body)
+    from nutdamp.loop.verify import verify_loop
+
+    with working("verifying", quiet=quiet):
+        found = verify_loop(body)
+
+    def data() -> dict[str, Any]:
+        from nutdamp.files.loop_json import verified_json
+
+        return verified_json(found)
+
+    def screen() -> RenderableType:
+        from nutdamp.presentation.loop_tables import verification_screen
+
+        return verification_screen(found)
+
+    deliver([(json, data)], *[screen] * (not silent))
+    if found.missing:
+        say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {found.missing}")
+        sys.exit(INFEASIBLE)
+    if not found.agree:
+        say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
+        sys.exit(UNREADABLE)

@@ -17,6 +17,7 @@ from nutdamp.files.plan_json import (
 )
 from nutdamp.loop.plan import LoopPlan
 from nutdamp.loop.stability import Map, Margin
+from nutdamp.loop.verify import LoopVerification
 
 MAP_HEADER = ("delay_s", "c_over_a", "factor", "damps")
 
@@ -46,6 +47,31 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "final": final_json(plan.flight),
         "target": target_json(body),
         "margins": margins_json(plan.margins),
+    }
+
+
+def verified_json(found: LoopVerification) -> dict[str, Any]:
+    """What ``verify --loop --json`` gives: of each firing how far DOP853 differs."""
+    run = found.run
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(run.spacecraft),
+        "scheme": "loop",
+        "agree": None if found.missing else found.agree,
+        "missing": found.missing or None,
+        "evaluations": found.evaluations,
+        "until_s": run.until,
+        "firings": [
+            {
+                "channel": one.pulse.channel,
+                "start_s": one.pulse.loaded[0],
+                "on_time_s": one.pulse.loaded[1],
+                "start_difference_s": start,
+                "on_time_difference_s": lasts,
+                "nutation_difference_deg": math.degrees(nutation),
+            }
+            for one, (start, lasts, nutation) in zip(run.fired, found.pairs, strict=False)
+        ],
     }
 
 

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Leg
 from nutdamp.limits import commandable
 from nutdamp.loop.diagnosis import Diagnosis, Glimpse, Stop
 from nutdamp.loop.law import Firing, Law
 from nutdamp.loop.sensor import Signal
-from nutdamp.loop.watch import GRID, MOST, Coast, Found, Seen
+from nutdamp.loop.watch import GRID, MOST, Coast, Found, Mover, Seen
 from nutdamp.loop_settings import ACCELEROMETER, Loop
 from nutdamp.motion import Path
 from nutdamp.physics import rigid
@@ -93,7 +93,7 @@ def fly(
     *,
     seed: int = SEED,
     known: Spacecraft | None = None,
-    dynamics: Dynamics | None = None,
+    dynamics: Mover | None = None,
 ) -> Run:
     """The loop of a ``spacecraft`` flown to ``until`` s.
 
@@ -108,7 +108,7 @@ class _Pilot:
     """One flight in the making."""
 
     def __init__(
-        self, truth: Spacecraft, loop: Loop, until: float, seed: int, known: Spacecraft, dynamics: Dynamics
+        self, truth: Spacecraft, loop: Loop, until: float, seed: int, known: Spacecraft, dynamics: Mover
     ) -> None:
         self.truth, self.loop, self.until, self.seed, self.dynamics = truth, loop, until, seed, dynamics
         self.law, self.signal = Law(known, loop), Signal(truth, loop.sensor, seed)

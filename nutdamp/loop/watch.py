@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from nutdamp.dynamics import Dynamics
 from nutdamp.loop.law import Actuator, ComplexArray, Firing, Law
 from nutdamp.loop.sensor import Estimator, Signal
 from nutdamp.loop_settings import Sensor
@@ -29,6 +29,33 @@ SAMPLED = 1e-6
 
 REFINED = 60
 """Steps, at most, in which the moment of a firing is found between two of the `GRID`."""
+
+
+class Mover(Protocol):
+    """What flies a loop: `dynamics.Dynamics`, or another integrator in its place."""
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """Principal moments, kg m²."""
+        ...
+
+    @property
+    def free(self) -> bool:
+        """Whether coasts are known in closed form, so that one may look at any of their moments."""
+        ...
+
+    def path(
+        self,
+        state: SpinState,
+        start: float,
+        end: float,
+        torques: Sequence[Vector] = (),
+        slope: Vector | None = None,
+        *,
+        most: int,
+    ) -> tuple[Path, SpinState]:
+        """See `dynamics.Dynamics.path`."""
+        ...
 
 
 class Seen(NamedTuple):
@@ -63,7 +90,7 @@ class Coast:
     """The motion from ``state`` at ``since`` s on without firing, and the signal of the sensor along it."""
 
     def __init__(
-        self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float, before: Vector | None = None
+        self, law: Law, signal: Signal, dynamics: Mover, state: SpinState, since: float, before: Vector | None = None
     ) -> None:
         self.law, self.signal, self.dynamics = law, signal, dynamics
         self.sensor: Sensor = signal.sensor

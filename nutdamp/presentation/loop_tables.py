@@ -14,6 +14,7 @@ from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.plan import LoopPlan
 from nutdamp.loop.run import Run
 from nutdamp.loop.stability import SURELY, Margin, dead_band, margins
+from nutdamp.loop.verify import AGREE, LoopVerification
 from nutdamp.loop_settings import GYRO, Loop
 from nutdamp.presentation.decisions import cost, decision_table, requirement
 from nutdamp.presentation.end_tables import end_table
@@ -125,6 +126,34 @@ def _firings(run: Run) -> Table:
         pulse = one.pulse
         table.add_row(str(index + 1), f"{pulse.start:.4f}", f"{pulse.on_time:.4f}", pulse.channel, *shown)
     return table
+
+
+def verification_screen(found: LoopVerification) -> RenderableType:
+    """The loop beside the same by DOP853."""
+    run, other = found.run, found.other
+    parts: list[RenderableType] = [header(run.spacecraft), Text(), Text(described(run.loop), style="bold"), Text()]
+    if other is None:
+        return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {found.missing}."))
+    names = ("firing", "channel", "start", "differs by", "on-time", "differs by", "nutation", "differs by")
+    units = ("", "", "s", "s", "s", "s", "deg", "deg")
+    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    for index, (one, apart) in enumerate(zip(run.fired[:SHOWN], found.pairs, strict=False), start=1):
+        start, on_time = one.pulse.loaded
+        what = (f"{start:.4f}", _apart(apart[0]), f"{on_time:.4f}", _apart(apart[1]))
+        nutation = degrees(one.true_nutation).removesuffix(" deg")
+        table.add_row(str(index), one.pulse.channel, *what, nutation, _apart(math.degrees(apart[2])))
+    said = f"DOP853 on the full tensor, {found.evaluations:,} evaluations, fires "
+    if found.agree:
+        said += f"alike: {len(run.fired)} firings, times within {found.worst:.1g} s ({AGREE:g} s allowed)."
+    elif found.same:
+        said += f"DIFFERENTLY: times differ by up to {found.worst:.2g} s ({AGREE:g} s allowed)."
+    else:
+        said += f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, or other channels."
+    return Group(*parts, table, Text(), Text(said))
+
+
+def _apart(value: float) -> str:
+    return f"{value:.1e}"
 
 
 def margin_table(found: tuple[Margin, ...]) -> Table:

@@ -20,7 +20,10 @@ from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.plan import loop_of
 from nutdamp.loop.run import Run, fly
 from nutdamp.loop.stability import dead_band, delay_map, margins
+from nutdamp.loop.verify import verify_loop
 from nutdamp.loop_settings import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
+from nutdamp.physics.feed import Cold
+from nutdamp.physics.valve import Trapezoid
 from nutdamp.spacecraft import Limits, Spacecraft
 
 FOUR = tuple(
@@ -285,6 +288,37 @@ def test_the_schedule_flown_again_is_the_flight_of_the_loop() -> None:
     rows = [one.sampled(100, 60.0) for one in (run.flight, again)]
     assert np.array_equal(rows[0].pulse, rows[1].pulse)
     assert np.array_equal(rows[0].t, rows[1].t)
+
+
+@pytest.mark.parametrize("predict", [True, False])
+def test_valves_and_cold_nozzles_are_fired_through(predict: bool) -> None:
+    """The law knows the valves; with prediction what they do to time and impulse is reckoned with."""
+    valve = Trapezoid(open_delay=0.03, close_delay=0.05, rise_time=0.02, fall_time=0.04)
+    channels = tuple(
+        replace(one, thrusters=tuple(replace(each, valve=valve, min_on_time=0.03) for each in one.thrusters))
+        for one in FOUR
+    )
+    loop = ideal(start=rad(0.3), stop=rad(0.002), predict=predict)
+    craft = replace(spinner(degrees=2.0, channels=channels), loop=loop)
+    run = fly(craft, loop, 60.0)
+    first = run.schedule.pulses[0]
+    assert first.command is not None
+    centred = fly(spinner(degrees=2.0, channels=FOUR), ideal(), 9.0).schedule.pulses[0]
+    assert first.channel == centred.channel
+    late = first.loaded[0] - centred.t if not predict else first.t - centred.t
+    assert late == pytest.approx(0.0, abs=2e-4)
+    again = flight.flown(craft, run.schedule, 60.0)
+    times = np.linspace(0.0, 60.0, 100)
+    for one, other in zip(run.flight.motion(times), again.motion(times), strict=True):
+        assert one == pytest.approx(other, abs=1e-12)
+    if predict:
+        assert run.settled is not None
+        assert run.flight.residual.nutation < rad(0.01)
+    colder = fly(replace(craft, cold=Cold(0.6, 2.0)), loop, 60.0)
+    strengths = [np.linalg.norm(one.impulse) / one.on_time / 6.0 for one in colder.schedule]
+    assert strengths[0] == pytest.approx(0.6)
+    assert colder.schedule.total_impulse == pytest.approx(run.schedule.total_impulse, rel=0.2)
+    assert verify_loop(craft, 12.0).agree
 
 
 def test_three_different_moments_are_damped() -> None:

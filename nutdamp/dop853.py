@@ -1,0 +1,124 @@
+"""Euler's equations by scipy's DOP853: written apart from everything else that flies, so that it can judge it.
+
+Cross products, a matrix for the tensor, in the axes of the file, and restarts at every edge of a pulse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft, SpinState, Vector
+
+EVALUATIONS = 200_000
+"""Evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds."""
+
+Push = tuple[Vector, Vector | None]
+"""Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
+
+
+class Equations:
+    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far.
+
+    A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
+        self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
+        self.inverse = np.linalg.inv(self.tensor)
+        self.evaluations = 0
+
+    def state(self, motion: SpinState) -> Vector:
+        """The state of a motion."""
+        turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
+        return np.concatenate([self.axes @ motion.rates, turned])
+
+    def motion(self, states: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) and quaternions (n, 4) in principal axes of ``states`` (n, 7)."""
+        quaternion = states[:, 3:] / np.linalg.norm(states[:, 3:], axis=1, keepdims=True)
+        return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
+
+    def kicked(self, state: Vector, impulse: Vector) -> Vector:
+        """The state after an ``impulse`` (3,) N m s in principal axes."""
+        return np.concatenate([state[:3] + self.inverse @ (self.axes @ impulse), state[3:]])
+
+    def solved(self, state: Vector, start: float, end: float, pushes: Iterable[Push], *, dense: bool = False) -> Any:
+        """What solve_ivp gives from ``state`` at ``start`` to ``end`` s, with its interpolant where it is ``dense``.
+
+        Raises Infeasible where all of them together take more than `EVALUATIONS`.
+        """
+        from scipy.integrate import solve_ivp
+
+        derivative = self._derivative(start, tuple(pushes))
+        return solve_ivp(derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense)
+
+    def _derivative(self, start: float, pushes: tuple[Push, ...]) -> Callable[[float, Vector], Vector]:
+        constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
+        slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
+
+        def derivative(t: float, y: Vector) -> Vector:
+            self.evaluations += 1
+            if self.evaluations > EVALUATIONS:
+                raise Infeasible(f"the motion takes more than {EVALUATIONS} evaluations of Euler's equations")
+            body, q = y[:3], y[3:]
+            momentum = self.tensor @ body
+            drive = self._sink(momentum)
+            torque = self.axes @ (constant + slope * (t - start) + self._disturbed(t))
+            spin = self.inverse @ (torque + drive - np.cross(body, momentum))
+            # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
+            slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
+            turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
+            return np.concatenate([spin, turning])
+
+        return derivative
+
+    def _disturbed(self, t: float) -> Vector:
+        """Torque (3,) N m of the disturbances at ``t`` s, principal axes."""
+        total = np.zeros(3)
+        for one in self.spacecraft.disturbances:
+            turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
+            total += (turned.real, turned.imag, one.axial)
+        return total
+
+    def _sink(self, momentum: Vector) -> Vector:
+        """What energy dissipation adds to dH/dt in the body, (3,) N m in the axes of the file, from H there.
+
+        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space.
+        So in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to
+        H.
+        """
+        axis, size = self.axes[:, 2], float(np.linalg.norm(momentum))
+        if self.spacecraft.growth == 0.0 or size == 0.0:
+            return np.zeros(3)
+        direction = momentum / size
+        across = direction * (direction @ axis) - axis  # of length sin θ
+        return np.asarray(self.spacecraft.growth * size * (direction @ axis) * across)
+
+
+def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
+    """The motion under a schedule: rates (n, 3) and quaternions (n, 4) in principal axes at ``times`` (n,) s ascending.
+
+    Raises Infeasible where that takes more than `EVALUATIONS`.
+    """
+    equations = Equations(spacecraft)
+    state = equations.state(spacecraft.initial)
+    edges = {0.0, float(times[-1]), *times.tolist()}
+    edges |= {edge for pulse in schedule for edge in pulse.edges}
+    knots = sorted(edge for edge in edges if edge <= times[-1])
+    rows = {}
+    for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
+        for pulse in schedule:
+            if pulse.on_time == 0.0 and pulse.t == now:
+                state = equations.kicked(state, pulse.impulse)
+        rows[now] = state
+        if end > now:
+            pushes = [push for push in (pulse.push(now, end) for pulse in schedule) if push is not None]
+            state = equations.solved(state, now, end, pushes).y[:, -1]
+    return equations.motion(np.array([rows[time] for time in times.tolist()]))
