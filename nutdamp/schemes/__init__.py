@@ -103,6 +103,9 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     return _corrected(scheme, model, made, chosen)
 
 
+MOVED = 8
+"""Of equal pulses, of which each has one number less to be corrected by, so many are moved."""
+
 LONGER = 4.0
 """Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
 
@@ -194,10 +197,10 @@ class _Correction:
         if self.options.uncorrected or not made.pulses:
             return made
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-        chosen = tuple(range(-min(len(made), free), 0)) if self.momentum else (-1,)
+        last = max(free, MOVED) if self.options.equal else free
+        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and free == 4:  # and the pulse that gives most to the spin
             chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-        return least_squares.correct(
-            spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, on_times=self.options.on_times
-        )
+        sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
+        return least_squares.correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)

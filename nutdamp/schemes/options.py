@@ -6,19 +6,12 @@ The command line makes its options, their help and their headings from the field
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from nutdamp.arguments import is_count, is_number, shown
 from nutdamp.errors import BadRequest, SenselessOption
-
-ANY_ON_TIME = (0.0, math.inf)
-"""Bounds on on-times, s, that bound nothing."""
-
-UNEQUAL = 0.1
-"""Share of a pulse length requested by which the last pulses may differ from it."""
 
 LEAST = ("propellant", "impulse", "time", "pulses")
 """What the scheme optimal can save."""
@@ -83,9 +76,14 @@ class SchemeOptions:
         return False
 
     @property
-    def on_times(self) -> tuple[float, float]:
-        """Bounds, s, that on-times keep whoever corrects the pulses."""
-        return ANY_ON_TIME
+    def equal(self) -> bool:
+        """Whether the pulses are of one size, which whoever corrects them keeps."""
+        return False
+
+    @property
+    def resizable(self) -> bool:
+        """Whether pulses may be made longer or shorter by whoever corrects them."""
+        return True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,14 +134,18 @@ class CommandBlockOptions(SchemeOptions):
 class RhumbLineOptions(SchemeOptions):
     """What may be chosen of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
 
-    on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
+    on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
 
     @property
-    def on_times(self) -> tuple[float, float]:
-        """About the length requested."""
-        requested = self.on_time
-        return ANY_ON_TIME if requested is None else ((1.0 - UNEQUAL) * requested, (1.0 + UNEQUAL) * requested)
+    def equal(self) -> bool:
+        """The width is one command."""
+        return True
+
+    @property
+    def resizable(self) -> bool:
+        """Not where a length was requested."""
+        return self.on_time is None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,8 +2,10 @@
 
 Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
 2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
-chosen so that they close, a nutation at t = 0 included, and the last pulses are corrected on the flown motion. Near
-φ = 2π, which is C = A for one pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
+chosen so that they close, a nutation at t = 0 included. All pulses are equal, as the width is one command: it is chosen
+so that they just reach the target, and phases do the rest. What is too much is bent away: the train heads a little to
+one side of its course (a spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π,
+which is C = A for one pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
 
 The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
 """
@@ -21,15 +23,18 @@ from nutdamp.limits import usable
 from nutdamp.physics import pointing
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import one_pulse
-from nutdamp.schemes.options import UNEQUAL, RhumbLineOptions
+from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.schemes.tools import least_squares, predamping
 from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
 from nutdamp.schemes.tools.pulse_train import LAST, Attempt, Train
 from nutdamp.schemes.tools.reasons import no_channels, no_target
 from nutdamp.spacecraft import Spacecraft
 
-CORRECTED = (4, 6, LAST)
-"""How many of the last pulses are corrected, one number after the other until nothing is left."""
+MOVED = (6, 12, LAST)
+"""How many of the last pulses are moved, one number after the other until nothing is left."""
+
+SHORT = 60
+"""Pulses up to which their size is corrected on the flown motion too: a longer train has little to spare."""
 
 EXACT = 1e-10
 """rad of flown residual that counts as nothing."""
@@ -111,7 +116,9 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         left = max(left, EXACT)
         if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
             best = left, made
-        if work.exhausted() or (left <= EXACT and best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor):
+        cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
+        # Of pulses of a given length the trains come in the order of their cost.
+        if work.exhausted() or (left <= EXACT and (cheap or train.options.on_time is not None)):
             break
     if best is None or best[0] > tolerable(train.here):
         raise Infeasible(_reason(train, best))
@@ -124,7 +131,7 @@ def _cheaper(made: Schedule, other: Schedule, before: float) -> bool:
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
-    """The train, each pulse aimed from where H then is, the last corrected; and what it leaves, rad."""
+    """The train, each pulse aimed from where H then is, the last ones moved; and what it leaves, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
         pulse = train.next_pulse(builder.here, remaining, attempt)
@@ -132,24 +139,28 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
             break
         builder.fire((pulse,))
     fired = min(count, len(builder.pulses))
-    for last in CORRECTED:
-        if builder.left < EXACT:
+    for last in MOVED:
+        before = builder.left
+        if before < EXACT:
             break
-        builder.correct(min(last, fired), attempt.bounds)
+        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
+        if train.here.limits.tick is not None and builder.left > 0.5 * before:
+            break  # what is left is the rounding of starts
     return builder.schedule(_note(builder, train, count)), builder.left
 
 
 def _note(builder: FlownBuilder, train: Train, count: int) -> str:
     """What the train is, in words."""
-    on_times = np.array([pulse.on_time for pulse in builder.pulses[-count:]])
-    efficiency = pointing.arc_efficiency(train.here.spin, float(on_times[0]))
+    on_time = builder.pulses[-1].on_time
+    efficiency = pointing.arc_efficiency(train.here.spin, on_time)
     line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
     names = ", ".join(channel.name for channel in train.channels)
     damped = len(builder.pulses) - count
     return (
         (f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then " if damped > 0 else "")
-        + f"{count} pulses"
+        + f"{count} equal pulses"
         + (f" of {names}" if names else "")
+        + (f", {on_time:.4g} s each," if on_time > 0.0 else "")
         + f" along the {line} of {math.degrees(train.way):.4g}°, arc efficiency {efficiency:.4f}"
     )
 
@@ -157,6 +168,6 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> str:
 def _reason(train: Train, best: tuple[float, Schedule] | None) -> str:
     """Why the ``best`` train found, with what it leaves (rad), is none."""
     requested = train.options.on_time
-    held = "" if requested is None else f" of {requested:.4g} s, the last few within {100 * UNEQUAL:.0f} % of that,"
-    text = f"no train of pulses{held} was found that ends on the target within the limits"
+    held = "" if requested is None else f" of {requested:.4g} s"
+    text = f"no train of equal pulses{held} was found that ends on the target within the limits"
     return text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°"

@@ -32,7 +32,18 @@ def train(spacecraft: Spacecraft, options: Choice = None) -> planning.Plan:
     return plan
 
 
+def equal(plan: planning.Plan) -> np.ndarray:
+    """The on-times of the train, all the same, without what damps the nutation before it."""
+    count = re.search(r"([0-9]+) equal pulses", " ".join(remarks(plan)))
+    assert count
+    pulses = plan.pulses.pulses[-int(count[1]) :]
+    sizes = np.array([pulse.on_time or pulse.magnitude for pulse in pulses])
+    assert sizes == pytest.approx(sizes[:1].repeat(len(sizes)), rel=1e-12)
+    return np.array([pulse.on_time for pulse in pulses])
+
+
 def ends_on_the_target(plan: planning.Plan) -> None:
+    equal(plan)
     assert Outcome(plan.spacecraft, plan.pulses).nutation < 1e-9
     assert off_target(plan.spacecraft, plan.pulses) < 1e-9
 
@@ -55,12 +66,16 @@ def test_a_nutation_goes_along_or_first(degrees: float) -> None:
 @pytest.mark.parametrize("on_time", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("torque", [40.0, 10.0])
 def test_arc_efficiency(torque: float, on_time: float) -> None:
-    """Along the great circle the train costs C|ω3|β over the mean of sinc(ω3τ/2), and a little for its trims."""
+    """Along the great circle equal pulses cost C|ω3|β over sinc(ω3τ/2), and what is left of a pulse and two to spare.
+
+    Their phases alone bring the nutation to nothing, which takes the pulses to spare.
+    """
     limits = Limits(horizon=2000.0)
     spacecraft = aimed(spinner(degrees=0.0, channels=cross(torque), limits=limits), 60.0, 0.0)
     made = train(spacecraft, Options(on_time=on_time)).pulses
+    assert {pulse.on_time for pulse in made} == {on_time}
     turned = sum(pulse.magnitude * pointing.arc_efficiency(3.0, pulse.on_time) for pulse in made)
-    assert 1.0 - 1e-3 < turned / spacecraft.turning_impulse < 1.0 + 1.0 / len(made)
+    assert 1.0 < turned / spacecraft.turning_impulse < 1.0 + 3.0 / len(made)
 
 
 def requested(seed: int) -> tuple[Spacecraft, RhumbLineOptions]:
@@ -85,8 +100,7 @@ def closes(plan: planning.Plan) -> None:
 
 
 @pytest.mark.slow
-def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
-    """Equal pulses, the last few within a tenth of what is requested."""
+def test_an_on_time_is_kept_exactly_or_the_nearest_that_works_is_named() -> None:
     kept, named = 0, 0
     for seed in range(16):
         spacecraft, options = requested(seed)
@@ -104,12 +118,7 @@ def test_an_on_time_is_kept_or_the_nearest_that_works_is_named() -> None:
         closes(plan)
         if seed % 10 == 1:
             ends_on_the_target(plan)
-        count = re.search(r"([0-9]+) pulses of ", remarks(plan)[0])
-        assert count
-        on_times = np.array([pulse.on_time for pulse in plan.pulses][-int(count[1]) :]) / options.on_time
-        assert on_times == pytest.approx(np.ones(len(on_times)), abs=0.1 + 1e-9), seed
-        assert on_times[:-10] == pytest.approx(on_times[:1].repeat(len(on_times[:-10])), rel=1e-12), seed
-        assert len(on_times) <= 10 or on_times[0] <= 1.0 + 1e-12, seed
+        assert equal(plan)[0] == options.on_time, seed
         kept += 1
     assert kept > 8
     assert named > 1

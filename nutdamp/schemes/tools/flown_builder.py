@@ -10,7 +10,6 @@ from dataclasses import replace
 from nutdamp import flight
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes.options import ANY_ON_TIME
 from nutdamp.schemes.tools import least_squares
 from nutdamp.spacecraft import Attitude, Spacecraft
 
@@ -72,18 +71,21 @@ class FlownBuilder:
             self.pulses.append(timed)
             self.now = timed.over
 
-    def correct(self, last: int, on_times: tuple[float, float] = ANY_ON_TIME) -> None:
-        """Correct the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
+    def correct(self, last: int, *, resized: int = 0) -> None:
+        """Move the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
 
-        Their on-times stay within the bounds ``on_times`` s.
+        Their sizes stay, but that of the last ``resized`` pulses, which are equal, may change as one.
         """
-        last = min(last, len(self.pulses))
-        if last == 0:
+        taken = min(max(last, resized), len(self.pulses))
+        if last == 0 or taken == 0:
             return
-        self.now, self.here = self._before[-last]
-        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-last:]))
-        del self.pulses[-last:], self._before[-last:]
-        self.fire(least_squares.correct(self.here, made, chosen=range(last), momentum=True, on_times=on_times))
+        self.now, self.here = self._before[-taken]
+        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
+        del self.pulses[-taken:], self._before[-taken:]
+        chosen = range(max(taken - last, 0), taken)
+        self.fire(
+            least_squares.correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0)
+        )
 
     def schedule(self, *notes: str) -> Schedule:
         """What has been chosen."""

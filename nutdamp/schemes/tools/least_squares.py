@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from nutdamp import flight, work
 from nutdamp.dynamics import make_dynamics
 from nutdamp.limits import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes.options import ANY_ON_TIME
+from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 from nutdamp.supply import supplied
@@ -26,6 +26,9 @@ CONVERGED = 1e-14
 
 DIFFERENCE = 1e-6
 """Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
+
+ALIKE = 1e-9
+"""Difference in size, relative, up to which pulses are equal."""
 
 STEPS = 30
 
@@ -108,25 +111,30 @@ def correct(
     chosen: Sequence[int],
     momentum: bool,
     spin: bool = False,
-    on_times: tuple[float, float] = ANY_ON_TIME,
+    equal: bool = False,
+    resizable: bool = True,
 ) -> Schedule:
     """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
 
-    Starts, on-times within their bounds and ``on_times`` s, and directions of steerable pulses are free. ``momentum``:
-    H too is to be brought to the target axis (without one, back), not only the nutation taken out; ``spin``: and the
-    spin to the rate requested. A schedule without pulses stays as it is.
+    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses the sizes
+    stay as they are, or where they are ``resizable`` and commands have no ticks, all that are as large as the last one
+    change alike. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
+    taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
     """
     if not made.pulses:
         return made
     chosen = sorted({index % len(made) for index in chosen})
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
-    pulses = [_Movable(spacecraft, made.pulses[index], on_times) for index in chosen]
+    pulses = [_Movable(spacecraft, made.pulses[index], sized=not equal) for index in chosen]
     ends = np.cumsum([len(one.start) for one in pulses])
+    common = [_Common(spacecraft, made)] if equal and resizable and spacecraft.limits.tick is None else []
 
     def build(x: Vector) -> Schedule:
-        parts = np.split(x, ends[:-1])
-        fired = (*kept, *(one.turn(part) for one, part in zip(pulses, parts, strict=True)))
-        return Schedule(supplied(spacecraft, fired), made.notes, made.bounds)
+        parts = np.split(x, ends)
+        factor = float(parts[-1][0]) if common else 1.0
+        others = common[0].resized(kept, factor) if common else kept
+        moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
+        return Schedule(supplied(spacecraft, (*others, *moved)), made.notes, made.bounds)
 
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
@@ -138,7 +146,8 @@ def correct(
         return missed if momentum else np.delete(missed, [2, 3])
 
     start, scale, lower, upper = (
-        np.concatenate([getattr(one, name) for one in pulses]) for name in ("start", "scale", "lower", "upper")
+        np.concatenate([getattr(one, name) for one in (*pulses, *common)])
+        for name in ("start", "scale", "lower", "upper")
     )
     x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
@@ -148,35 +157,76 @@ def correct(
 
 
 class _Movable:
-    """What can be turned of a pulse: (start, on-time) of a channel, (start, impulse, angle) of a steerable torquer."""
+    """What can be turned of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
-    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, on_times: tuple[float, float]) -> None:
+    Without the last of them where it is not ``sized`` for itself.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
         pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
         self.channel = channel_of(spacecraft, pulse)
         self.torquer = spacecraft.torquer
-        if self.channel is not None:
-            self.start = np.array([pulse.start, pulse.on_time])
-            self.scale = np.array([pace, pulse.on_time])
-            longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
-            self.lower = np.array([earliest, max(effective_on_times(self.channel)[0], on_times[0])])
-            self.upper = np.array([latest, min(longest, on_times[1])])
-        else:
-            self.start = np.array([pulse.start, pulse.magnitude, math.atan2(pulse.impulse[1], pulse.impulse[0])])
-            self.scale = np.array([pace, pulse.magnitude, 1.0])
-            torque = None if self.torquer is None else self.torquer.torque
-            least, most = (0.0, math.inf) if torque is None else (torque * bound for bound in on_times)
-            self.lower = np.array([earliest, least, -np.inf])
-            self.upper = np.array([latest, most, np.inf])
+        self.size = _size(pulse)
+        start, scale, lower, upper = [pulse.start], [pace], [earliest], [latest]
+        if self.channel is None:
+            start.append(math.atan2(pulse.impulse[1], pulse.impulse[0]))
+            scale, lower, upper = [*scale, 1.0], [*lower, -math.inf], [*upper, math.inf]
+        if sized:
+            start, scale = [*start, self.size], [*scale, self.size]
+            least, most = _bounds(spacecraft, pulse)
+            lower, upper = [*lower, least], [*upper, most]
+        self.sized = sized
+        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
 
-    def turn(self, x: Vector) -> Pulse:
-        """The pulse with these settings."""
+    def turn(self, x: Vector, factor: float) -> Pulse:
+        """The pulse with these settings; ``factor`` times as large where it is not sized for itself."""
+        size = float(x[-1]) if self.sized else factor * self.size
         if self.channel is not None:
-            return channel_pulse(self.channel, x[0] + 0.5 * x[1], float(x[1]))
+            return channel_pulse(self.channel, x[0] + 0.5 * size, size)
         assert self.torquer is not None
         torque = self.torquer.torque
-        on_time = 0.0 if torque is None else x[1] / torque
-        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[2]), impulse=float(x[1]))
+        on_time = 0.0 if torque is None else size / torque
+        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[1]), impulse=size)
+
+
+class _Common:
+    """What equal pulses change alike: one factor on the size of all that are as large as the last one."""
+
+    start = scale = np.ones(1)
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        self.spacecraft, self.last = spacecraft, made.pulses[-1]
+        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if self._alike(pulse)]) / _size(self.last)
+        self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
+
+    def _alike(self, pulse: Pulse) -> bool:
+        by_size = self.last.on_time == 0.0
+        one, other = (each.magnitude if by_size else each.on_time for each in (pulse, self.last))
+        return abs(one - other) <= ALIKE * other
+
+    def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
+        """The ``pulses`` about their centres, those alike ``factor`` times as large."""
+        return [_resized(self.spacecraft, one, factor) if self._alike(one) else one for one in pulses]
+
+
+def _resized(spacecraft: Spacecraft, pulse: Pulse, factor: float) -> Pulse:
+    moved = _Movable(spacecraft, pulse, sized=False)
+    made = moved.turn(moved.start, factor)
+    return replace(made, t=pulse.t)
+
+
+def _size(pulse: Pulse) -> float:
+    """What a pulse is measured by: on-time of a channel, s, impulse of a steerable torquer, N m s."""
+    return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
+
+
+def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
+    """The least and the largest size of a pulse."""
+    channel = channel_of(spacecraft, pulse)
+    if channel is None:
+        return 0.0, math.inf
+    return effective_on_times(channel)[0], max(longest_on_time(spacecraft, channel), pulse.on_time)
 
 
 def solve(

@@ -16,8 +16,8 @@ from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import Windows, usable
 from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
-from nutdamp.schedule import Pulse, channel_pulse, steerable_pulse
-from nutdamp.schemes.options import UNEQUAL, RhumbLineOptions
+from nutdamp.schedule import TOUCHING, Pulse, channel_pulse, steerable_pulse
+from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 TURN_SHARE = 0.125
@@ -37,11 +37,26 @@ OPEN = 1.2
 
 MOST_PULSES = 600
 
-LAST = 10
-"""How many of the last pulses may be corrected, at most."""
+LAST = 20
+"""How many of the last pulses may be moved, at most."""
 
 TRIES = 4
-"""Counts that are flown, at most; twice as many where pulses are to have a given length."""
+"""Counts that are flown, at most."""
+
+SPARE = 3e-3
+"""Pulses that a train has to spare: by so much it may bend, without which its phases could not bring H nearer."""
+
+ROOM = 1.0
+"""Times twice the spare pulses that it takes at least to close the phasors by the phases of the last pulses."""
+
+LEAST_RATIO = 0.1
+"""Inertia ratio below which the phases of pulses hardly matter to the nutation."""
+
+BENT = 10.0
+"""Times as many spare pulses for a last try."""
+
+WIDEST_BEND = 1.3
+"""rad by which the heading of a train may differ from the course to the target."""
 
 
 class Shot(NamedTuple):
@@ -52,15 +67,16 @@ class Shot(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A train to fly: so many ``pulses`` of ``on_time`` s, the last few corrected within ``bounds`` (s).
+    """A train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
 
-    ``closes``: whether the pulses leave little nutation as they are, so that correction costs little.
+    ``closes``: whether they leave little nutation as they are, so that correction costs little. ``resizable``: whether
+    the size is not that of a command, and may be corrected.
     """
 
     pulses: int
-    on_time: float
-    bounds: tuple[float, float]
+    size: float
     closes: bool
+    resizable: bool = False
 
 
 class Train:
@@ -74,7 +90,7 @@ class Train:
         self.sun = here.goal.sun
         self.channels = [] if here.torquer is not None else _spread(usable(here), options.per_turn)
         if self.channels:
-            self.torque = min(abs(channel.transverse) for channel in self.channels)
+            self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(self.channels)
             self.shortest = max(channel.min_on_time for channel in self.channels)
             self.longest = min(channel.max_on_time for channel in self.channels)
         else:
@@ -90,14 +106,14 @@ class Train:
             raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
         self.way = pointing.course(here.momentum, here.target_axis, self.sun)[1]
 
-    def turns_by(self, on_time: float) -> float:
-        """By how much a pulse turns H, N m s."""
-        return self.torque * on_time * pointing.arc_efficiency(self.here.spin, on_time)
+    def turns_by(self, size: float) -> float:
+        """By how much a pulse of a ``size`` as in `Attempt` turns H, N m s."""
+        return size if math.isinf(self.torque) else self.torque * size * pointing.arc_efficiency(self.here.spin, size)
 
     @property
     def strongest(self) -> float:
         """By how much a full pulse of the train turns H, N m s."""
-        return STEP * self.h if math.isinf(self.torque) else self.turns_by(self.on_time)
+        return self.turns_by(STEP * self.h if math.isinf(self.torque) else self.on_time)
 
     def _check(self, given: float) -> None:
         """Raises Infeasible where no pulse can be ``given`` s long, or should."""
@@ -108,25 +124,35 @@ class Train:
                 f"an on-time of {given:.4g} s is outside what the channels allow: "
                 f"{self.shortest:.4g} s to {self.longest:.4g} s"
             )
+        if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
+            raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {self.here.limits.tick:.4g} s")
         if given > 0.5 * self.turn:
             raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
 
-    def length(self, count: int) -> float:
-        """On-time (s) of ``count`` equal pulses that turn H all the way; not a number where that is too far."""
+    def size(self, count: int, spare: float) -> float:
+        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on the ticks, rounded up.
+
+        Not a number where that is too far.
+        """
+        share = self.h * self.way / (count - min(spare, 0.5 * count))
         if math.isinf(self.torque):
-            return 0.0
-        share = np.array([self.h * self.way / count])
-        return float(pointing.on_times_to_turn(share, self.torque, self.here.spin)[0])
+            return share
+        needed = max(float(pointing.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]), self.shortest)
+        return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
     def attempts(self) -> list[Attempt]:
         """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
         left = self.left_by(self.shots())
         return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
 
-    def _attempt(self, count: int, on_time: float, about: float, left: Vector) -> Attempt:
-        """Pulses of ``on_time`` s, the last within `UNEQUAL` of ``about`` s."""
-        bounds = (1.0 - UNEQUAL) * about, (1.0 + UNEQUAL) * about
-        return Attempt(count, on_time, bounds, bool(left[count - 1] <= CLOSED))
+    def _spare(self, count: int, left: Vector) -> float:
+        """Pulses to spare for a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
+
+        A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
+        of its square.
+        """
+        needed = float(left[count - 1]) / max(abs(self.here.inertia.a), LEAST_RATIO)
+        return SPARE + ROOM * needed**2 / min(count, LAST)
 
     def _free(self, left: Vector) -> list[Attempt]:
         """Trains of pulses of any length: `left_by` of 1, 2, … pulses is ``left`` (n,)."""
@@ -143,42 +169,51 @@ class Train:
             if left[best - 1] > OPEN:
                 raise Infeasible(self._in_phase(fewest, most, float(left[best - 1])))
             closing = [best]
-        # Of the next few counts the one that closes best, then in turn; at last with corrections of any size.
+        # Of the next few counts the one that closes best, or that ticks make least dear; at last with room to bend.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
-        near = sorted(near, key=lambda count: left[count - 1])[:TRIES]
-        tried = [self._attempt(count, self.length(count), self.length(count), left) for count in near]
-        bounds = self.shortest, max(self.on_time, self.widest)
-        return [*tried, Attempt(near[0], self.length(near[0]), bounds, closes=False)]
+        free = self.here.limits.tick is None
+        tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
+        if free:
+            tried.sort(key=lambda one: float(left[one.pulses - 1]))
+        else:
+            tried.sort(key=lambda one: one.pulses * one.size)
+        tried = tried[:TRIES]
+        for count in [one.pulses for one in tried[:2]]:
+            tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
+        widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
+        possible = list({one[:2]: one for one in reversed(tried) if one.size <= widest}.values())[::-1]
+        if not possible:
+            raise self._too_few(most + 1, len(left))
+        return possible
 
     def _held(self, left: Vector, given: float) -> list[Attempt]:
-        """Trains of pulses ``given`` s long, or equal ones hardly shorter, the fewest first: ``left`` as in `_free`."""
-        fewest = self.fewest()
-        most = min(self._most(), math.floor(_ratio(self.h * self.way, self.turns_by((1.0 - UNEQUAL) * given)) + 1e-9))
-        if fewest > min(self._most(), len(left)):
+        """Trains of pulses ``given`` s long, the fewest first, the spare ones bent away: ``left`` as in `_free`."""
+        fewest, most = self.fewest(), self._most()
+        if fewest > min(most, len(left)):
             raise self._too_few(fewest, len(left))
-        if fewest > most:
-            within = f"within {100 * UNEQUAL:.0f} % of {given:.4g} s"
-            raise Infeasible(f"{fewest} pulses {within} turn H too far, and {fewest - 1} not far enough")
-        counts = range(fewest, min(most, len(left)) + 1)
-        tried = [self._attempt(fewest, given, given, left)] if left[fewest - 1] <= OPEN else []
-        tried += [self._attempt(count, self.length(count), given, left) for count in counts if left[count - 1] <= OPEN]
+        counts = range(fewest, min(most, len(left), fewest + 2 * TRIES) + 1)
+        needed = self.h * self.way / self.turns_by(given)
+        closing = [count for count in counts if left[count - 1] <= OPEN]
+        enough = [count for count in closing if count - needed >= 0.5 * self._spare(count, left)]
+        tried = [Attempt(count, given, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
         if not tried:
-            least = float(left[fewest - 1 : counts[-1]].min())
-            raise Infeasible(self._in_phase(fewest, counts[-1], least))
+            raise Infeasible(self._in_phase(fewest, counts[-1], float(left[fewest - 1 : counts[-1]].min())))
         return tried[: 2 * TRIES]
 
     @property
     def floor(self) -> float:
         """Impulse (N m s) that no train can do without."""
-        shortest = 0.0 if math.isinf(self.torque) else max((1.0 - UNEQUAL) * self.on_time, self.shortest)
-        return self.h * self.way / pointing.arc_efficiency(self.here.spin, shortest)
+        given = self.shortest if self.options.on_time is None else self.on_time
+        return self.h * self.way / pointing.arc_efficiency(self.here.spin, given)
 
     def lengths_near(self, given: float) -> list[float]:
         """On-times (s) of trains that may close, in the order of how near they are to the one ``given``."""
         left = self.left_by(self.shots())
-        most = min(len(left), self._most())
-        closing = [self.length(count) for count in range(2, most + 1) if left[count - 1] <= OPEN]
-        possible = [one for one in closing if self.shortest <= one <= self.widest and one > 0.0]
+        closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
+        sizes = {self.size(count, self._spare(count, left)) for count in closing}
+        if self.here.limits.tick is not None:
+            sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
+        possible = [one for one in sizes if self.shortest <= one <= self.widest and one > 0.0]
         return sorted(possible, key=lambda one: abs(one - given))
 
     @property
@@ -258,16 +293,9 @@ class Train:
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
-        ahead, way = pointing.course(here.momentum, here.target_axis, self.sun)
         windows, limits = Windows(here), here.limits
-        share = self.h * way / remaining
-        on_time = 0.0
-        if not math.isinf(self.torque):
-            least, most = max(attempt.bounds[0], self.shortest), min(attempt.bounds[1], self.longest)
-            each = attempt.on_time
-            if remaining <= LAST:
-                each = float(pointing.on_times_to_turn(np.array([share]), self.torque, here.spin)[0])
-            on_time = windows.on_time(each if math.isfinite(each) else most, least, most)
+        ahead = self._heading(here, remaining, attempt)
+        on_time = 0.0 if math.isinf(self.torque) else attempt.size
         ready, turn = limits.earliest, self.turn / self.options.per_turn
         begun = here is not self.here
         if self.channels:  # no two in the same passage of the phase
@@ -280,8 +308,16 @@ class Train:
         centre = start + 0.5 * on_time
         body = self._body(Arc(here.inertia.A, here.inertia.C, 0.0, here.initial), Shot(centre, None), ahead)
         assert here.torquer is not None
-        given = {"impulse": share} if here.torquer.torque is None else {"on_time": on_time}
+        given = {"impulse": attempt.size} if here.torquer.torque is None else {"on_time": on_time}
         return steerable_pulse(here.torquer, centre, cmath.phase(body), **given)
+
+    def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
+        """The course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
+        ahead, way = pointing.course(here.momentum, here.target_axis, self.sun)
+        share = self.h * way / (remaining * self.turns_by(attempt.size))
+        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
+        aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
+        return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
     def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
         """The first firing of a channel as it passes the phase that the limits allow."""
