@@ -161,7 +161,7 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
     ),
     "an unknown format": (
         lambda _, plan: nutdamp.export(plan, "oem", "x"),
-        "format = 'oem': expected one of apm, aem, stk, basilisk, json",
+        "format = 'oem': expected one of apm, aem, aem-spin, opm, stk, spin-table, basilisk, json",
     ),
     "an end as text": (lambda _, plan: plan.fly(until="3"), "until = '3': expected a time after t = 0, in s"),
     "half a sample": (lambda _, plan: plan.fly(samples=2.5), "samples = 2.5: expected a whole number of at least 2"),
