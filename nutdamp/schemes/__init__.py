@@ -197,7 +197,7 @@ class _Correction:
         if self.options.uncorrected or not made.pulses:
             return made
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-        last = max(free, MOVED) if self.options.equal else free
+        last = MOVED if self.options.equal and free == 4 else free
         chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and free == 4:  # and the pulse that gives most to the spin
