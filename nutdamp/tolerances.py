@@ -35,7 +35,9 @@ class Dispersions:
     relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes across the force) and
     ``position`` (m, each component) are by thruster too. The steerable torquer counts as the thruster
     `nutdamp.schedule.STEERABLE`. ``timing`` s shifts each pulse, ``timing_offset`` s the whole schedule; ``attitude``
-    rad tilts the spin axis at t = 0 about two axes across it.
+    rad tilts the spin axis at t = 0 about two axes across it. ``open_delay`` and ``close_delay`` s and ``impulse_bit``,
+    a relative one, are by thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is
+    off.
     """
 
     A: Tolerance | None = None
@@ -48,3 +50,7 @@ class Dispersions:
     timing: Tolerance | None = None
     timing_offset: Tolerance | None = None
     attitude: Tolerance | None = None
+    open_delay: Mapping[str, Tolerance] = field(default_factory=dict)
+    close_delay: Mapping[str, Tolerance] = field(default_factory=dict)
+    impulse_bit: Mapping[str, Tolerance] = field(default_factory=dict)
+    cold: Tolerance | None = None

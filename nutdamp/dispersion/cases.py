@@ -8,7 +8,8 @@ nothing disperses stays one number for all of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -117,6 +118,20 @@ class _Actuation:
     remainder: Triple
 
 
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """A pulse through valves that are not as the file has them: ``longer``, factors by thruster, and ``late``, s.
+
+    As what they change is small beside the pulse, it keeps its shape, with another impulse and another centroid.
+    """
+
+    longer: Mapping[str, Cases]
+    late: Cases
+
+
+AS_PLANNED = _Opened({}, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """A spacecraft and the schedule it flies, ready to be dispersed."""
@@ -182,15 +197,19 @@ class Model:
         starts, impulses = [], []
         propellant: Cases | None = 0.0
         for number, one in enumerate(self._actuations, start=1):
+            opened = self._opened(one, draws)
             late = plus(offset, draws.get(f"Sun pulse {number}", 0.0))
             shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-            start, lead = one.pulse.start, 0.0
+            lead: Cases = 0.0
+            start = one.pulse.start
             if one.pulse.command is not None:
                 start = one.pulse.command.start
-                lead = one.pulse.t - 0.5 * self.on_times[number - 1] - start
+                lead = plus(one.pulse.t - 0.5 * self.on_times[number - 1] - start, opened.late)
             starts.append(plus(start if _nothing(shift) else _not_before(start + shift), lead))
             factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
-            torque, mean, flow = torques[one.source]
+            if not _nothing(warmer := times(draws.get("cold", 0.0), self._coldness[number - 1])):
+                factor = factor * (1.0 + warmer)
+            torque, mean, flow = torques[one.source] if not opened.longer else self._torque(one.source, draws, opened)
             if one.source == STEERABLE and not self._members[STEERABLE]:
                 impulse = self._steered(one.pulse.impulse, mean, draws)
             else:
@@ -230,7 +249,34 @@ class Model:
             remainder = np.zeros(3)
         return _Actuation(pulse, source, duration, _parts(remainder))
 
-    def _torque(self, source: str | None, draws: Draws) -> tuple[Triple, Cases, Cases]:
+    def _opened(self, one: _Actuation, draws: Draws) -> _Opened:
+        """What delays and impulse bits other than those of the file do to a pulse."""
+        if one.pulse.command is None or one.source is None or not one.pulse.command.ramps:
+            return AS_PLANNED
+        longer: dict[str, Cases] = {}
+        late: Cases = 0.0
+        members = self._members[one.source]
+        for thruster in members:
+            opens, closes = (draws.get(f"{key} {thruster.name}", 0.0) for key in ("open_delay", "close_delay"))
+            bit = draws.get(f"impulse_bit {thruster.name}", 0.0)
+            more = plus(times(plus(closes, times(-1.0, opens)), 1.0 / one.pulse.on_time), bit)
+            if not (_nothing(more) and _nothing(opens)):
+                longer[thruster.name] = plus(1.0, more)
+                late = plus(late, times(plus(opens, closes), 0.5 / len(members)))
+        return _Opened(longer, late)
+
+    @cached_property
+    def _coldness(self) -> tuple[float, ...]:
+        """By how much each pulse grows with the factor of the first, over what it is."""
+        cold, fired, found = self.spacecraft.cold, Counter[str](), []
+        for one in self._actuations:
+            before = fired[one.pulse.channel]
+            fired[one.pulse.channel] += 1
+            through = cold is not None and one.source not in (None, STEERABLE)
+            found.append(cold.decay(before) / cold.factor(before) if cold is not None and through else 0.0)
+        return tuple(found)
+
+    def _torque(self, source: str | None, draws: Draws, opened: _Opened | None = None) -> tuple[Triple, Cases, Cases]:
         """Torque of a channel (N m), the mean thrust factor of its thrusters, and that of their propellant flow."""
         thrusters = self._members.get(source, ()) if source is not None else ()
         if not thrusters:
@@ -238,6 +284,9 @@ class Model:
             return (0.0, 0.0, 0.0), factor, factor
         torque: Triple = (0.0, 0.0, 0.0)
         factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
+        if opened is not None:
+            lasts = [opened.longer.get(thruster.name, 1.0) for thruster in thrusters]
+            factors = [factor * longer for factor, longer in zip(factors, lasts, strict=True)]
         for thruster, factor in zip(thrusters, factors, strict=True):
             turned = self._thruster_torque(thruster, draws)
             torque = _sum(torque, turned if isinstance(factor, float) and factor == 1.0 else _scaled(turned, factor))

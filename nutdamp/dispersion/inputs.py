@@ -112,6 +112,14 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
         yield from _direction(name, tolerance, members)
     for name, tolerance in requested.position.items():
         yield from _position(name, tolerance, members)
+    for key in ("open_delay", "close_delay", "impulse_bit"):
+        for name, tolerance in getattr(requested, key).items():
+            yield _valve(key, name, tolerance, members)
+    if requested.cold is not None:
+        cold = spacecraft.cold
+        known = cold is not None and bool(members)
+        why = "the file has no cold nozzles" if cold is None else "the schedule fires no thruster"
+        yield _input("cold", "cold", requested.cold, 1.0, "") if known else Unused("cold", why)
     pulses = range(1, len(schedule) + 1)
     if requested.thrust_per_pulse is not None:
         named = [f"thrust pulse {number}" for number in pulses]
@@ -184,6 +192,21 @@ def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | Non
     else:
         for axis in "xyz":
             yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
+
+
+def _valve(key: str, name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:
+    """A tolerance of a valve, or of a table in its place."""
+    called = f"{key} {name}"
+    if name not in members:
+        return Unused(called, _idle(name))
+    thruster = members[name]
+    delay = getattr(None if thruster is None else thruster.valve, key, None)
+    if key == "impulse_bit":
+        measured = thruster is not None and thruster.valve is not None and not hasattr(thruster.valve, "open_delay")
+        if not measured:
+            return Unused(called, f"{name} has no impulse_bit")
+        return Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
+    return Unused(called, f"{name} has no valve") if delay is None else _input(called, key, tolerance, delay, "s")
 
 
 def _of_pulses(

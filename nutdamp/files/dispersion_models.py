@@ -26,13 +26,17 @@ QUANTITIES = {
     "timing": "time",
     "timing_offset": "time",
     "attitude": "angle",
+    "open_delay": "time",
+    "close_delay": "time",
+    "impulse_bit": "ratio",
+    "cold": "ratio",
 }
 """The keys of dispersions with the kind of quantity that they hold."""
 
 RELATIVE = ("inertia", "rate", "force", "ratio")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
-BY_THRUSTER = ("thrust", "thrust_direction", "position")
+BY_THRUSTER = ("thrust", "thrust_direction", "position", "open_delay", "close_delay", "impulse_bit")
 """The keys that hold one tolerance for all thrusters, or one by name."""
 
 ALL = ""
@@ -171,6 +175,26 @@ class DispersionsSection(Section):
         description="Of the direction of the spin axis at t = 0, about two axes across it, rad.",
         examples=[{"normal": "0.2 deg"}],
     )
+    open_delay: Annotated[_ByThruster, _Alike("open_delay")] | None = Field(
+        default=None,
+        description="Of each valve's open_delay, the same in all its pulses, s; or by name.",
+        examples=[{"normal": "1 ms"}],
+    )
+    close_delay: Annotated[_ByThruster, _Alike("close_delay")] | None = Field(
+        default=None,
+        description="Of each valve's close_delay, the same in all its pulses, s; or by name.",
+        examples=[{"normal": "1 ms"}],
+    )
+    impulse_bit: Annotated[_ByThruster, _Alike("impulse_bit")] | None = Field(
+        default=None,
+        description="Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.",
+        examples=[{"normal": "2 %"}],
+    )
+    cold: Annotated[ToleranceSection, _Alike("cold")] | None = Field(
+        default=None,
+        description="Of the thrust of a first cold pulse, in % of a warm one.",
+        examples=[{"normal": "2 %"}],
+    )
 
 
 def dispersions(
@@ -215,6 +239,10 @@ def dispersions(
         timing=one("timing"),
         timing_offset=one("timing_offset"),
         attitude=one("attitude"),
+        open_delay=each("open_delay"),
+        close_delay=each("close_delay"),
+        impulse_bit=each("impulse_bit"),
+        cold=one("cold"),
     )
 
 

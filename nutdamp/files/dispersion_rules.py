@@ -89,7 +89,7 @@ def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
         return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
     if key == "omega0":
         return _spin(facts), "the spin"
-    if key == "thrust_per_pulse":
+    if QUANTITIES[key] == "ratio":
         return 1.0, ""
     return (RIGHT_ANGLE, "a right angle") if QUANTITIES[key] == "angle" else (None, "")
 

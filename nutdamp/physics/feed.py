@@ -17,7 +17,11 @@ class Cold:
 
     def factor(self, before: int) -> float:
         """Of the pulse that comes after so many ``before`` it: 1 - (1 - first) exp(-k/pulses)."""
-        return 1.0 - (1.0 - self.first) * math.exp(-before / self.pulses)
+        return 1.0 - (1.0 - self.first) * self.decay(before)
+
+    def decay(self, before: int) -> float:
+        """What is left of the difference to a warm nozzle then, over that of the first pulse."""
+        return math.exp(-before / self.pulses)
 
 
 @dataclass(frozen=True, slots=True)

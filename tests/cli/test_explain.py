@@ -165,8 +165,9 @@ def test_units_and_defaults_of_keys() -> None:
 
 def test_examples_can_be_set() -> None:
     """As --set takes them, on a file that has what they need."""
-    omega0 = "name: x\ninertia: {A: 100, C: 80}\nomega0: [0.1, 0, 3]\nthrusters: [{name: T1, torque: [0, 8, 0]},"
-    base = omega0 + " {name: T2, torque: [8, 0, 0]}]\n"
+    base = "name: x\ninertia: {A: 100, C: 80}\nomega0: [0.1, 0, 3]\nthrusters:\n"
+    for name, torque in (("T1", "[0, 8, 0]"), ("T2", "[8, 0, 0]")):
+        base += f"  - {{name: {name}, torque: {torque}, lever_arm: 1, isp: 220}}\n"
     base += "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: GCRF}\n"
     base += "sun: epoch\nsun_sensor: {azimuth: 0}\n"
     chosen = [key for key in keys() if not key.parent and key.name not in ("state", "omega0")]

@@ -1,0 +1,140 @@
+"""Dispersed valves and cold nozzles: a case against the flight of a body that has them so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import channel, spinner
+
+from nutdamp import planning
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.flown import RealWidths
+from nutdamp.dispersion.inputs import list_inputs
+from nutdamp.dispersion.single import flown_outputs
+from nutdamp.dispersion.study import Results, run
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.flight import flown
+from nutdamp.physics.feed import Cold
+from nutdamp.physics.valve import Measured, Trapezoid, Valve
+from nutdamp.schedule import Schedule, commanded
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.supply import supplied
+
+SLOW = Trapezoid(0.008, 0.012, 0.005, 0.010)
+TABLE = Measured(((0.01, 0.008, 0.011), (0.05, 0.047, 0.036), (0.2, 0.198, 0.11)))
+COLD = Cold(0.9, 4.0)
+
+BODY = spinner(
+    spin=math.pi,
+    degrees=0.4,
+    channels=tuple(
+        channel(name, *torque, min_on_time=0.02, max_on_time=0.09, isp=220.0, thrust=10.0)
+        for name, torque in {"a": (8.0, 0.0, 0.1), "b": (-8.0, 0.0, 0.1), "c": (0.0, 8.0, 0.1)}.items()
+    ),
+)
+
+
+def through(valve: Valve, of: str = "", other: Valve | None = None) -> Spacecraft:
+    """The body with this valve on its thrusters, and an ``other`` on one of them."""
+    channels = []
+    for one in BODY.channels:
+        mounted = other if one.name == of else valve
+        channels.append(replace(one, thrusters=tuple(replace(thruster, valve=mounted) for thruster in one.thrusters)))
+    return replace(BODY, channels=tuple(channels), cold=COLD)
+
+
+def refired(body: Spacecraft, made: Schedule) -> Schedule:
+    """The same commands to a body that is not as it was planned for."""
+    channels = {one.name: one for one in body.channels}
+    return Schedule(supplied(body, (commanded(channels[pulse.channel], *pulse.loaded) for pulse in made)))
+
+
+def nutation(model: Model, draws: dict[str, float]) -> float:
+    """Of the case of these draws."""
+    ends = RealWidths(model)(model.cases({name: np.full(2, draw) for name, draw in draws.items()}))
+    return float(np.arctan2(np.hypot(*ends.momentum[:2]), ends.momentum[2])[0])
+
+
+CHANGES: dict[str, tuple[dict[str, float], Valve, Valve, Cold]] = {
+    "opens late": ({"open_delay a": 0.002}, SLOW, replace(SLOW, open_delay=0.010), COLD),
+    "opens early": ({"open_delay a": -0.003}, SLOW, replace(SLOW, open_delay=0.005), COLD),
+    "closes late": ({"close_delay a": 0.002}, SLOW, replace(SLOW, close_delay=0.014), COLD),
+    "larger bits": (
+        {"impulse_bit a": 0.05},
+        TABLE,
+        Measured(tuple((on_time, 1.05 * acts, centroid) for on_time, acts, centroid in TABLE.rows)),
+        COLD,
+    ),
+    "colder": ({"cold": -0.05}, SLOW, SLOW, Cold(0.85, 4.0)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
+    draws, valve, other, cold = CHANGES[change]
+    body = through(valve)
+    made = planning.plan(body, "optimal").pulses
+    model = Model(body, made)
+    nominal, found = nutation(model, {"cold": 0.0}), nutation(model, draws)
+    true = replace(through(valve, "a", other), cold=cold)
+    expected = flown(true, refired(true, made)).residual.nutation
+    assert nominal < math.radians(1e-6)
+    assert expected > math.radians(1e-3)
+    assert found == pytest.approx(expected, rel=1e-3)  # the shape of the pulse stays that of the plan
+    assert flown_outputs(model, dict(draws))[0] == pytest.approx(found, rel=1e-9)
+
+
+FILE = """\
+name: Sat
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 0.4 deg, phase: 40 deg}
+thrusters:
+  - {name: a, torque: [8, 0, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, max_on_time: 90 ms}
+  - {name: b, torque: [-8, 0, 0], lever_arm: 0.8, isp: 220, impulse_bit: [[20 ms, 0.15, 16 ms], [90 ms, 0.8, 60 ms]]}
+  - {name: c, torque: [0, 8, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, max_on_time: 90 ms}
+valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}
+"""
+
+TOLERANCES = """\
+dispersions:
+  open_delay: {normal: 1 ms}
+  close_delay: {a: {uniform: 2 ms}, c: {normal: 1 ms}}
+  impulse_bit: {normal: 3 %}
+  cold: {normal: 2 %}
+"""
+
+
+def test_what_is_drawn_and_what_touches_nothing() -> None:
+    body = read_spacecraft(FILE + "cold: {first: 90 %, pulses: 4}\n" + TOLERANCES, "sat.yaml")
+    fires = Schedule(tuple(commanded(one, 1.0 + number, 0.05) for number, one in enumerate(body.channels)))
+    drawn, unused = list_inputs(body, fires)
+    assert [one.name for one in drawn] == [
+        "open_delay a",
+        "open_delay c",
+        "close_delay a",
+        "close_delay c",
+        "impulse_bit b",
+        "cold",
+    ]
+    assert {one.name: one.reason for one in unused} == {
+        "open_delay b": "b has no valve",
+        "impulse_bit a": "a has no impulse_bit",
+        "impulse_bit c": "c has no impulse_bit",
+    }
+    warm = read_spacecraft(FILE + TOLERANCES, "sat.yaml")
+    assert any(one.reason == "the file has no cold nozzles" for one in list_inputs(warm, fires).unused)
+
+
+def test_a_study_spreads_as_its_valves_do() -> None:
+    """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the draws."""
+    body = read_spacecraft(FILE + "dispersions: {close_delay: {a: {normal: 1 ms}}}\n", "sat.yaml")
+    fires = Schedule((commanded(body.channels[0], 1.0, 0.05),))
+    found = run(Results(study_of(body, fires, seed=3), 4000)).distribution("nutation")
+    slope = [nutation(Model(body, fires), {"close_delay a": late}) for late in (-0.001, 0.001)]
+    assert found is not None
+    low, high = found.quantiles(np.array([0.1587, 0.8413]))
+    assert high - low == pytest.approx(abs(slope[1] - slope[0]), rel=0.05)
