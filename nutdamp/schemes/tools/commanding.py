@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from nutdamp import work
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.limits import commandable, effective_on_times, keeps_limits
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
@@ -28,6 +29,12 @@ EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the
 ROUNDING = 1e-12
 """Share by which an on-time may pass its bounds."""
 
+ROOM = 0.02
+"""Share of the longest pulse that the next plan leaves at either end of all, where there was too little room."""
+
+NEARLY, EXACT = 1.1, 1e-10
+"""Times what the plan leaves on the plain body, and rad, that commands may leave without another plan."""
+
 PLANS = 4
 """Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
 
@@ -35,12 +42,13 @@ TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
 
-def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0) -> Spacecraft:
+def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0) -> Spacecraft:
     """The body that schemes plan for: rectangles of full thrust at any time, that the channels can really give.
 
-    Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file.
+    Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
+    ``room`` s longer at either end.
     """
-    lead, lag = _reaches(spacecraft)
+    lead, lag = (reach + room for reach in _reaches(spacecraft))
     limits = spacecraft.limits
     return replace(
         spacecraft,
@@ -104,11 +112,13 @@ class Correct(Protocol):
 
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
     """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `commanded`."""
-    weakest = strongest = 1.0
+    weakest, strongest, room = 1.0, 1.0, 0.0
+    tried: list[tuple[bool, float, Schedule]] = []
     made: Schedule | None = None
     for _ in range(PLANS):
+        body = plain(spacecraft, weakest, strongest, room)
         try:
-            made = plan(plain(spacecraft, weakest, strongest))
+            made = plan(body)
         except TooShort as short:
             if made is None:
                 raise TooShort(short.why + EFFECTIVE, short.cure) from None
@@ -117,12 +127,28 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
             if made is None:
                 raise Infeasible(f"{reason}{EFFECTIVE}") from None
             break
-        too_weak, too_strong = _outside(spacecraft, made)
-        if not too_weak and not too_strong:
+        too_weak, too_strong, longer = _outside(spacecraft, made)
+        if too_weak or too_strong:
+            weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
+            continue
+        found = commanded(spacecraft, made, correct)
+        kept, left = keeps_limits(spacecraft, found.pulses), _left(spacecraft, found, correct)
+        tried.append((not kept, left, found))
+        rounded = spacecraft.limits.tick is not None
+        if work.exhausted() or not made.pulses:
             break
-        weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
+        if kept and (rounded or left <= NEARLY * _left(body, made, correct) + EXACT):
+            break
+        # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
+        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in made))
     assert made is not None
-    return commanded(spacecraft, made, correct)
+    return min(tried, key=lambda one: one[:2])[2] if tried else commanded(spacecraft, made, correct)
+
+
+def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
+    """What a schedule leaves of what counts, rad."""
+    missed = misses(spacecraft, made)
+    return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
 
 def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
@@ -161,14 +187,17 @@ def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = Fal
     return tuple(pulses)
 
 
-def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[float]]:
+def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[float], float]:
     """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
+
+    And by how much, s, a pulse becomes longer at either end.
 
     Raises Infeasible where the propellant does not last.
     """
     channels = {one.name: one for one in spacecraft.channels}
-    weak, strong = [], []
-    for pulse in _translated(spacecraft, made, unbounded=True):
+    weak, strong, longer = [], [], 0.0
+    for planned_, pulse in zip(made, _translated(spacecraft, made, unbounded=True), strict=True):
+        longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
         channel = channels.get(pulse.channel)
         if channel is None or pulse.torque is None:
             continue
@@ -178,7 +207,7 @@ def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[
             weak.append(level)
         if pulse.on_time < least * (1.0 - ROUNDING):
             strong.append(level)
-    return weak, strong
+    return weak, strong, longer
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
@@ -200,10 +229,4 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Sched
         in_turn = correct(smooth, rounded(in_turn, len(made) - behind), behind)
     found = [rounded(one, len(made)) for one in (made, in_turn)]
     kept = [one for one in found if keeps_limits(spacecraft, one.pulses)] or found
-    aimed = correct.momentum
-
-    def left(one: Schedule) -> float:
-        missed = misses(spacecraft, one)
-        return float(np.linalg.norm(missed if aimed else missed[:2]))
-
-    return min(kept, key=left)
+    return min(kept, key=lambda one: _left(spacecraft, one, correct))
