@@ -110,15 +110,16 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     best: tuple[float, Schedule] | None = None
     before = sum(pulse.magnitude for pulse in builder.pulses)
     for attempt in train.attempts():
-        if best is not None and best[0] <= EXACT and not attempt.closes:
+        nothing = max(EXACT, train.rounding(attempt.size))
+        if best is not None and best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
         made, left = _flown(builder.fork(), train, attempt)
-        left = max(left, EXACT)
+        left = max(left, nothing)
         if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
             best = left, made
         cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
         # Of pulses of a given length the trains come in the order of their cost.
-        if work.exhausted() or (left <= EXACT and (cheap or train.options.on_time is not None)):
+        if work.exhausted() or (left <= nothing and (cheap or train.options.on_time is not None)):
             break
     if best is None or best[0] > tolerable(train.here):
         raise Infeasible(_reason(train, best))

@@ -150,6 +150,27 @@ def test_lengths_that_no_pulse_can_have(actuators: dict[str, Any], on_time: floa
     assert said in why
 
 
+def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
+    """What is left is the rounding of starts: by 10 ms a pulse is turned by 1.7 deg, of its 0.7 deg."""
+    limits = Limits(horizon=400.0, tick=0.01)
+    body = aimed(spinner(degrees=0.0, channels=cross(20.0), limits=limits), 12.0, 45.0)
+    for options in (None, Options(on_time=0.15)):
+        plan = train(body, options)
+        ticks = equal(plan) / 0.01
+        assert ticks == pytest.approx(np.rint(ticks), abs=1e-9)
+        assert plan.pulses.total_impulse < 1.1 * body.turning_impulse
+        assert Outcome(body, plan.pulses).nutation < math.radians(0.05)
+        assert off_target(body, plan.pulses) < math.radians(0.05)
+    why = infeasibility(planning.plan(body, "rhumb-line", Options(on_time=0.152)))
+    assert "no multiple of the tick of 0.01 s; --on-time 0.15s works" in why
+
+
+def test_unequal_moments_change_the_width_of_all_pulses_alike() -> None:
+    limits = Limits(horizon=400.0)
+    body = aimed(spinner(moments=(100.0, 116.0, 140.0), degrees=0.0, channels=cross(20.0), limits=limits), 12.0, 45.0)
+    ends_on_the_target(train(body))
+
+
 def test_ideal_pulses_come_down_to_the_floor() -> None:
     spacecraft = aimed(spinner(degrees=0.0), 40.0, 100.0)
     plan = train(spacecraft)

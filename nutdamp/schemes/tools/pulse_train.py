@@ -140,6 +140,10 @@ class Train:
         needed = max(float(pointing.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]), self.shortest)
         return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
+    def rounding(self, size: float) -> float:
+        """What it may leave, rad, that the start of one pulse is rounded to a tick."""
+        return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
+
     def attempts(self) -> list[Attempt]:
         """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
         left = self.left_by(self.shots())
