@@ -121,3 +121,9 @@ def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
         if wrong == {"whole": 2.0}:  # JSON knows no other 2
             continue
         assert not judge.is_valid(wrong), wrong
+
+
+def test_entries_too_many_are_one_fault() -> None:
+    problems: Problems = []
+    Outer.read({"times": [1, 2, 3, "x"]}, problems)
+    assert problems == [(("times",), "expected 2 to 3 entries, got 4")]
