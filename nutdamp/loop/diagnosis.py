@@ -11,7 +11,7 @@ import numpy as np
 from nutdamp.loop.law import ComplexArray
 from nutdamp.spacecraft import Vector
 
-HALF = 0.5
+WORKS = 0.25
 """Share of what it was to add above which a firing works, and below whose negative it works backwards."""
 
 SIGMAS = 5.0
@@ -43,13 +43,9 @@ class Glimpse:
     samples: int
 
     @classmethod
-    def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse | None:
-        """None where nothing was seen; ``rate`` is complex where the nutation grows."""
-        known = ~np.isnan(best)
-        if not known.any():
-            return None
-        carried = best[known] * np.exp(1j * rate * (times[known] - centre))
-        return cls(complex(carried.mean()), int(known.sum()))
+    def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
+        """Of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
+        return cls(complex((best * np.exp(1j * rate * (times - centre))).mean()), len(times))
 
 
 @dataclass(slots=True)
@@ -77,7 +73,7 @@ class Effect:
     @property
     def known(self) -> bool:
         """Whether noise and bias leave no doubt which."""
-        return SIGMAS * math.sqrt(self.noise) + self.offset < HALF * self.wanted
+        return SIGMAS * math.sqrt(self.noise) + self.offset < WORKS * self.wanted
 
 
 @dataclass(slots=True)
@@ -105,7 +101,7 @@ class Diagnosis:
         if not effect.known:
             return None
         factor = effect.factor.real
-        if factor <= -HALF:
+        if factor <= -WORKS:
             if self.suspect not in (None, channel):
                 return Stop.SENSOR, channel
             if self.suspect is None:
@@ -113,11 +109,11 @@ class Diagnosis:
             return None
         if self.suspect is not None:
             return Stop.CHANNEL, self.suspect
-        if abs(effect.factor) < HALF:
+        if abs(effect.factor) < WORKS:
             return Stop.IDLE, channel
         believed = abs(abs(before.z) - abs(expected))  # by a firing that comes at its moment
         grown = abs(after.z) - abs(before.z)
-        lowers = abs(before.z) - believed > HALF * abs(expected)
+        lowers = abs(before.z) - believed > 0.5 * abs(expected)
         if lowers and grown > SIGMAS * math.hypot(first, second) + 2.0 * offset + 1e-9 * abs(before.z):
             return Stop.FEEDS, channel
         return None

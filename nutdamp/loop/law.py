@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,15 @@ from nutdamp.schemes.four_pulse import DEFAULT_SHARE
 from nutdamp.schemes.tools.reasons import no_channels
 from nutdamp.spacecraft import Channel, Spacecraft
 
+if TYPE_CHECKING:
+    from nutdamp.physics.valve import Valve
+
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+
+LEADS = 100
+"""On-times of a channel for which it is worked out what its valve does."""
 
 
 class Firing(NamedTuple):
@@ -44,7 +51,7 @@ class Firing(NamedTuple):
 class Actuator:
     """A channel as the law sees it: ``kick`` rad/s² is what a second of it adds to z, ``spin_rate`` rad/s² to ω3.
 
-    Its pulses last from ``shortest`` to ``longest`` s.
+    Its pulses last from ``shortest`` to ``longest`` s; ``leads`` are those of its valve: see `_leads`.
     """
 
     channel: Channel
@@ -52,6 +59,7 @@ class Actuator:
     spin_rate: float
     shortest: float
     longest: float
+    leads: tuple[Array, Array] | None = None
 
 
 class Law:
@@ -81,7 +89,8 @@ class Law:
             longest = effective_on_time(channel, self.loop.on_time)
         if self.loop.law == BANG:
             shortest = longest
-        return Actuator(channel, complex(self.seen(kick)), channel.axial / third, shortest, longest)
+        leads = _leads(channel.valve, shortest, longest)
+        return Actuator(channel, complex(self.seen(kick)), channel.axial / third, shortest, longest, leads)
 
     def seen(self, omega: Any) -> Any:
         """z of ω, numbers or arrays."""
@@ -121,19 +130,32 @@ class Law:
         return Firing(wait - lead if self.loop.predict else wait, on_time, lead, lasts, acts)
 
     def waits(self, actuator: Actuator, z: ComplexArray, spin: Array) -> Array:
-        """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not help."""
-        if actuator.spin_rate != 0.0 or actuator.channel.valve is not None:
-            found = (self.firing(actuator, one, turn) for one, turn in zip(z.tolist(), spin.tolist(), strict=True))
-            return np.array([math.nan if one is None else one.wait for one in found])
+        """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not help.
+
+        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks: it tells between which
+        moments a channel comes to fire, `firing` then when and for how long.
+        """
         rate, size, push = self.inertia.body_rate * spin, np.abs(z), abs(actuator.kick)
         half = np.abs(0.5 * rate)
         sine = half * size / push
         needed = np.where(sine > 1.0, math.inf, np.arcsin(np.minimum(sine, 1.0)) / half)
         on_time = np.clip(needed, actuator.shortest, actuator.longest)
         acts = push * np.abs(np.sin(half * on_time)) / half
-        turn = np.angle(-z * np.conj(actuator.kick) * np.where(np.sin(half * on_time) < 0.0, -1.0, 1.0))
-        wait = turn / rate - (0.5 * on_time if self.loop.predict else 0.0)
+        direction = actuator.kick * np.where(np.sin(half * on_time) < 0.0, -1.0, 1.0)
+        if actuator.spin_rate != 0.0:
+            direction = direction * np.exp(1j * self.inertia.body_rate * actuator.spin_rate * on_time * on_time / 6.0)
+        wait = np.angle(-z * np.conj(direction)) / rate
+        if self.loop.predict:
+            wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
         return np.where((acts > 0.0) & (acts < 2.0 * size), wait, math.nan)
+
+
+def _leads(valve: Valve | None, shortest: float, longest: float) -> tuple[Array, Array] | None:
+    """Effective on-times (n,) s from ``shortest`` to ``longest``, and how long before their centres commands begin."""
+    if valve is None:
+        return None
+    on_times = np.linspace(shortest, longest, LEADS)
+    return on_times, np.array([valve.thrust(valve.on_time_for(one)).centroid for one in on_times.tolist()])
 
 
 def _gauge(moments: tuple[float, float, float]) -> tuple[float, float]:

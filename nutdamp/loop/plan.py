@@ -11,7 +11,7 @@ from nutdamp.compliance import Left
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
 from nutdamp.loop.run import SEED, Run, fly
-from nutdamp.loop.stability import Band, Margin, dead_band, margins
+from nutdamp.loop.stability import Band, Margin, dead_band, feeding, margins
 from nutdamp.outcome import left_by, seen_at
 from nutdamp.planning import Plan
 from nutdamp.spacecraft import Spacecraft
@@ -80,9 +80,9 @@ def loop_of(spacecraft: Spacecraft, until: float | None = None, *, seed: int = S
     """
     loop = spacecraft.loop
     assert loop is not None
-    late = [one for one in margins(spacecraft, loop) if not one.damps]
-    if late:
-        raise Infeasible(too_late(late[0]))
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
     run = fly(spacecraft, loop, until, seed=seed)
     return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, run=run)
 
@@ -90,12 +90,11 @@ def loop_of(spacecraft: Spacecraft, until: float | None = None, *, seed: int = S
 def too_late(margin: Margin) -> str:
     """Why a loop does not damp, before it is flown: what to say of one of its channels."""
     degrees = np.degrees(margin.late)
-    what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of the nutation at the start threshold"
+    theta = np.degrees(margin.nutation)
+    what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of {theta:.4g} deg"
     if margin.growth > 1.0:
         what += f", which grows by {100.0 * (margin.growth - 1.0):.3g} % in a period"
     if margin.delay == -np.inf:
         return f"the loop does not damp: {what}; raise start, or allow other on-times"
-    return (
-        f"the loop feeds the nutation: {what}, since it comes {degrees:.4g} deg late; shorten the delays by "
-        f"{-margin.delay:.4g} s, or predict: true"
-    )
+    late = f"it comes up to {degrees:.4g} deg late; it may be {-margin.delay:.4g} s less, or predict: true"
+    return f"the loop does not damp: {what}: {late}"

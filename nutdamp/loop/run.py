@@ -207,8 +207,10 @@ class _Pilot:
         parts = [one if one is not self._seen[-1] else one.up_to(row) for one in self._seen]
         times = np.concatenate([one.times for one in parts])
         best, spin = np.concatenate([one.best for one in parts]), np.concatenate([one.spin for one in parts])
-        if not len(times):
+        known = ~np.isnan(best)
+        if not known.any():
             return None
+        times, best, spin = times[known], best[known], spin[known]
         edge = times[-1] - self.law.period if last else times[0] + self.law.period
         near = times >= edge if last else times <= edge
         rate = complex(self.law.rate(float(spin[-1])), self.law.growth)

@@ -32,6 +32,9 @@ BLOCK = 4096
 FILTERED = 600.0
 """Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
 
+SETTLED = 5.0
+"""Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
+
 BLIND = 1e-6
 """Share of |ω3| times the distance from the centre of mass below which an accelerometer shows nothing of ω."""
 
@@ -94,7 +97,7 @@ class Estimator:
 
     def __init__(self, law: Law, sensor: Sensor, since: float) -> None:
         self.law, self.sensor = law, sensor
-        self.since = since + law.loop.settle
+        self.since = since + max(law.loop.settle, SETTLED * sensor.low_pass)
         self.step = 0.0 if sensor.rate is None else 1.0 / sensor.rate
         self._filtered: Vector | None = None
         self._kept: tuple[Vector, Vector] = (np.empty(0), np.empty(0))

@@ -42,7 +42,7 @@ class Cause(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """A channel at a ``nutation`` (rad): how ``late`` it fires (rad), and the share (``gain``) that a firing leaves.
+    """A channel at a ``nutation`` (rad): how ``late`` it fires at most (rad), and what share (``gain``) that leaves.
 
     ``growth`` is the factor of a period. ``delay``: s by which it may come later still; negative where it comes too
     late, minus infinity where no firing damps. ``cause``: faults in the file, not counted in these figures.
@@ -69,15 +69,22 @@ def margins(spacecraft: Spacecraft, loop: Loop, nutation: float | None = None) -
     return tuple(_margin(law, actuator, theta, spacecraft.spin) for actuator in law.actuators)
 
 
+def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
+    """A channel that does not damp, at the start threshold or, where that is more, at the nutation at t = 0."""
+    angles = [loop.start, spacecraft.nutation] if spacecraft.nutation > loop.start else [loop.start]
+    found = (one for theta in angles for one in margins(spacecraft, loop, theta))
+    return next((one for one in found if not one.damps), None)
+
+
 def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     loop, rate = law.loop, abs(float(law.rate(spin)))
-    firing = law.firing(actuator, complex(law.size(theta, spin)), spin)
-    growth = min(math.exp(min(law.growth * law.period, math.log(NEVER))), NEVER)
     size = law.size(theta, spin)
+    firing = law.firing(actuator, complex(abs(loop.sensor.scale) * size), spin)
+    growth = min(math.exp(min(law.growth * law.period, math.log(NEVER))), NEVER)
     pull = 0.0 if firing is None else abs(firing.acts) / size
     late = 0.0
     if firing is not None and not loop.predict:
-        sampling = 0.0 if loop.sensor.rate is None else 0.5 / loop.sensor.rate
+        sampling = 0.0 if loop.sensor.rate is None else 1.0 / loop.sensor.rate
         late = abs(lag(law, loop.sensor, spin)) + rate * (firing.lead + sampling)
     most = _most_late(pull, growth)
     cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
@@ -176,7 +183,7 @@ def _row(spacecraft: Spacecraft, loop: Loop, delays: Vector) -> Vector:
     worst = np.zeros(len(delays))
     for actuator, margin in zip(law.actuators, found, strict=True):
         size = law.size(loop.start, spacecraft.spin)
-        firing = law.firing(actuator, complex(size), spacecraft.spin)
+        firing = law.firing(actuator, complex(abs(loop.sensor.scale) * size), spacecraft.spin)
         pull = 0.0 if firing is None else abs(firing.acts) / size
         worst = np.maximum(worst, np.abs(1.0 - pull * np.exp(1j * (margin.late + rate * delays))) * margin.growth)
     return worst

@@ -188,16 +188,17 @@ class Coast:
     def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Found | None:
         now = float(seen.now[row])
         if self.sensor.rate is None:
-            return self._refined(row, now - self.law.period / GRID, now, actuator)
+            step = self.law.period / GRID
+            return self._refined(row, now - 2.0 * step, now + step, now, actuator)
         firing = self.law.firing(actuator, complex(seen.z[row]), float(seen.spin[row]))
         if firing is None:
             return None
         return Found(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
 
-    def _refined(self, row: int, low: float, high: float, actuator: Actuator) -> Found | None:
+    def _refined(self, row: int, low: float, high: float, now: float, actuator: Actuator) -> Found | None:
         """The moment at which the wait of a continuous signal is over, by Newton's steps: it falls by 1 s a second."""
         low = max(low, self.estimator.since + self.sensor.delay)
-        now, firing = high, None
+        firing = None
         for _ in range(REFINED):
             firing = self._wait_at(now, actuator)
             if firing is None:

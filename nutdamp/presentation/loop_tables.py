@@ -11,9 +11,9 @@ from rich.text import Text
 
 from nutdamp.decision import Decision
 from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.plan import LoopPlan
+from nutdamp.loop.plan import LoopPlan, too_late
 from nutdamp.loop.run import Run
-from nutdamp.loop.stability import SURELY, Margin, dead_band, margins
+from nutdamp.loop.stability import SURELY, Margin, dead_band, feeding, margins
 from nutdamp.loop.verify import AGREE, LoopVerification
 from nutdamp.loop_settings import GYRO, Loop
 from nutdamp.presentation.decisions import cost, decision_table, requirement
@@ -86,10 +86,9 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
     elif turned:
         how = "is" if len(turned) == 1 else "are"
         yield f"loop: {' and '.join(turned)} {how} wired backwards against the sensor, and feed the nutation"
-    if not all(one.damps for one in found):
-        from nutdamp.loop.plan import too_late
-
-        yield too_late(next(one for one in found if not one.damps))
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        yield too_late(late)
     band = dead_band(spacecraft, loop)
     if band.step > loop.start * (1.0 + 1e-9):
         yield (

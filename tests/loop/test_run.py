@@ -193,7 +193,7 @@ def test_a_channel_wired_backwards_is_named_within_a_period(sensor: Sensor, wron
     "sensor",
     [
         Sensor(scale=-1.0),
-        Sensor(scale=-1.1, rate=50.0, noise=rad(0.02), bias=rad(0.01)),
+        Sensor(scale=-0.5, rate=50.0, noise=rad(0.02), bias=rad(0.01)),
         Sensor(ACCELEROMETER, 50.0, scale=-1.0, noise=1e-4, position=np.array([1.0, 0.2, 0.0])),
     ],
 )
@@ -203,6 +203,14 @@ def test_a_reversed_sensor_is_named_within_a_period(sensor: Sensor) -> None:
     assert run.stop is Stop.SENSOR
     assert len(run.fired) == 2
     assert run.fired[1].pulse.start - run.fired[0].pulse.start <= craft.body_period
+
+
+def test_long_settling_hides_no_fault() -> None:
+    craft = spinner(degrees=2.0, channels=FOUR)
+    loop = Loop(Sensor(rate=20.0, noise=1e-4, scale=-1.0), start=rad(0.3), settle=2.2 * craft.body_period)
+    assert fly(craft, loop, 200.0).stop is Stop.UNCLEAR
+    single = replace(craft, channels=FOUR[:1])
+    assert fly(single, loop, 200.0).stop is Stop.UNCLEAR
 
 
 def test_a_single_channel_cannot_tell_itself_from_the_sensor() -> None:
@@ -218,7 +226,7 @@ def test_firings_that_come_too_late_are_refused_before_the_flight_and_stopped_in
     (allowed,) = {round(one.delay, 12) for one in margins(craft, craft.loop)}
     just, over = (replace(craft, loop=replace(craft.loop, sensor=Sensor(delay=allowed + by))) for by in (-0.01, 0.01))
     assert loop_of(just, 30.0).flown_run.stop is Stop.END
-    with pytest.raises(Infeasible, match=r"deg late; shorten the delays by 0\.01 s"):
+    with pytest.raises(Infeasible, match=r"deg late; it may be 0\.01 s less"):
         loop_of(over, 30.0)
     assert over.loop is not None
     late = replace(over.loop, sensor=Sensor(delay=0.5 * craft.body_period))

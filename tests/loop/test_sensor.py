@@ -135,7 +135,8 @@ def test_low_pass_filter_is_the_recursion_and_its_lag_is_known(spin: float) -> N
         level = beta * level + (1.0 - beta) * row
         wanted.append(complex(*level))
     found = estimator.feed(np.arange(500) / 20.0, values, np.full(500, spin))
-    assert found == pytest.approx(np.array(wanted), abs=1e-13)
+    assert np.isnan(found[:40]).all()  # not used before it has forgotten how it began
+    assert found[40:] == pytest.approx(np.array(wanted)[40:], abs=1e-13)
     _, best, true = estimates(craft, sensor)
     assert best[-1] == pytest.approx(true[-1], abs=1e-12)
     raw = best[-1] * (1.0 - beta) / (1.0 - beta * np.exp(1j * law.rate(spin) * 0.05))
