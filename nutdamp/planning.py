@@ -235,7 +235,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
             made = judged(spacecraft, scheme, schemes.schedule(scheme, body, chosen), chosen)
         except Infeasible as reason:
             made = Plan(spacecraft, scheme, None, str(reason))
-        if made.astray is not None and schemes.SCHEMES[scheme].points:
+        if made.astray is not None and (schemes.SCHEMES[scheme].points or schemes.SCHEMES[scheme].reads_commands):
             made = _routed(made, chosen)
     return replace(made, cut=True) if spent.exhausted else made
 

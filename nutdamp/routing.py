@@ -14,13 +14,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from nutdamp import schemes, work
+from nutdamp import flight, schemes, work
+from nutdamp.commands import Block
 from nutdamp.demands import Keep
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.tools import commanding
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
+from nutdamp.schemes.tools.sun_pulses import fired, sun_pulses
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.words import listed
 
@@ -134,7 +136,7 @@ def _over(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOptions, r
 
     Each leg has the share of the horizon that it has of the way.
     """
-    builder, goal = FlownBuilder(spacecraft), spacecraft.goal
+    builder, goal, blocks = FlownBuilder(spacecraft), spacecraft.goal, list[Block]()
     for number, point in enumerate(route, start=1):
         here = builder.here
         to_go = _length((here.momentum, point, *route[number:]))
@@ -145,7 +147,17 @@ def _over(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOptions, r
             goal=replace(goal, axis=point, spin=spin),
             limits=replace(here.limits, horizon=share * here.horizon),
         )
-        builder.fire(schemes.schedule(scheme, leg, options))
+        made = schemes.schedule(scheme, leg, options)
+        passed = _sun_pulses(spacecraft, builder) if made.blocks else 0
+        blocks += [replace(block, first=block.first + passed) for block in made.blocks]
+        builder.fire(made)
     names, count = listed([keep.name for keep in spacecraft.keep]), len(route) - 1
     points = f"{count} way point{'s' * (count > 1)}"
-    return builder.schedule(f"goes by {points}, so that the spin axis keeps its distance from {names}")
+    note = f"goes by {points}, so that the spin axis keeps its distance from {names}"
+    return replace(fired(spacecraft, blocks), notes=(note,)) if blocks else builder.schedule(note)
+
+
+def _sun_pulses(spacecraft: Spacecraft, builder: FlownBuilder) -> int:
+    """How many Sun pulses came until the pulses of a ``builder`` are over: those of its next leg count from there."""
+    flown = flight.flown(spacecraft, builder.schedule(), builder.now)
+    return len(sun_pulses(flown, builder.now)) if builder.now > 0.0 else 0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nutdamp.epoch import Epoch
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.yaml_tree import KeyPath
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, sun
 from nutdamp.units import shown
 
 Vector = NDArray[np.float64]
@@ -55,10 +55,10 @@ def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[
 
 def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
     """A Sun that gives no pulse: along the spin ``axis`` (3,) in the body at t = 0, or out of the sensor's view."""
-    turned, sun = facts.vector("number", 4, "attitude", "quaternion"), facts.vector("angle", 2, "sun")
-    if not facts.has("sun_sensor") or turned is None or sun is None or not np.any(turned):
+    turned, direction = facts.vector("number", 4, "attitude", "quaternion"), _to_sun(facts)
+    if not facts.has("sun_sensor") or turned is None or direction is None or not np.any(turned):
         return
-    seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), attitude.on_sphere(*sun.tolist()))
+    seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
     angle = float(attitude.angle_between(seen, axis))
     if min(angle, math.pi - angle) < ALONG:
         yield Finding(("sun",), "lies along the spin axis at t = 0: then there is no Sun pulse to fire blocks by")
@@ -87,6 +87,20 @@ def _orbit(facts: Facts) -> Iterator[Finding]:
     center = facts.text("orbit", "center")
     if center is not None and not (center.strip() and center.isascii() and center.isprintable()):
         yield Finding(("orbit", "center"), f"{shown(center)} is no name of a body; expected one such as EARTH")
+
+
+def _to_sun(facts: Facts) -> Vector | None:
+    """The direction (3,) to the Sun, given or of the epoch; None where it cannot be read."""
+    given = facts.vector("angle", 2, "sun")
+    if given is not None:
+        return attitude.on_sphere(*given.tolist())
+    epoch = facts.text("attitude", "epoch")
+    if facts.text("sun") != "epoch" or epoch is None:
+        return None
+    try:
+        return sun.direction(Epoch.parse(epoch).days_of_j2000)
+    except ValueError:
+        return None
 
 
 def _sun(facts: Facts) -> Iterator[Finding]:

@@ -229,7 +229,7 @@ class Search:
                 if math.isfinite(failed[index]):
                     at = np.unravel_index(index, shape)
                     wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
-                    block = Block(channel.name, number + wait, delay, width, count, every)
+                    block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, every)
                     here = State(*(np.broadcast_to(part, shape)[at] for part in vars(state).values()))
                     rank = float(failed[index]), float(cost.ravel()[index])
                     yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))

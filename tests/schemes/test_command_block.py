@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 from spinners import commanded, flown_by_reference, some_body
 
 from nutdamp import compliance, flight, planning, remarks
+from nutdamp.aspect import aspects
 from nutdamp.commands import Block
 from nutdamp.comparison import usual
 from nutdamp.errors import Infeasible
@@ -26,7 +27,7 @@ from nutdamp.schemes import Options
 from nutdamp.schemes.command_block import Search
 from nutdamp.schemes.tools.block_model import BlockModel, Trial
 from nutdamp.schemes.tools.sun_pulses import fired, sun_clock
-from nutdamp.spacecraft import Commands, Disturbance, Requirement, Spacecraft, SunSensor
+from nutdamp.spacecraft import Commands, Disturbance, Keep, Requirement, Spacecraft, SunSensor
 
 Array = NDArray[np.float64]
 
@@ -290,6 +291,22 @@ def test_blocks_keep_out_of_blackout_windows() -> None:
     assert plan.meets_requirement
     assert not any(pulse.end > begins and pulse.start < ends for pulse in plan.pulses)
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
+
+
+def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
+    """The blocks of all legs count their Sun pulses from t = 0: fired anew they are the same pulses."""
+    straight = a_turn()
+    middle = straight.momentum / np.linalg.norm(straight.momentum) + straight.target_axis
+    body = replace(straight, keep=(Keep("Earth", middle / np.linalg.norm(middle), least=math.radians(1.5)),))
+    plan = planning.plan(body, "command-block")
+    assert plan.feasible, remarks.infeasibility(plan)
+    assert plan.meets_requirement
+    assert any("way point" in note for note in plan.pulses.notes)
+    (found, _) = aspects(plan.flight)
+    assert found.kept
+    assert len(plan.pulses.blocks) > 1
+    _, starts = flown_by_reference(body, plan.pulses.blocks)
+    assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
 
 
 def test_a_way_that_only_fits_around_a_window_is_gone_in_two_blocks() -> None:
