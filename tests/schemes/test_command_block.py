@@ -309,6 +309,31 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
 
 
+@pytest.mark.parametrize("seed", some(range(20), always=0))
+def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> None:
+    """Flown by the reference, nutation included, with a cone near the way."""
+    body, rng = some_body(seed), np.random.default_rng(seed)
+    start, end = body.momentum / np.linalg.norm(body.momentum), body.target_axis
+    centre = start + end + rng.uniform(-0.5, 0.5) * np.cross(start, end)
+    centre /= np.linalg.norm(centre)
+    clear = min(float(attitude.angle_between(centre, one)) for one in (start, end))
+    keep = Keep("cone", centre, least=0.4 * clear)
+    body = replace(body, keep=(keep,), requirement=Requirement(math.radians(1.0), math.radians(0.5)))
+    plan = planning.plan(body, "command-block")
+    if not plan.feasible:
+        assert "from cone" in remarks.infeasibility(plan)
+        return
+    motion, nearest, now = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion)), math.inf, 0.0
+    sense = math.copysign(1.0, body.spin)
+    for pulse in plan.pulses:
+        assert pulse.torque is not None
+        for torque, until in ((np.zeros(3), pulse.start), (pulse.torque, pulse.end)):
+            path = reference.coast(body.inertia.moments, motion, torque, np.linspace(0.0, until - now, 20)[1:])
+            nearest = min(nearest, *(reference.angle(sense * one.rotation[:, 2], centre) for one in path))
+            motion, now = path[-1], until
+    assert nearest > keep.least - 1e-4
+
+
 def test_a_way_that_only_fits_around_a_window_is_gone_in_two_blocks() -> None:
     free = planning.plan(a_turn(), "command-block").pulses
     window = (free.pulses[8].start - 1.0, free.pulses[8].start + 1.0)
