@@ -42,8 +42,9 @@ NEWTON = 3
 def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last one is whole.
 
-    ``phase_deg`` is how much of its spin is over when a pulse begins. Without an epoch ``start_utc`` is empty. Raises
-    BadRequest for more than `MOST_SPINS`, Infeasible where the sensor does not see the Sun.
+    ``phase_deg`` is how much of its spin is over when a pulse is commanded, ``on_time_s`` the length of the command.
+    Without an epoch ``start_utc`` is empty. Raises BadRequest for more than `MOST_SPINS`, Infeasible where the sensor
+    does not see the Sun.
     """
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
@@ -60,7 +61,7 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         # Spin 0 is what is left of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
         phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
-        several = ([one.channel for one in firing], map(_number, phases), (_number(one.on_time) for one in firing))
+        several = ([one.channel for one in firing], map(_number, phases), (_number(one.loaded[1]) for one in firing))
         times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
         rows.append([str(first + index), *times, *map(BETWEEN.join, several)])
     return csv_text(HEADER, rows)

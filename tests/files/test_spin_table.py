@@ -18,7 +18,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.exchange import export_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.files.spin_table import HEADER, spin_table
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schedule import Schedule, channel_pulse, commanded
 from nutdamp.spacecraft import Limits, Spacecraft
 
 SUNLIT = """
@@ -137,6 +137,18 @@ def test_a_pulse_before_the_first_sun_pulse_is_in_spin_0() -> None:
     whole = table(spin_table(body, Schedule(), 1.0 + period))
     ends = float(whole[1]["start_s"])
     assert float(rows[0]["phase_deg"]) == pytest.approx(360.0 * (1.0 - (ends - 0.2) / period), abs=1.0)
+
+
+def test_through_valves_on_times_and_phases_are_those_commanded() -> None:
+    valve = "valve: {open_delay: 15 ms, close_delay: 5 ms, rise_time: 10 ms, fall_time: 2 ms}\n"
+    body = read_spacecraft(SUNLIT + valve, "sunlit.yaml")
+    (one,) = body.channels
+    fired = commanded(one, 6.0, 0.2)
+    assert fired.on_time == pytest.approx(0.186, rel=1e-12)
+    (row,) = [row for row in table(spin_table(body, Schedule((fired,)), 10.0)) if row["pulses"] == "1"]
+    assert float(row["on_time_s"]) == 0.2
+    begins, period = float(row["start_s"]), float(row["period_s"])
+    assert float(row["phase_deg"]) == pytest.approx(360.0 * (6.0 - begins) / period, abs=1e-6)
 
 
 def test_what_makes_no_table() -> None:
