@@ -198,9 +198,12 @@ def effective_on_times(channel: Channel) -> tuple[float, float]:
 
 
 def effective_on_time(channel: Channel, on_time: float) -> float:
-    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the torque."""
+    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the torque.
+
+    An ``on_time`` of 0 is the shortest there is: a valve that closes later than it opens gives thrust for a while.
+    """
     valve = channel.valve
-    return on_time if valve is None or math.isinf(on_time) else valve.thrust(on_time).on_time
+    return on_time if valve is None or math.isinf(on_time) else valve.thrust(on_time or TOUCHING).on_time
 
 
 def longest_useful(max_on_time: float, period: float) -> float:

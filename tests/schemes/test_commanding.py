@@ -16,7 +16,7 @@ from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.flight import by_impulses, flown
-from nutdamp.limits import breaches
+from nutdamp.limits import breaches, effective_on_times
 from nutdamp.physics.feed import Cold
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
 from nutdamp.remarks import infeasibility
@@ -215,3 +215,27 @@ def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     assert budget["all: as flown"] < MICRODEGREE
     assert budget["without valves"] > 1000.0 * MICRODEGREE
     assert budget["without cold pulses"] > 1000.0 * MICRODEGREE
+
+
+def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_with() -> None:
+    late = Trapezoid(open_delay=0.005, close_delay=0.105)
+    assert effective_on_times(channel("C", 8.0, 0.0, 0.0))[0] == 0.0
+    body = through(late, spinner(spin=3.0, degrees=0.1, channels=(channel("C", 8.0, 0.0, 0.0),)))
+    assert effective_on_times(body.channels[0])[0] == pytest.approx(0.1, abs=1e-8)
+    for scheme in ("one-pulse", "four-pulse", "optimal"):
+        made = planning.plan(body, scheme)
+        assert all(pulse.loaded[1] > 0.0 and pulse.on_time >= 0.1 for pulse in made.pulses)
+
+
+def test_no_pulse_of_a_plan_is_without_thrust() -> None:
+    """Oblate, strong thrusters, and a valve that closes so late that a tick already gives 141 ms of thrust."""
+    M, tick = 1072.4242912066034, 0.05652980755265212
+    torques = {"+M1": (M, 0.0), "-M1": (-M, 0.0), "+M2": (0.0, M), "-M2": (0.0, -M)}
+    channels = tuple(channel(name, *one, 0.1 * M, isp=172.0, thrust=1580.0) for name, one in torques.items())
+    limits = Limits(earliest=0.80377, tick=tick, blackout=((2.766427, 16.756058), (56.5298, 62.182788)))
+    body = spinner(A=696.2014640787293, C=1290.5142511514878, channels=channels, limits=limits)
+    body = replace(body, omega0=np.array([0.02924650877807938, 0.3621071224872865, -1.1114818144971392]))
+    late = Trapezoid(0.012435118149339648, 0.09611290163212675, 0.010065350950248513, 0.01181259076686132)
+    made = planning.plan(through(late, body), "optimal")
+    assert made.pulses
+    assert all(pulse.magnitude > 0.0 for pulse in made.pulses)

@@ -16,7 +16,7 @@ import numpy as np
 
 from nutdamp import work
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.limits import commandable, effective_on_times, keeps_limits
+from nutdamp.limits import commandable, effective_on_time, effective_on_times, keeps_limits, shortest_on_time
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.least_squares import misses
@@ -52,7 +52,7 @@ def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, 
     limits = spacecraft.limits
     return replace(
         spacecraft,
-        channels=tuple(_plain(channel, weakest, strongest) for channel in spacecraft.channels),
+        channels=tuple(_plain(spacecraft, channel, weakest, strongest) for channel in spacecraft.channels),
         cold=None,
         tank=None,
         limits=Limits(
@@ -71,8 +71,9 @@ def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
     return max((lead for lead, _ in found), default=0.0), max((lag for _, lag in found), default=0.0)
 
 
-def _plain(channel: Channel, weakest: float, strongest: float) -> Channel:
-    least, most = effective_on_times(channel)
+def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: float) -> Channel:
+    least = effective_on_time(channel, shortest_on_time(spacecraft, channel))
+    most = effective_on_times(channel)[1]
     least, most = least * max(strongest, 1.0), most * min(weakest, 1.0)
     return replace(
         channel,
@@ -154,17 +155,22 @@ def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
 def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
     """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
 
-    Raises Infeasible where the propellant does not last.
+    Commands that give no thrust are left out. Raises Infeasible where the propellant does not last.
     """
-    first = replace(made.without_proof, pulses=_translated(spacecraft, made))
+    first = _firing(replace(made.without_proof, pulses=_translated(spacecraft, made)))
     tank = spacecraft.tank
     if tank is not None and first.pulses:
         left = tank.pressure_after(first.propellant or 0.0)
         note = f"tank pressure falls from {1e-5 * tank.pressure:.4g} to {1e-5 * left:.4g} bar"
         first = replace(first, notes=(*first.notes, note))
     if spacecraft.limits.tick is None or not first.pulses:
-        return correct(spacecraft, first, TAIL)
-    return _on_ticks(spacecraft, first, correct)
+        return _firing(correct(spacecraft, first, TAIL))
+    return _firing(_on_ticks(spacecraft, first, correct))
+
+
+def _firing(made: Schedule) -> Schedule:
+    """The schedule without pulses of no impulse."""
+    return replace(made, pulses=tuple(pulse for pulse in made if pulse.magnitude > 0.0))
 
 
 def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = False) -> tuple[Pulse, ...]:
@@ -178,7 +184,11 @@ def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = Fal
         if channel is None:
             pulses.append(supply.fire(pulse, None))
             continue
-        on_time = pulse.on_time / supply.level(channel.name)
+        level = supply.level(channel.name)
+        on_time = pulse.on_time / level
+        if on_time > spacecraft.horizon:
+            text = f"a pulse at {level:.2g} times the thrust, cold or at low pressure, would take {on_time:.4g} s"
+            raise Infeasible(f"{text}, longer than limits.horizon")
         given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
         pulses.append(supply.fire(given, channel))
     tank = spacecraft.tank
