@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.rules import spin_of, symmetric, tensor_of
+from nutdamp.files.thrust_rules import VALVE_TIMES
 from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.physics.cones import momentary, nutation_angle
 from nutdamp.physics.inertia import principal_axes
@@ -30,6 +31,15 @@ LOOSE = 0.1
 LASTING = 50.0
 """Spin turns; no pulse against a nutation lasts longer."""
 
+SLUGGISH = 1.0
+"""s; few valves take so long, and many a data sheet counts in ms."""
+
+THIN = 1e3
+"""Pa; no tank feeds thrusters with less, and most data sheets count in bar."""
+
+STRONG = 2.0
+"""Times the thrust of a warm nozzle; none gives as much when it is cold."""
+
 ANGLES: tuple[KeyPath, ...] = (("state", "phase"), ("goal", "azimuth"), ("goal", "right_ascension"))
 """Angles that may be of any size; the others are refused where they are too large, with a hint."""
 
@@ -49,6 +59,7 @@ def doubts(root: Node) -> Iterator[Finding]:
     yield from _orbit(facts)
     yield from _rates(facts)
     yield from _firings(facts)
+    yield from _thrust(facts)
 
 
 def reading(value: float, kind: str, meant: str) -> str:
@@ -131,3 +142,24 @@ def _firings(facts: Facts) -> Iterator[Finding]:
             value = _bare(facts, path)
             if value is not None and spin is not None and value * abs(spin) > 2.0 * math.pi * turns:
                 yield _doubt(path, value, "time", "ms")
+
+
+def _thrust(facts: Facts) -> Iterator[Finding]:
+    """Valves that take seconds, tanks of a few Pa, and first pulses of many times the thrust."""
+    times: list[KeyPath] = []
+    for path in ((), *(("thrusters", index) for index, _ in facts.children("thrusters"))):
+        times += [(*path, "valve", key) for key in VALVE_TIMES]
+        rows = facts.children(*path, "impulse_bit") if path else []
+        times += [(*path, "impulse_bit", row, column) for row, _ in rows for column in (0, 2)]
+    found = [(path, "time", "ms") for path in times if (_bare(facts, path) or 0.0) > SLUGGISH]
+    pressures: list[KeyPath] = [("tank", "pressure"), ("tank", "final_pressure")]
+    pressures += [("tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
+    found += [(path, "pressure", "bar") for path in pressures if 0.0 < (_bare(facts, path) or 0.0) < THIN]
+    for path, kind, meant in found:
+        value = _bare(facts, path)
+        assert value is not None
+        yield _doubt(path, value, kind, meant)
+    first = _bare(facts, ("cold", "first"))
+    if first is not None and first > STRONG:
+        problem = f"{first} is read as {first} times the thrust of a warm nozzle; write {first} % if that is meant"
+        yield Finding(("cold", "first"), problem)

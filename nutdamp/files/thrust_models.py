@@ -49,7 +49,8 @@ class TankSection(Section):
     )
     isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
         default=None,
-        description="Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters.",
+        description="Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; it runs "
+        "evenly between them, and below the first it is that of the first.",
         examples=[[["8 bar", "215 s"], ["22 bar", "228 s"]]],
     )
 

@@ -71,6 +71,10 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
             if value is not None and last is not None and value <= last:
                 problem = f"{what} {value:g} {unit} is not above that of the row before, {last:g} {unit}"
                 yield Finding((*table, number, column), f"{problem}; expected rows with rising on-times and impulses")
+        value, last = row[2], before[2]
+        if value is not None and last is not None and value < last:
+            problem = f"centroid {value:g} s is before that of the row before, {last:g} s; expected one not earlier"
+            yield Finding((*table, number, 2), problem)
     if thrust is None:
         if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
             return  # what cannot be read is said already
@@ -120,6 +124,10 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
         if before is not None and pressure is not None and pressure <= before:
             problem = f"{pressure:g} Pa is not above that of the row before, {before:g} Pa; expected rising pressures"
             yield Finding(("tank", "isp", number, 0), problem)
+    known = [pressure for pressure in rows if pressure is not None]
+    if full is not None and known and not min(known) <= full <= max(known):
+        problem = f"{min(known):g} Pa to {max(known):g} Pa leave out the pressure at t = 0, {full:g} Pa; add a row"
+        yield Finding(("tank", "isp"), problem)
     for index, _ in facts.children("thrusters"):
         name = facts.text("thrusters", index, "name") or ""
         if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):

@@ -26,7 +26,7 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
     turns = survey.turns(spacecraft)
     if turns:
         parts += [Text(), turns_table(turns)]
-    if any(channel.valve is not None for channel in spacecraft.channels):
+    if survey.acting(spacecraft):
         parts += [Text(), valve_table(spacecraft)]
     if spacecraft.cold is not None:
         parts += [Text(), Text(_cold(spacecraft.cold))]

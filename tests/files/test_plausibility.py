@@ -54,6 +54,22 @@ def doubts_of(text: str) -> list[str]:
             "thrusters[0].min_on_time: warning: 20 is read as 20 s; write 20 ms if that is meant, else 20 s",
         ),
         (
+            BASE + THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}\n",
+            "f.yaml:5:21: valve.open_delay: warning: 8 is read as 8 s; write 8 ms if that is meant, else 8 s",
+        ),
+        (
+            BASE + THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
+            "thrusters[0].impulse_bit[0][2]: warning: 16 is read as 16 s; write 16 ms if that is meant",
+        ),
+        (
+            BASE + THRUSTER.format(0.3, "0, isp: 200") + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}\n",
+            "f.yaml:5:33: tank.pressure: warning: 22 is read as 22 Pa; write 22 bar if that is meant, else 22 Pa",
+        ),
+        (
+            BASE + THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}\n",
+            "f.yaml:5:15: cold.first: warning: 90 is read as 90 times the thrust of a warm nozzle; write 90 % if",
+        ),
+        (
             BASE + "steerable: {torque: 3, lever_arm: 800}\n",
             "f.yaml:4:35: steerable.lever_arm: warning: 800 is read as 800 m; write 800 mm",
         ),

@@ -102,6 +102,10 @@ def test_cold_nozzles() -> None:
         ("tank: {propellant: 30 kg, pressure: 8 N, final_pressure: 8 bar}\n", "9:37: tank.pressure: '8 N' is a force"),
         (TANK.replace("}", ", exponent: -1}"), "9:78: tank.exponent: -1 is out of range"),
         (TANK.replace("}", ", isp: [[8 bar, 215 s], [8 bar, 228 s]]}"), "9:91: tank.isp[1][0]: 800000 Pa is not above"),
+        (
+            TANK.replace("}", ", isp: [[1 bar, 215 s], [2 bar, 228 s]]}"),
+            "9:73: tank.isp: 100000 Pa to 200000 Pa leave out",
+        ),
         (TANK + "mass: 20 kg\n", "9:20: tank.propellant: 30 kg is not less than the mass, 20 kg"),
         (TANK.replace("30 kg", "0"), "9:20: tank.propellant: 0 is out of range"),
     ],
@@ -119,6 +123,10 @@ def test_faults_of_valve_and_cold(lines: str, expected: str) -> None:
         ("impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]", "is a mass; expected an impulse"),
         ("impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]", "on-time 0.02 s is not above"),
         ("impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]", "impulse 0.36 N s is not above"),
+        (
+            "impulse_bit: [[20 ms, 0.15 N s, 35 ms], [40 ms, 0.36 N s, 30 ms]]",
+            "centroid 0.03 s is before that of the row",
+        ),
         ("impulse_bit: [[20 ms, 0.15 N s, 2 ms], [40 ms, 0.36 N s, 30 ms]]", "0.002 s is too early: 0.15 N s take"),
         ("impulse_bit: [[60 ms, 0.5 N s, 40 ms], [90 ms, 0.8 N s, 60 ms]]", "0.05 s is not above the first on-time"),
         (f"valve: {{open_delay: 1 ms}}, {TABLE}", "given together with valve; keep one of the two"),
