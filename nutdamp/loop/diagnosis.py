@@ -89,11 +89,12 @@ class Diagnosis:
     deadline: float = math.inf
 
     def judge(
-        self, channel: str, centre: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
+        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
     ) -> tuple[Stop, str] | None:
         """Why to stop after a firing of ``channel`` that was to add ``expected``, and the channel to name; else None.
 
-        ``doubt``: sigma of ``before`` and of ``after``, and by how much each may be off in any case.
+        ``now`` s is when it is judged. ``doubt``: sigma of ``before`` and of ``after``, and by how much each may be off
+        in any case.
         """
         first, second, offset = doubt
         effect = self.effects.setdefault(channel, Effect())
@@ -105,7 +106,7 @@ class Diagnosis:
             if self.suspect not in (None, channel):
                 return Stop.SENSOR, channel
             if self.suspect is None:
-                self.suspect, self.deadline = channel, centre + self.period
+                self.suspect, self.deadline = channel, now + self.period
             return None
         if self.suspect is not None:
             return Stop.CHANNEL, self.suspect

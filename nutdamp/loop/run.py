@@ -278,10 +278,10 @@ class _Pilot:
                 self._pending = None
                 estimator = coast.estimator
                 doubt = (estimator.doubt(before.samples), estimator.doubt(after.samples), estimator.offset)
-                verdict = self.diagnosis.judge(pulse.channel, pulse.t, before, after, firing.acts, doubt)
+                verdict = self.diagnosis.judge(pulse.channel, float(seen.now[row]), before, after, firing.acts, doubt)
                 if verdict is not None:
                     self.ending = verdict
-        if not self.ending[0].fault:
+        if self._pending is None and not self.ending[0].fault:
             overdue = self.diagnosis.overdue(float(seen.now[row]))
             if overdue is not None:
                 self.ending = overdue

@@ -10,7 +10,8 @@ which in free motion is ω3-fold: for r = (x, y, z) the part that is linear in �
     K2 = ω3 [u3 y (1 + (I2 - I3)/I1) + u2 z (1 - (I2 - I3)/I1)],
 
 so that along axis 3 at radius x it is x ω1 ω3 (1 + a): nothing where C = 2A. The rest of s is even (centripetal) or
-square in ω, and falls out of the fit of a sine with an offset over the last nutation period that finds ω.
+square in ω, of twice the nutation rate: offset, sine and a sine of twice the rate are fitted over the last nutation
+period, and the first of the sines gives ω.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ BLOCK = 4096
 
 FILTERED = 600.0
 """Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
+
+HARMONIC = 7
+"""Samples a nutation period from which on the sine of twice its rate can be told from the others."""
 
 SETTLED = 5.0
 """Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
@@ -106,12 +110,12 @@ class Estimator:
     @property
     def window(self) -> int:
         """Samples of a nutation period, over which an accelerometer's sine is fitted."""
-        return max(round(self.law.period / self.step), 6)
+        return max(round(self.law.period / self.step), 4)
 
     @property
     def first(self) -> float:
         """When the first estimate is there after the last firing, s."""
-        return self.since + (0.5 * self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
+        return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
 
     def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
         """z (n,) at the times of the samples (n,), filter reckoned with; NaN where there is none yet.
@@ -120,7 +124,9 @@ class Estimator:
         """
         smooth = self._low_pass(values)
         if self.sensor.kind == ACCELEROMETER:
-            found = self._fitted(times, smooth[:, 0], spin)
+            # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
+            x, y, _ = (self.sensor.position * self.sensor.axis).tolist()
+            found = self._fitted(times, smooth[:, 0] + (x + y) * spin * spin, spin)
         else:
             found = np.where(times >= self.since, self.law.seen(smooth[:, 0] + 1j * smooth[:, 1]), math.nan)
         return np.asarray(found)
@@ -173,7 +179,9 @@ class Estimator:
         if not fresh:
             return found
         angle = self._rate * (all_times - all_times[0])
-        basis = np.column_stack([np.ones(count), np.cos(angle), np.sin(angle)])
+        turns = np.exp(1j * angle[:, None] * (np.array([1.0, 2.0]) if size >= HARMONIC else np.array([1.0])))
+        basis = np.column_stack([np.ones(count), turns.real, turns.imag])
+        sines = 1 + turns.shape[1]
         normal = np.cumsum(basis[:, :, None] * basis[:, None, :], axis=0)
         right = np.cumsum(basis * all_values[:, None], axis=0)
         last = np.arange(count - fresh, count)
@@ -182,11 +190,11 @@ class Estimator:
         window, moment = normal[last], right[last]
         window[inside] -= normal[first[inside]]
         moment[inside] -= right[first[inside]]
-        enough = np.minimum(last + 1, size) >= max(size // 2, 4)
+        enough = last + 1 >= size
         sine = np.full(fresh, math.nan, dtype=complex)
         if enough.any():
             fit = np.linalg.solve(window[enough], moment[enough][:, :, None])[:, :, 0]
-            sine[enough] = (fit[:, 1] + 1j * fit[:, 2]) * np.exp(-1j * angle[last][enough])
+            sine[enough] = (fit[:, 1] + 1j * fit[:, sines]) * np.exp(-1j * angle[last][enough])
         found[used] = sine / (np.conj(self._seen_gain) * spin[used])
         return found
 
@@ -200,7 +208,7 @@ class Estimator:
         """One sigma of the mean of so many estimates of |z|, rad/s, by the noise of the sensor."""
         if self.sensor.kind != ACCELEROMETER:
             return self.sensor.noise * math.sqrt(2.0 / max(samples, 1)) * max(self.law.gauge)
-        return 4.0 * self.sensor.noise / (math.sqrt(self.window) * self._least_gain)
+        return 2.0 * self.sensor.noise / (math.sqrt(self.window) * self._least_gain)
 
     @property
     def offset(self) -> float:

@@ -202,13 +202,14 @@ def test_a_reversed_sensor_is_named_within_a_period(sensor: Sensor) -> None:
     run = fly(craft, Loop(sensor, start=rad(0.3), stop=rad(0.1)))
     assert run.stop is Stop.SENSOR
     assert len(run.fired) == 2
-    assert run.fired[1].pulse.start - run.fired[0].pulse.start <= craft.body_period
+    latency = craft.body_period if sensor.kind == ACCELEROMETER else 0.0  # until it has seen what a firing did
+    assert run.fired[1].pulse.start - run.fired[0].pulse.start <= craft.body_period + latency
 
 
 def test_long_settling_hides_no_fault() -> None:
     craft = spinner(degrees=2.0, channels=FOUR)
     loop = Loop(Sensor(rate=20.0, noise=1e-4, scale=-1.0), start=rad(0.3), settle=2.2 * craft.body_period)
-    assert fly(craft, loop, 200.0).stop is Stop.UNCLEAR
+    assert fly(craft, loop, 200.0).stop is Stop.SENSOR
     single = replace(craft, channels=FOUR[:1])
     assert fly(single, loop, 200.0).stop is Stop.UNCLEAR
 
@@ -346,7 +347,7 @@ def residuals(count: int, loop: Loop, craft: Spacecraft) -> np.ndarray:
         size = 0.5 + 0.5 * (0.414 * seed % 1.0)
         turn = size * cmath.exp(2j * math.pi * seed * 0.618) * complex(*craft.omega0[:2])
         body = replace(craft, omega0=np.array([turn.real, turn.imag, craft.spin]))
-        run: Run = fly(body, loop, 60.0, seed=seed)
+        run: Run = fly(body, loop, 120.0, seed=seed)
         assert run.stop is Stop.END
         assert run.settled is not None
         at = run.flight.motion(np.array([run.settled]))[0]

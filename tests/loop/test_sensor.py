@@ -106,11 +106,11 @@ def estimates(
 def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(moments: tuple[float, float, float]) -> None:
     for at, along in (((1.0, 0.3, 0.2), (0.0, 0.0, 1.0)), ((0.1, 0.3, 0.8), (1.0, 0.0, 0.0))):
         sensor = Sensor(ACCELEROMETER, 50.0, bias=0.3, position=np.array(at), axis=np.array(along))
-        craft = body(moments, degrees=0.01)
+        craft = body(moments, degrees=0.01 if moments[0] != moments[1] else 3.0)
         times, found, true = estimates(craft, sensor)
         known = ~np.isnan(found)
-        assert times[known][0] == pytest.approx(0.5 * craft.body_period, abs=0.05)
-        assert np.abs(found[known] - true[known]).max() < 2e-3 * np.abs(true).max()
+        assert times[known][0] == pytest.approx(craft.body_period, abs=0.05)
+        assert np.abs(found[known] - true[known]).max() < 1e-3 * np.abs(true).max()
 
 
 def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:
