@@ -18,6 +18,13 @@ SIGMAS = 5.0
 """A firing is judged by what so many sigma of the noise leave open."""
 
 
+FED = 0.5
+"""Share of the first size that firings may add to it in all: then they feed it, whatever hides which of them."""
+
+STALE = 4.0
+"""Nutation periods after a firing, from which on what is seen no longer tells what it did."""
+
+
 class Stop(Enum):
     """Why the loop was flown no further, or that it was flown to the end."""
 
@@ -28,6 +35,7 @@ class Stop(Enum):
     UNCLEAR = "a channel is wired backwards, or the sensor is reversed"
     IDLE = "a channel does nothing"
     FEEDS = "the firings come at the wrong time"
+    FED = "the firings feed the nutation"
 
     @property
     def fault(self) -> bool:
@@ -87,6 +95,9 @@ class Diagnosis:
     effects: dict[str, Effect] = field(default_factory=dict)
     suspect: str | None = None
     deadline: float = math.inf
+    fed: float = 0.0
+    variance: float = 0.0
+    sizes: list[float] = field(default_factory=list)
 
     def judge(
         self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
@@ -97,6 +108,11 @@ class Diagnosis:
         in any case.
         """
         first, second, offset = doubt
+        self.sizes.append(abs(before.z))
+        self.fed += abs(after.z) - abs(before.z)
+        self.variance += first * first + second * second
+        if len(self.sizes) > 1 and self.fed > FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset:
+            return Stop.FED, channel
         effect = self.effects.setdefault(channel, Effect())
         effect.add(after.z - before.z, expected, math.hypot(first, second), 2.0 * offset)
         if not effect.known:
@@ -118,6 +134,11 @@ class Diagnosis:
         if lowers and grown > SIGMAS * math.hypot(first, second) + 2.0 * offset + 1e-9 * abs(before.z):
             return Stop.FEEDS, channel
         return None
+
+    def rest(self) -> None:
+        """The loop has fallen quiet: what firings add to the size is counted anew."""
+        self.fed = self.variance = 0.0
+        self.sizes.clear()
 
     def overdue(self, now: float) -> tuple[Stop, str] | None:
         """That no other channel has fired in time to tell which of the two it is."""

@@ -14,7 +14,7 @@ from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Leg
 from nutdamp.limits import commandable
-from nutdamp.loop.diagnosis import Diagnosis, Glimpse, Stop
+from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
 from nutdamp.loop.law import Firing, Law
 from nutdamp.loop.sensor import Signal
 from nutdamp.loop.watch import GRID, MOST, Coast, Found, Mover, Seen
@@ -251,6 +251,7 @@ class _Pilot:
             downs, fire = _first(np.asarray(shown <= self.loop.stop), row), _first(np.asarray(fires.any(axis=0)), row)
             if downs is not None and (fire is None or downs <= fire):
                 self.active, row = False, downs + 1
+                self.diagnosis.rest()
                 self.quiet.append(float(seen.now[downs]))
                 continue
             if fire is None:
@@ -274,7 +275,9 @@ class _Pilot:
         if self._pending is not None:
             pulse, firing, before = self._pending
             after = self._glimpse(pulse.t, row, last=False)
-            if after is not None:
+            if after is not None and seen.now[row] > pulse.t + STALE * self.law.period:
+                self._pending = None
+            elif after is not None:
                 self._pending = None
                 estimator = coast.estimator
                 doubt = (estimator.doubt(before.samples), estimator.doubt(after.samples), estimator.offset)
