@@ -81,6 +81,7 @@ def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
         {
             "channel": one.channel,
             "late_deg": math.degrees(one.late),
+            "latest_deg": math.degrees(one.latest) if math.isfinite(one.latest) else None,
             "gain": one.gain,
             "growth": one.growth,
             "delay_margin_s": one.delay if math.isfinite(one.delay) else None,

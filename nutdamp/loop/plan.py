@@ -96,5 +96,5 @@ def too_late(margin: Margin) -> str:
         what += f", which grows by {100.0 * (margin.growth - 1.0):.3g} % in a period"
     if margin.delay == -np.inf:
         return f"the loop does not damp: {what}; raise start, or allow other on-times"
-    late = f"it comes up to {degrees:.4g} deg late; it may be {-margin.delay:.4g} s less, or predict: true"
-    return f"the loop does not damp: {what}: {late}"
+    late = f"it comes up to {degrees:.4g} deg late, and damps up to {np.degrees(margin.latest):.4g} deg"
+    return f"the loop does not damp: {what}: {late}; shorten the delays by {-margin.delay:.4g} s, or set predict: true"

@@ -44,13 +44,15 @@ class Cause(NamedTuple):
 class Margin:
     """A channel at a ``nutation`` (rad): how ``late`` it fires at most (rad), and what share (``gain``) that leaves.
 
-    ``growth`` is the factor of a period. ``delay``: s by which it may come later still; negative where it comes too
-    late, minus infinity where no firing damps. ``cause``: faults in the file, not counted in these figures.
+    It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
+    later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
+    not counted in these figures.
     """
 
     channel: str
     nutation: float
     late: float
+    latest: float
     gain: float
     growth: float
     delay: float
@@ -89,7 +91,7 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     most = _most_late(pull, growth)
     cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, gain, growth, (most - late) / rate, cause)
+    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause)
 
 
 def _most_late(pull: float, growth: float) -> float:

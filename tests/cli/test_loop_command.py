@@ -92,7 +92,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
     late = ("--set", "loop.predict=false", "--set", "loop.sensor.delay=2s")
     done = run("loop", file, *late)
     assert (done.returncode, done.stdout) == (3, "")
-    assert "deg late; it may be 0.8" in done.stderr
+    assert "shorten the delays by 0.8" in done.stderr
     checked = " ".join(run("check", file, *late).stdout.split())
     assert "Warning: the loop does not damp" in checked
     found = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
