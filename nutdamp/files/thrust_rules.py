@@ -30,8 +30,10 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
         if valve is not None:
-            yield from (one for one in _opens(facts, path, valve) if one.path not in said)
-            said.add((*valve, "open_delay"))
+            for found in _opens(facts, path, valve):
+                if found.path not in said:
+                    yield found
+                said.add(found.path)
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
     yield from _alike(facts)
@@ -52,8 +54,8 @@ def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
     longest = facts.number("time", *path, "max_on_time")
     if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
         problem = (
-            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s: the valve closes "
-            "before it opens, and no command gives thrust"
+            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s of "
+            f"{facts.text(*path, 'name') or 'a thruster'}: its valve closes before it opens, and no command gives thrust"
         )
         yield Finding((*valve, "open_delay"), problem)
 

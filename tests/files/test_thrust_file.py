@@ -115,6 +115,12 @@ def test_faults_of_valve_and_cold(lines: str, expected: str) -> None:
     assert any(one.startswith(expected) for one in found), found
 
 
+def test_a_valve_that_opens_for_some_thrusters_and_not_for_others_is_a_fault() -> None:
+    found = faults("valve: {open_delay: 60 ms}\n", body=BODY.replace("max_on_time: 50 ms", "max_on_time: 90 ms", 1))
+    assert len(found) == 1
+    assert found[0].endswith("of b: its valve closes before it opens, and no command gives thrust")
+
+
 @pytest.mark.parametrize(
     ("table", "expected"),
     [
