@@ -253,16 +253,20 @@ class Model:
         """What delays and impulse bits other than those of the file do to a pulse."""
         if one.pulse.command is None or one.source is None or not one.pulse.command.ramps:
             return AS_PLANNED
+        from nutdamp.physics.valve import Trapezoid  # few spacecraft have any
+
         longer: dict[str, Cases] = {}
         late: Cases = 0.0
         members = self._members[one.source]
         for thruster in members:
             opens, closes = (draws.get(f"{key} {thruster.name}", 0.0) for key in ("open_delay", "close_delay"))
             bit = draws.get(f"impulse_bit {thruster.name}", 0.0)
-            more = plus(times(plus(closes, times(-1.0, opens)), 1.0 / one.pulse.on_time), bit)
-            if not (_nothing(more) and _nothing(opens)):
-                longer[thruster.name] = plus(1.0, more)
-                late = plus(late, times(plus(opens, closes), 0.5 / len(members)))
+            if not _nothing(bit):
+                longer[thruster.name] = plus(1.0, bit)
+            if not (_nothing(opens) and _nothing(closes)) and isinstance(thruster.valve, Trapezoid):
+                given, later = thruster.valve.delayed(one.pulse.command.on_time, opens, closes)
+                longer[thruster.name] = given / one.pulse.on_time
+                late = plus(late, times(later, 1.0 / len(members)))
         return _Opened(longer, late)
 
     @cached_property

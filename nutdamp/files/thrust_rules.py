@@ -53,9 +53,10 @@ def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
     opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
     longest = facts.number("time", *path, "max_on_time")
     if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
+        of = facts.text(*path, "name") or "a thruster"
         problem = (
-            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s of "
-            f"{facts.text(*path, 'name') or 'a thruster'}: its valve closes before it opens, and no command gives thrust"
+            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s of {of}: its valve "
+            "closes before it opens, and no command gives thrust"
         )
         yield Finding((*valve, "open_delay"), problem)
 

@@ -12,7 +12,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,27 @@ class Trapezoid:
                 ramps.append(Ramp(begin, begin + length, first, last))
                 begin += length
         return Thrust(total, self.open_delay + moment / total, tuple(ramps))
+
+    def delayed(self, on_time: float, opens: Any, closes: Any) -> tuple[Any, Any]:
+        """Effective on-time (s) of a command where the delays are longer by ``opens`` and ``closes`` s, elementwise.
+
+        And by how much, s, the centroid of the thrust is later; that of a valve that does not open stays.
+        """
+        command = self._command(on_time) if self.effective else on_time
+        held = command + self.close_delay - self.open_delay
+        (planned, before), (given, after) = self._given(held), self._given(held + closes - opens)
+        return given, np.where((planned > 0.0) & (np.real(given) > 0.0), opens + after - before, 0.0)
+
+    def _given(self, opened: Any) -> tuple[Any, Any]:
+        """Effective on-time and centroid, s after the first thrust, which begins to fall after ``opened`` s."""
+        length, rise, fall = np.real(opened), self.rise_time, self.fall_time
+        rising, flat = np.where(length < rise, opened, rise), np.where(length < rise, 0.0, opened - rise)
+        level = rising / rise if rise > 0.0 else 1.0
+        areas = 0.5 * level * rising, flat, 0.5 * level * level * fall
+        total = np.where(length > 0.0, areas[0] + areas[1] + areas[2], 0.0)
+        moment = areas[0] * 2.0 * rising / 3.0 + flat * (rising + 0.5 * flat)
+        moment = moment + areas[2] * (opened + level * fall / 3.0)
+        return total, moment / np.where(total == 0.0, 1.0, total)
 
     def on_time_for(self, effective: float) -> float:
         """On-time (s) that acts like full thrust for ``effective`` s."""

@@ -73,6 +73,20 @@ CHANGES: dict[str, tuple[dict[str, float], Valve, Valve, Cold]] = {
 }
 
 
+@pytest.mark.parametrize("late", [-0.01, 0.01, 0.03, 0.05, 0.2])
+def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_none(late: float) -> None:
+    slow = Trapezoid(0.02, 0.012, 0.05, 0.08)
+    body = replace(through(slow), cold=None)
+    made = planning.plan(body, "one-pulse").pulses
+    (fired,) = {pulse.channel for pulse in made}
+    outputs = flown_outputs(Model(body, made), {f"open_delay {fired}": late})
+    true = replace(through(slow, fired, replace(slow, open_delay=0.02 + late)), cold=None)
+    given = refired(true, made)
+    assert (given.total_impulse == 0.0) == (late == 0.2)
+    assert outputs[0] == pytest.approx(flown(true, given).residual.nutation, rel=3e-3)
+    assert outputs[4] == pytest.approx(given.propellant, rel=1e-9, abs=1e-15)
+
+
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
     draws, valve, other, cold = CHANGES[change]
