@@ -18,6 +18,7 @@ from nutdamp.motion import Arc
 from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import TOUCHING, Pulse, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import RhumbLineOptions
+from nutdamp.schemes.tools import reasons
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 TURN_SHARE = 0.125
@@ -104,7 +105,7 @@ class Train:
         self.on_time = max(self.on_time, self.shortest)
         if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
             raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
-        self.way = pointing.course(here.momentum, here.target_axis, self.sun)[1]
+        self.ahead, self.way = pointing.course(here.momentum, here.target_axis, self.sun)
 
     def turns_by(self, size: float) -> float:
         """By how much a pulse of a ``size`` as in `Attempt` turns H, N m s."""
@@ -171,7 +172,7 @@ class Train:
         if not closing:
             best = int(np.argmin(left[fewest - 1 : most])) + fewest
             if left[best - 1] > OPEN:
-                raise Infeasible(self._in_phase(fewest, most, float(left[best - 1])))
+                raise self._in_phase(fewest, most, left)
             closing = [best]
         # Of the next few counts the one that closes best, or that ticks make least dear; at last with room to bend.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
@@ -201,7 +202,7 @@ class Train:
         enough = [count for count in closing if count - needed >= 0.5 * self._spare(count, left)]
         tried = [Attempt(count, given, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
         if not tried:
-            raise Infeasible(self._in_phase(fewest, counts[-1], float(left[fewest - 1 : counts[-1]].min())))
+            raise self._in_phase(fewest, counts[-1], left)
         return tried[: 2 * TRIES]
 
     @property
@@ -240,28 +241,18 @@ class Train:
     def left_by(self, shots: list[Shot]) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
         start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
-        ahead = self._ahead(self.here)
-        pushes = np.array([self._body(Arc(A, self.here.inertia.C, 0.0, start), shot, ahead) for shot in shots])
-        if len(shots) == 0:
-            return np.empty(0)
+        pushes = np.array([_in_body(self.here, self.ahead, t) if one is None else one.transverse for t, one in shots])
+        pushes /= np.abs(pushes)
         turned = np.exp(1j * a * spin * np.array([shot.t for shot in shots]))
         sums = np.cumsum(pushes * turned)
         counts = np.arange(1, len(shots) + 1)
         return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
 
-    def _body(self, arc: Arc, shot: Shot, ahead: Vector) -> complex:
-        """Direction of a pulse in the body, as a unit complex number."""
-        if shot.channel is not None:
-            return shot.channel.transverse / abs(shot.channel.transverse)
-        _, quaternions = arc.motion(np.array([shot.t]))
-        body = attitude.matrix(quaternions[0]).T @ ahead
-        return cmath.exp(1j * math.atan2(body[1], body[0]))
-
     def shots(self) -> list[Shot]:
         """Moments of right phase, one pulse after the other as the limits allow them."""
         found: list[Shot] = []
         ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
-        firsts = [(self._first(channel), channel) for channel in self.channels]
+        firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
         for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
@@ -289,12 +280,6 @@ class Train:
                 ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
         return found
 
-    def _ahead(self, here: Spacecraft) -> Vector:
-        return pointing.course(here.momentum, here.target_axis, self.sun)[0]
-
-    def _first(self, channel: Channel) -> float:
-        return _aligned(self.here, channel, self._ahead(self.here), self.here.limits.earliest)
-
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
         windows, limits = Windows(here), here.limits
@@ -310,10 +295,9 @@ class Train:
         if start is None:
             return None
         centre = start + 0.5 * on_time
-        body = self._body(Arc(here.inertia.A, here.inertia.C, 0.0, here.initial), Shot(centre, None), ahead)
         assert here.torquer is not None
         given = {"impulse": attempt.size} if here.torquer.torque is None else {"on_time": on_time}
-        return steerable_pulse(here.torquer, centre, cmath.phase(body), **given)
+        return steerable_pulse(here.torquer, centre, cmath.phase(_in_body(here, ahead, centre)), **given)
 
     def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
         """The course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
@@ -337,6 +321,10 @@ class Train:
             ready = max(free or 0.0, start + 0.25 * self.turn)
         return None
 
+    def _in_phase(self, fewest: int, most: int, left: Vector) -> Infeasible:
+        nutation = float(left[fewest - 1 : most].min()) * self.way / most
+        return Infeasible(reasons.in_phase(self.here, self.options.per_turn, fewest, most, nutation))
+
     def _too_few(self, needed: int, moments: int) -> Infeasible:
         """That the limits do not leave moments for as many pulses as are needed, or allow too few."""
         most = self.here.limits.max_pulses
@@ -354,32 +342,12 @@ class Train:
             f"{moments}; longer pulses or more of them a turn help, or a longer horizon"
         )
 
-    def _in_phase(self, fewest: int, most: int, left: float) -> str:
-        inertia, per_turn = self.here.inertia, self.options.per_turn
-        ratio = inertia.C / (inertia.A * per_turn)
-        off = abs(ratio - round(ratio))
-        least = math.degrees(left * self.way / most)
-        if off * most >= 1.0:
-            return (
-                f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
-                f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
-            )
-        return (
-            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
-            f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
-            f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
-        )
-
 
 def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
     """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead`` (3,), inertial."""
-    direction = channel.transverse / abs(channel.transverse)
-    arc, turn = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial), 2.0 * math.pi / abs(here.spin)
-    t = ready
+    direction, turn, t = channel.transverse / abs(channel.transverse), 2.0 * math.pi / abs(here.spin), ready
     for step in range(12):
-        _, quaternions = arc.motion(np.array([t]))
-        body = attitude.matrix(quaternions[0]).T @ ahead
-        off = cmath.phase(direction * complex(body[0], -body[1]))  # the torque is so far ahead of it
+        off = cmath.phase(direction * _in_body(here, ahead, t).conjugate())  # the torque is so far ahead of it
         change = -off / here.spin
         if step == 0:
             change %= turn
@@ -387,6 +355,13 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
         if abs(change) < 1e-12 * turn:
             break
     return t if t >= ready - 1e-9 else t + turn
+
+
+def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
+    """What an inertial ``direction`` (3,) has along axes 1 and 2 of the body at ``t`` s, undisturbed."""
+    _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(np.array([t]))
+    body = attitude.matrix(quaternions[0]).T @ direction
+    return complex(body[0], body[1])
 
 
 def _spread(channels: list[Channel], count: int) -> list[Channel]:

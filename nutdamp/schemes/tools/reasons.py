@@ -85,6 +85,22 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
     )
 
 
+def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left: float) -> str:
+    """That trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
+    ratio = spacecraft.inertia.C / (spacecraft.inertia.A * per_turn)
+    off, least = abs(ratio - round(ratio)), math.degrees(left)
+    if off * most >= 1.0:
+        return (
+            f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
+            f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+        )
+    return (
+        f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
+        f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
+        f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
+    )
+
+
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
     """By how many degrees an ``impulse`` across the spin axis, N m s, turns H; of A|ω|, the nutation."""
     return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"
