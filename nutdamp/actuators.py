@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,10 @@ class Channel:
     name: str
     thrusters: tuple[Thruster, ...]
     spends: float | None = None
+
+    def of(self, **changed: Any) -> Channel:
+        """The same of thrusters with these fields ``changed`` in each."""
+        return replace(self, thrusters=tuple(replace(one, **changed) for one in self.thrusters))
 
     @property
     def torque(self) -> Vector:

@@ -75,7 +75,7 @@ def fronts(
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
-        spacecraft = _of_unknown_propellant(spacecraft)
+        spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
     ordered = sorted(set(shifts))
     found: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
@@ -122,14 +122,6 @@ def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
     plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances))
     ends = {Part.SHIFT, Part.DISTANCE}
     return [one for one in plans if len(one.pulses) and {bound.part for bound in one.shortfalls} <= ends]
-
-
-def _of_unknown_propellant(spacecraft: Spacecraft) -> Spacecraft:
-    channels = (
-        replace(channel, thrusters=tuple(replace(thruster, isp=None) for thruster in channel.thrusters))
-        for channel in spacecraft.channels
-    )
-    return replace(spacecraft, channels=tuple(channels))
 
 
 @dataclass(eq=False)

@@ -181,8 +181,7 @@ class Spacecraft(views.Shown):
     ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun,
     where it is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of
     ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not;
-    ``loop`` damps by what a sensor shows;
-    ``source`` is what it was read from, None once a field is replaced.
+    ``loop`` damps by what a sensor shows; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -337,10 +336,8 @@ class Spacecraft(views.Shown):
         Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in [0, 2π) and tilt, as
         `direction_in_n` takes them. Right ascension and azimuth are None at the pole, where there is none.
         """
-        if self.attitude is not None:
-            return attitude.sphere_angles(direction)
-        x, y, z = direction.tolist()
-        return attitude.sphere_angles(direction)[0], math.atan2(math.hypot(x, y), z)
+        about, declination = attitude.sphere_angles(direction)
+        return about, math.atan2(math.hypot(*direction[:2]), direction[2]) if self.attitude is None else declination
 
     def utc(self, time: float, digits: int = DIGITS) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.

@@ -28,7 +28,7 @@ class Supply:
         """Thrust of the next pulse of ``channel``, over that of the file."""
         cold, tank = self.spacecraft.cold, self.spacecraft.tank
         level = 1.0 if cold is None else cold.factor(self.fired[channel])
-        return level if tank is None else level * tank.thrust_factor(min(self.used, tank.propellant))
+        return level if tank is None else level * tank.thrust_factor(self.used)
 
     def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
         """The pulse as strong as it really is, taken into account for those after it."""
@@ -36,7 +36,7 @@ class Supply:
             self.used += pulse.propellant or 0.0
             return pulse
         level, tank = self.level(channel.name), self.spacecraft.tank
-        isp = None if tank is None else tank.isp_after(min(self.used, tank.propellant))
+        isp = None if tank is None else tank.isp_after(self.used)
         flow = channel.mass_flow
         if flow is not None and isp is not None and all(one.thrust is not None for one in channel.thrusters):
             flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
@@ -78,11 +78,7 @@ def thrust_laws(spacecraft: Spacecraft) -> Iterator[str]:
 def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
     """The body without one ``law`` of `thrust_laws`, and what the commands of ``schedule`` give then."""
     if law == VALVES:
-        channels = tuple(
-            replace(channel, thrusters=tuple(replace(one, valve=None) for one in channel.thrusters))
-            for channel in spacecraft.channels
-        )
-        body = replace(spacecraft, channels=channels)
+        body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
     else:
         body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=None)
     known = {channel.name: channel for channel in body.channels}

@@ -16,6 +16,8 @@ from nutdamp.units import shown
 from nutdamp.words import listed
 
 KeyPath = tuple[str | int, ...]
+"""Keys and list positions that lead from the root to a value."""
+
 Problems = list[tuple[KeyPath, str]]
 """What is wrong, and where."""
 

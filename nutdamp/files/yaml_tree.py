@@ -20,6 +20,7 @@ from yaml.scanner import Scanner
 
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.input import read_bytes
+from nutdamp.files.sections import KeyPath as KeyPath
 from nutdamp.units import shown
 
 MAX_BYTES = 1 << 20
@@ -45,9 +46,6 @@ class Place(NamedTuple):
         """A fault here; ``name`` is that of the file."""
         return Fault(self.setting or name, self.line, self.column, where, problem)
 
-
-KeyPath = tuple[str | int, ...]
-"""Keys and list positions that lead from the root to a value."""
 
 Scalar = str | int | float | bool | None
 

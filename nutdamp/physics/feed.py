@@ -39,11 +39,12 @@ class Tank:
     isp: tuple[tuple[float, float], ...] | None = None
 
     def pressure_after(self, used: float) -> float:
-        """Pressure (Pa) of the gas once so many kg are ``used``.
+        """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it.
 
         At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
         V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
         """
+        used = min(used, self.propellant)
         return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
 
     def thrust_factor(self, used: float) -> float:

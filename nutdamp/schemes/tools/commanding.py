@@ -74,11 +74,7 @@ def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
 def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: float) -> Channel:
     least = effective_on_time(channel, shortest_on_time(spacecraft, channel))
     most = effective_on_times(channel)[1]
-    least, most = least * max(strongest, 1.0), most * min(weakest, 1.0)
-    return replace(
-        channel,
-        thrusters=tuple(replace(one, valve=None, min_on_time=least, max_on_time=most) for one in channel.thrusters),
-    )
+    return channel.of(valve=None, min_on_time=least * max(strongest, 1.0), max_on_time=most * min(weakest, 1.0))
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
