@@ -9,7 +9,7 @@ flown from the Sun pulses of the nutating body, and the best of these is the sch
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
@@ -76,19 +76,20 @@ LOOKED = 2e-6
 class Found(NamedTuple):
     """Blocks, the motion after them in closed form, and how good that is: the less, the better.
 
-    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost; ``share``: the share.
+    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
+    ``share``: the share.
     """
 
     blocks: tuple[Block, ...]
     state: State
-    rank: tuple[float, float]
+    rank: tuple[float, float, float]
     share: float = math.inf
 
 
 class Flown(NamedTuple):
-    """What was found, flown: how good it is, those that break a limit last, and its pulses."""
+    """What was found, flown: how good it is, those that break a limit last, then the earlier end, and its pulses."""
 
-    rank: tuple[bool, float, float]
+    rank: tuple[bool, float, float, float]
     made: Schedule
     found: Found
 
@@ -111,10 +112,8 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     search = Search(spacecraft, channels, commands)
     flights: list[Flown] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
-    pulses, why = (
-        0,
-        f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help",
-    )
+    why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
+    pulses = 0
     best = search.best(options.max_blocks or BLOCKS)
     for found in best:
         if pulses > FLOWN_PULSES or work.exhausted():
@@ -127,7 +126,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not flights:
         raise Infeasible(why)
     chosen = min(flights, key=lambda one: one.rank)
-    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank <= best[0].rank), *steps))
+    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank[:2] <= best[0].rank[:2]), *steps))
 
 
 def _steps(spacecraft: Spacecraft, commands: Commands) -> tuple[str, ...]:
@@ -165,7 +164,7 @@ class Search:
 
     def best(self, most: int) -> list[Found]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
-        start = Found((), self.model.start, (math.inf, math.inf))
+        start = Found((), self.model.start, (math.inf, math.inf, math.inf))
         found = self._single(start)
         firsts: list[Found] = []
         for number in range(2, most + 1):
@@ -173,14 +172,10 @@ class Search:
                 break
             if number == 2:
                 small = self._behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
-                ranked = (sorted(ones, key=lambda one: one.rank) for ones in (found, small))
-                firsts = [one for ones in (*ranked, self._parts(start)) for one in islice(ones, FIRST)]
-            firsts = [
-                more
-                for first in firsts[: 3 * FIRST if number == 2 else 2 * FIRST // 3]
-                for more in self._behind(first, self._rest(first), few=4)
-            ]
-            firsts.sort(key=lambda one: one.rank)
+                firsts = [*_promising(found, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
+            else:
+                firsts = _promising(firsts, FIRST // 2)
+            firsts = [more for first in firsts for more in self._behind(first, self._rest(first), few=4)]
             found += firsts
         # The flight differs a little: half of them are the cheapest that comply, half those that do most clearly.
         cheap = sorted(found, key=lambda one: one.rank)[: FLOWN // 2]
@@ -192,7 +187,8 @@ class Search:
         made = fired(self.body, found.blocks)
         left = left_by(flight.flown(self.body, made))
         share = max(float(self._share(bound, left)) for bound in self.bounds)
-        return Flown((not keeps_limits(self.body, made), share if share > 1.0 else 0.0, made.cost), made, found)
+        rank = not keeps_limits(self.body, made), share if share > 1.0 else 0.0, made.cost, made.end
+        return Flown(rank, made, found)
 
     def note(self, chosen: Flown, *, first: bool) -> str:
         """What was looked at, and how far flight and closed form are apart; ``first``: it is the best in that form."""
@@ -222,7 +218,7 @@ class Search:
             over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
             over = over | self._dark(before.state, trial, state)
             severity = np.where(np.isnan(severity) | over, np.inf, severity)
-            cost = spent + self._rate(channel) * np.broadcast_to(trial.count * trial.width, shape)
+            cost = spent + channel.cost_rate(by_propellant=True) * np.broadcast_to(trial.count * trial.width, shape)
             failed = np.where(severity <= 1.0, 0.0, severity).ravel()
             chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
             for index in dict.fromkeys(chosen):
@@ -231,18 +227,15 @@ class Search:
                     wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
                     block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, every)
                     here = State(*(np.broadcast_to(part, shape)[at] for part in vars(state).values()))
-                    rank = float(failed[index]), float(cost.ravel()[index])
+                    rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
                     yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
 
     def _share(self, bound: compliance.Bound, left: compliance.Left) -> Array:
         return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
 
-    def _rate(self, channel: Channel) -> float:
-        return channel.cost_rate(by_propellant=True)
-
     def _cost(self, block: Block) -> float:
         channel = next(one for one in self.channels if one.name == block.channel)
-        return self._rate(channel) * block.count * block.width
+        return channel.cost_rate(by_propellant=True) * block.count * block.width
 
     def _spaced(self, every: int) -> bool:
         """Whether pulses in one of ``every`` spins are as far apart as limits.gap asks for."""
@@ -389,6 +382,15 @@ class Search:
         step = self.commands.delay_step
         most = math.floor(self.commands.delay_max / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
+
+
+def _promising(found: Iterable[Found], most: int) -> list[Found]:
+    """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
+    ranked, front = sorted(found, key=lambda one: one.rank), list[Found]()
+    for one in ranked:
+        if not front or one.rank[1] < front[-1].rank[1]:
+            front.append(one)
+    return list({one.blocks: one for one in (*ranked[:most], *front[:most])}.values())
 
 
 def _spread(values: Array, most: int) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from samples import some
 from scipy.integrate import solve_ivp
 from spinners import commanded, flown_by_reference, some_body
 
-from nutdamp import compliance, flight, planning, remarks
+from nutdamp import compliance, flight, load, planning, remarks
 from nutdamp.aspect import aspects
 from nutdamp.commands import Block
 from nutdamp.comparison import usual
@@ -163,7 +164,7 @@ def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -
     )
     assert body.commands is not None
     found = Search(body, body.channels, body.commands).best(1)
-    assert found[0].rank == pytest.approx(scanned(body), rel=1e-9)
+    assert found[0].rank[:2] == pytest.approx(scanned(body), rel=1e-9)
 
 
 def outcome(seed: int) -> tuple[float, float]:
@@ -192,6 +193,20 @@ def test_more_blocks_where_one_does_not_do() -> None:
     assert len(single.pulses.blocks) == 1
     assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
     assert plan.severity <= single.severity
+
+
+def test_blocks_behind_cheap_first_ones_are_looked_for_too() -> None:
+    """Three blocks of two pulses each meet the requirement; a first block of 73 that leaves a little less is no better.
+
+    Their delays were found one block after the other, by flying each channel at delays from 0 to 5 s in steps of 50 ms.
+    """
+    body = load(Path(__file__).parents[2] / "configs" / "lunar-prospector.yaml")
+    delays = ((1, "-M2", 2.45), (3, "+M2", 2.15), (5, "-M2", 1.85))
+    known = fired(body, tuple(Block(name, first, delay, 0.2, 2, 1) for first, name, delay in delays))
+    assert left_by(flight.flown(body, known)).nutation < math.radians(0.2)
+    plan = planning.plan(body, "command-block")
+    assert plan.meets_requirement
+    assert plan.pulses.cost <= known.cost
 
 
 def one_block() -> Options:

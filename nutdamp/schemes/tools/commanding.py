@@ -156,9 +156,9 @@ def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Sched
     first = _firing(replace(made.without_proof, pulses=_translated(spacecraft, made)))
     tank = spacecraft.tank
     if tank is not None and first.pulses:
-        left = tank.pressure_after(first.propellant or 0.0)
-        note = f"tank pressure falls from {1e-5 * tank.pressure:.4g} to {1e-5 * left:.4g} bar"
-        first = replace(first, notes=(*first.notes, note))
+        full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(first.propellant or 0.0)))
+        if full != left:
+            first = replace(first, notes=(*first.notes, f"tank pressure falls from {full} to {left} bar"))
     if spacecraft.limits.tick is None or not first.pulses:
         return _firing(correct(spacecraft, first, TAIL))
     return _firing(_on_ticks(spacecraft, first, correct))
