@@ -27,6 +27,7 @@ from nutdamp.flight import Flight
 from nutdamp.physics.attitude import angle_between
 from nutdamp.presentation import figures, geometry
 from nutdamp.presentation.figures import sphere
+from nutdamp.presentation.figures.export import _brief
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft, Steerable, Vector
@@ -339,6 +340,23 @@ def test_settings_of_the_user_change_nothing() -> None:
     with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
         assert figures.picture("timeline", *flown("blackouts"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
+
+
+def test_long_lines_are_short_in_a_page_and_stay_in_place() -> None:
+    generator = np.random.default_rng(3)
+    places = np.cumsum(generator.normal(scale=4.0, size=(900, 2)), axis=0)
+    commands = ["M" if row in (0, 300) else "L" for row in range(len(places))]
+    path = " \n".join(f"{name} {x:.6f} {y:.6f}" for name, (x, y) in zip(commands, places, strict=True))
+    brief = _brief(path)
+    assert len(brief) < 0.45 * len(path)
+    here, found = np.zeros(2), []
+    for name, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", brief):
+        for pair in np.reshape([float(one) for one in re.findall(r"-?[\d.]+", numbers)], (-1, 2)):
+            here = pair if name == "M" else here + pair
+            found.append(here)
+    assert np.abs(np.array(found) - places).max() <= 0.0501
+    assert [name for name in brief if name.isalpha()] == ["M", "l", "M", "l"]
+    assert _brief("M 0 0 \nL 1.23456 3.5 \nz") == "M 0 0 \nL 1.23 3.5 \nz"
 
 
 def test_inline_svg_stands_in_any_page() -> None:

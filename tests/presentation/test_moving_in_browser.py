@@ -181,6 +181,22 @@ def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Br
         assert "target" in part(page, "globe").text_content()
 
 
+@pytest.mark.parametrize("name", ["ace", "single-thruster", "communications-spinner"])
+def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(browse: Browse, written: Any, name: str) -> None:
+    """ACE flies close to the Sun; the others point to where the equator has its numbers."""
+    with browse(written((CONFIGS / f"{name}.yaml").read_text(encoding="utf-8"))) as page:
+        globe = part(page, "globe")
+        boxes = """(marks) => marks.filter((one) => getComputedStyle(one).visibility !== "hidden")
+          .map((one) => one.getBoundingClientRect()).map((one) => [one.left, one.top, one.right, one.bottom])"""
+        names = globe.locator("text").evaluate_all(boxes)
+        assert names
+        for moment in (0, int(part(page, "slider").get_attribute("max"))):
+            part(page, "slider").fill(str(moment))
+            (mark,) = globe.locator("circle.cursor").evaluate_all(boxes)
+            for left, top, right, bottom in names:
+                assert mark[2] <= left or mark[0] >= right or mark[3] <= top or mark[1] >= bottom
+
+
 @pytest.mark.parametrize(("key", "other"), [("ArrowLeft", "ArrowRight"), ("ArrowUp", "ArrowDown")])
 def test_arrow_keys_turn_the_globe_and_home_turns_it_back(browse: Browse, written: Any, key: str, other: str) -> None:
     with browse(written(EXAMPLE)) as page:

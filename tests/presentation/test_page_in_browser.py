@@ -17,7 +17,7 @@ from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.presentation.page import pdf
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html
-from nutdamp.schemes import CLASSIC
+from nutdamp.schemes import CLASSIC, COMMANDED
 
 pytestmark = pytest.mark.browser
 
@@ -56,7 +56,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         if not target.exists():
             source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == name), None)
             source = source or example_text()
-            compared = compare(read_spacecraft(source, f"{name}.yaml"), CLASSIC)
+            commanded = (*CLASSIC, *COMMANDED) if name == "ace" else CLASSIC
+            compared = compare(read_spacecraft(source, f"{name}.yaml"), commanded)
             repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
             flown = {}
             if name == DISPERSED:

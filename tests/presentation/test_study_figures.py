@@ -462,8 +462,34 @@ def test_points_close_together_keep_numbers_that_can_be_read() -> None:
         made = replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))
         close.append(point._replace(plan=made))
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
-    check_layout(figure)
+    check_layout(figure, crowded=True)
     assert {str(count) for count in range(1, 81)} <= {text.get_text() for text, _ in texts(figure)}
+
+
+def test_numbers_of_points_close_together_are_nearest_to_their_own_or_joined_to_them() -> None:
+    (strict, _) = traded()
+    point = strict.points[0]
+    assert point.plan.schedule is not None
+    close = []
+    for step in range(5):
+        pulses = tuple(
+            replace(one, t=one.t + 0.4 * step, impulse=one.impulse * (1.0 - 0.004 * step))
+            for one in point.plan.schedule
+        )
+        close.append(point._replace(plan=replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))))
+    figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
+    check_layout(figure)
+    (axes,) = figure.axes
+    joined = [tuple(line.get_xydata()[0]) for line in axes.lines if line.get_label() == "_leader"]
+    places = {note.get_text(): np.asarray(axes.transData.transform(note.xy)) for note in axes.texts}
+    for note in axes.texts:
+        box = note.get_window_extent()
+        away = {
+            name: np.hypot(*np.maximum(np.maximum(box.min - place, place - box.max), 0.0))
+            for name, place in places.items()
+        }
+        own = away.pop(note.get_text())
+        assert own < 0.5 * min(away.values()) or any(np.allclose(note.xy, end) for end in joined), note.get_text()
 
 
 # --- colours ---------------------------------------------------------------------------------------------------------

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg", "pdf")
 
+LONG = 30
+"""Points of a polyline from which an inline SVG has it in tenths of a point, half a pixel at four times its size."""
+
 FONT = "'DejaVu Sans'"
 FONTS = f"{FONT}, 'Bitstream Vera Sans', Verdana, sans-serif"
 """Of text in SVG: that of the layout, and what stands for it, alike in width, where that is not installed."""
@@ -51,6 +54,25 @@ def rendered(figure: Figure, path: str) -> bytes:
     return content.replace(FONT.encode(), FONTS.encode()) if kind == "svg" else content
 
 
+def _brief(path: str) -> str:
+    """The data of a path to 0.01 points; of long polylines the steps from point to point in tenths of a point.
+
+    Places are rounded, not steps, so that errors do not add up.
+    """
+    parts = [(part[0], part[1:].split()) for part in re.findall(r"[A-Za-z][^A-Za-z]*", path)]
+    if len(parts) < LONG or {letter for letter, _ in parts} - {"M", "L"}:
+        return re.sub(r"(\.\d\d)\d+", r"\1", path)
+    made, (x, y), before = "", (0, 0), ""
+    for letter, numbers in parts:
+        to = round(10.0 * float(numbers[0])), round(10.0 * float(numbers[1]))
+        step = to if letter == "M" else (to[0] - x, to[1] - y)
+        across, along = (f"{value / 10:g}" for value in step)
+        name = letter if letter == "M" else "l" if before == "M" else "" if across[0] == "-" else " "
+        made += name + across + (along if along[0] == "-" else " " + along)
+        (x, y), before = to, letter
+    return made
+
+
 @style.styled
 def svg(figure: Figure) -> str:
     """The figure as an inline ``<svg>`` element, as wide as what holds it, on no background.
@@ -65,9 +87,10 @@ def svg(figure: Figure) -> str:
     # What matplotlib says of all elements would hold for the whole page, and its metadata are no part of the picture.
     text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
-    text = re.sub(r'(?<=\sd=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), text)  # 0.01 points will do
-    text = text.replace(FONT, FONTS)
-    ours = '<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt" '
+    text = re.sub(r'(?<=\sd=")[^"]*', lambda path: _brief(path[0]), text)
+    text = re.sub(rf"font-family: {FONT}; |(?<=\" ) ?transform=\"rotate\(-0 [^)]*\)\"", "", text)
+    text = re.sub(r'(?<=\s[xy]=")[^"]*', lambda place: re.sub(r"(\.\d\d)\d+", r"\1", place[0]), text)
+    ours = f'<svg width="100%" role="img" style="stroke-linejoin: round; stroke-linecap: butt; font-family: {FONTS}" '
     text = text.replace("<svg ", ours, 1).replace(INK, "currentColor").replace(PAPER, "var(--paper, #fff)")
     # Roles of labels end up as ids, several times over: only ids that something refers to stay.
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))

@@ -116,20 +116,13 @@ def sheet(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=200, layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.07)  # type: ignore[union-attr, call-arg]
+    figure.get_layout_engine().set(h_pad=0.07, w_pad=0.08)  # type: ignore[union-attr, call-arg]
     return figure
 
 
 def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
     """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
-    look = {
-        "arrowstyle": "-|>",
-        "color": colour,
-        "linewidth": 0.0,
-        "mutation_scale": 9.0,
-        "shrinkA": 0.0,
-        "shrinkB": 0.0,
-    }
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0}
     for row in places:
         if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
             (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
@@ -294,11 +287,13 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
         out = 0.0 if role == "_number" else out
         if led and not _nearest(note, box, points):
+            way = _way(note, box, points)
             covered += 3.0 if np.hypot(x, y) > FAR else 1e3
+            covered += 1e3 * any(other.count_contains(way) for other in taken)
         if out > 0.0 or any(box.overlaps(other) for other in taken):
             if role != "_vital":
                 continue
-            covered += 1e3 * (1.0 + out)
+            covered += 1e4 * (1.0 + out)
         if covered < min(least, _COVERED[role]):
             best, least = (offset, box), covered
     if best is None:
@@ -329,20 +324,26 @@ def _away(box: Bbox, places: Vector) -> float:
     return float(np.hypot(*beyond.T).min(initial=np.inf))
 
 
+def _way(note: Annotation, box: Bbox, points: float) -> Vector:
+    """The points, 4 pixels apart, from what a label is of to its ``box``."""
+    axes: Any = note.axes
+    tip = np.asarray(axes.transData.transform(note.xy))
+    inner = box.padded(-1.5 * points)
+    edge = np.clip(tip, [inner.x0, inner.y0], [inner.x1, inner.y1])
+    return np.linspace(tip, edge, max(int(np.hypot(*(edge - tip)) / 4.0), 2))
+
+
 def _lead(note: Annotation, box: Bbox, points: float) -> Vector:
     """The points, 4 pixels apart, of a thin line from a label to what it is of; none where that is nearest anyhow."""
     axes: Any = note.axes
     if _nearest(note, box, points):
         return np.empty((0, 2))
-    tip = np.asarray(axes.transData.transform(note.xy))
-    inner = box.padded(-1.5 * points)
-    edge = np.clip(tip, [inner.x0, inner.y0], [inner.x1, inner.y1])
-    ends = np.asarray(axes.transData.inverted().transform([tip, edge]))
+    way = _way(note, box, points)
+    ends = np.asarray(axes.transData.inverted().transform(way[[0, -1]]))
     limits = axes.get_xlim(), axes.get_ylim()
     axes.plot(*ends.T, color=note.get_color(), linewidth=LEADER, label="_leader", zorder=2.5)
     axes.set(xlim=limits[0], ylim=limits[1])
-    steps = np.linspace(0.0, 1.0, max(int(np.hypot(*(edge - tip)) / 4.0), 2))[:, None]
-    return np.asarray(tip + steps * (edge - tip))
+    return way
 
 
 def thickness(path: Vector, turns: float | None = None) -> float:

@@ -121,8 +121,10 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
     if covered:
         ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)
-    for end, cost, numbers in shown:
-        style.label(axes, ", ".join(map(str, numbers)), np.array([end, cost]), INK, role="vital")
+    places = np.array([one[:2] for one in shown])
+    for row, (_, _, numbers) in enumerate(shown):
+        meant = style.Meant(places[[row]], np.delete(places, row, axis=0))
+        style.label(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
 
 
 def _alike(one: tuple[float, float], other: tuple[float, float]) -> bool:

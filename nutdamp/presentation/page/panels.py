@@ -6,6 +6,7 @@ import hashlib
 from typing import TYPE_CHECKING
 
 from nutdamp.presentation import figures
+from nutdamp.presentation.figures.export import FONTS
 from nutdamp.presentation.page.document import Picture
 
 if TYPE_CHECKING:
@@ -27,7 +28,13 @@ def apart(figure: Figure, caption: str, described: str) -> Picture:
     svg = figures.svg(figure)
     name = "p" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     begin, end = svg.index(">") + 1, svg.rindex("</svg>")
-    return Picture(f'{svg[:begin]}<g id="{name}">{svg[begin:end]}</g></svg>', caption, described, name, _boxes(figure))
+    return Picture(
+        f'{svg[:begin]}<g id="{name}" style="font-family: {FONTS}">{svg[begin:end]}</g></svg>',
+        caption,
+        described,
+        name,
+        _boxes(figure),
+    )
 
 
 def _boxes(figure: Figure) -> tuple[str, ...]:

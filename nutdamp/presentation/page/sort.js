@@ -16,8 +16,9 @@ for (const table of document.querySelectorAll("table.sortable")) {
       head.setAttribute("aria-sort", falling ? "descending" : "ascending");
       const rows = Array.from(body.rows, (row) => {
         const cell = row.cells[column];
-        const known = cell.dataset.value !== undefined;
-        return { row, known, value: Number(cell.dataset.value), text: cell.textContent };
+        // A cell that shows "< 1e-9" has its number beside it.
+        const value = Number(cell.dataset.value ?? (cell.textContent || NaN));
+        return { row, known: cell.classList.contains("number") && !Number.isNaN(value), value, text: cell.textContent };
       });
       // Numbers before words, and what is not known last, whichever way.
       rows.sort((one, other) => {

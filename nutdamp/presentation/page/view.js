@@ -184,7 +184,9 @@ for (const view of document.querySelectorAll(".moving")) {
     const taken = [];
     for (const one of signs) {
       const [x, y] = see(one.axis);
-      const left = x > MIDDLE;
+      // Away from the track where that is beside it.
+      const beside = Math.abs(seen[0][1] - y) < 150 && Math.abs(seen[0][0] - x) < 400;
+      const left = beside ? seen[0][0] > x : x > MIDDLE;
       const name = put(one.mark, one.axis) ? one.name : `${one.name}, behind`;
       const [wide, tall] = [name.length * 50, 80];
       const begins = left ? x - 75 - wide : x + 75;
@@ -195,7 +197,11 @@ for (const view of document.querySelectorAll(".moving")) {
       one.text.setAttribute("class", left ? "end" : "");
       place(one.text, x + (left ? -75 : 75), down);
     }
-    for (const one of numbers) one.text.setAttribute("visibility", put(one.text, one.axis) ? "visible" : "hidden");
+    for (const one of numbers) {
+      const [x, y] = see(one.axis);
+      const free = seen.every((point) => point[2] < 0 || Math.hypot(point[0] - x, point[1] - y) > 110);
+      one.text.setAttribute("visibility", put(one.text, one.axis) && free ? "visible" : "hidden");
+    }
     put(momentumAtGlobe, momenta[current]);
     put(atGlobe, axes[current]);
   };
