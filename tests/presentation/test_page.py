@@ -211,7 +211,9 @@ def test_pictures_are_inside_and_described(example: str) -> None:
 
 def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     lightened = set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", (PAGE / "page.css").read_text(encoding="utf-8")))
-    assert lightened == {colour.lower() for colour in (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED)}
+    assert lightened == {
+        colour.lower() for colour in (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED)
+    }
 
 
 def test_without_a_feasible_plan_the_page_says_why() -> None:

@@ -25,6 +25,7 @@ CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 QUICK = ("ace", "kreisel-course", "lunar-prospector")
 """The most columns, the fewest, and a train of pulses; the others are slow only by their number."""
 
+# A name with a plus is compared by command blocks too.
 DISPERSED = "dispersed"
 """The built-in example, its dispersions flown."""
 
@@ -54,9 +55,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def page(name: str) -> Path:
         target = folder / f"{name}.html"
         if not target.exists():
-            source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == name), None)
+            source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == name.rstrip("+")), None)
             source = source or example_text()
-            commanded = (*CLASSIC, *COMMANDED) if name == "ace" else CLASSIC
+            commanded = (*CLASSIC, *COMMANDED) if name.endswith("+") else CLASSIC
             compared = compare(read_spacecraft(source, f"{name}.yaml"), commanded)
             repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
             flown = {}
@@ -209,7 +210,7 @@ def test_wide_tables_scroll_in_their_box(tab: Browse) -> None:
         pytest.fail("the arrow keys scroll nothing")
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", [*QUICK, "ace+"])
 def test_on_a_screen_all_columns_are_seen_and_no_shade_lies_under_the_last(tab: Browse, name: str) -> None:
     """At 1280 px, and where a table does scroll the shade is no wider than the blank behind the last column."""
     with tab(name, 1280) as page:

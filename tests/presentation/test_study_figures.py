@@ -16,6 +16,7 @@ from layout import check_layout, texts
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, StepPatch
+from matplotlib.text import Annotation
 
 from nutdamp import dispersion, fronts, planning
 from nutdamp.comparison import Comparison, compare
@@ -480,9 +481,10 @@ def test_numbers_of_points_close_together_are_nearest_to_their_own_or_joined_to_
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
     check_layout(figure)
     (axes,) = figure.axes
-    joined = [tuple(line.get_xydata()[0]) for line in axes.lines if line.get_label() == "_leader"]
-    places = {note.get_text(): np.asarray(axes.transData.transform(note.xy)) for note in axes.texts}
-    for note in axes.texts:
+    joined = [np.asarray(line.get_xydata())[0] for line in axes.lines if line.get_label() == "_leader"]
+    notes = [note for note in axes.texts if isinstance(note, Annotation)]
+    places = {note.get_text(): np.asarray(axes.transData.transform(note.xy)) for note in notes}
+    for note in notes:
         box = note.get_window_extent()
         away = {
             name: np.hypot(*np.maximum(np.maximum(box.min - place, place - box.max), 0.0))
