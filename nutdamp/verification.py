@@ -110,7 +110,7 @@ def verify(
     end = schedule.end + spacecraft.inertial_period
     judge = flight.flown(spacecraft, schedule, end)
     times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
-    reference = _motion(judge, times)
+    reference = judge.motion(times)
     methods = (
         _closed_form(spacecraft, schedule, end, times, reference),
         Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
@@ -123,22 +123,12 @@ def verify(
     )
 
 
-def _motion(flown: Flight, times: Vector) -> tuple[Vector, Vector]:
-    """Rates (n, 3) and quaternions (n, 4) of a flight at ``times``, after a jump where there is one."""
-    owner = np.searchsorted([leg.start for leg in flown.legs], times, side="right") - 1
-    body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-    for index in np.unique(owner):
-        rows = owner == index
-        body[rows], quaternion[rows] = flown.legs[index].path.motion(times[rows])
-    return body, quaternion
-
-
 def _closed_form(
     spacecraft: Spacecraft, schedule: Schedule, end: float, times: Vector, reference: tuple[Vector, Vector]
 ) -> Method:
     """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
     arcs = flight.by_impulses(spacecraft, schedule, end)
-    body, quaternion = _motion(arcs, times)
+    body, quaternion = arcs.motion(times)
     inertia = spacecraft.inertia
     if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0:
         omega, spin = rates.impulse_sum(
@@ -172,7 +162,7 @@ def _by_basilisk(spacecraft: Spacecraft, schedule: Schedule, end: float) -> Meth
         flown = basilisk.fly(spacecraft, schedule, end)
     except (MissingExtra, Infeasible) as reason:
         return Method(name, missing=str(reason), outside=True)
-    reference = _motion(flight.flown(spacecraft, schedule, end), flown.t)
+    reference = flight.flown(spacecraft, schedule, end).motion(flown.t)
     return _compared(name, spacecraft, schedule, flown.t, (flown.rates, flown.quaternion), reference)
 
 

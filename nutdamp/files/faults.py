@@ -15,6 +15,7 @@ from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import findings
 from nutdamp.files.sections import Problems, Section, section_of
 from nutdamp.files.settings import Setting, overlay
+from nutdamp.files.thrust_rules import thrust_findings
 from nutdamp.files.yaml_tree import KeyPath, Node, dotted, read_tree
 from nutdamp.units import shown
 
@@ -32,7 +33,7 @@ def read_contents(
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *_thrust(root)]
+    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
         from nutdamp.files.loop_rules import loop_findings  # few files have one
 
@@ -47,17 +48,6 @@ def read_contents(
     if faults or contents is None:
         raise FaultyFile(faults)
     return contents
-
-
-def _thrust(root: Node) -> list[Finding]:
-    """What `thrust_rules` finds, where the file says anything of what thrusters make of commands."""
-    thrusters = root.get("thrusters")
-    every = [root, *(entry for _, entry in thrusters.children())] if thrusters is not None else [root]
-    if not any(one.get(key) for one in every for key in ("valve", "impulse_bit", "cold", "tank")):
-        return []
-    from nutdamp.files.thrust_rules import thrust_findings  # few files do
-
-    return list(thrust_findings(root))
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:

@@ -36,7 +36,7 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
                 said.add(found.path)
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
-    yield from _alike(facts)
+    yield from _alike(facts, named)
     if facts.has("tank") and thrusters:
         yield from _tank(facts, named)
 
@@ -101,9 +101,10 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
         yield Finding((*path, "max_on_time"), f"{most:g} s is not above the first on-time of impulse_bit, {first:g} s")
 
 
-def _alike(facts: Facts) -> Iterator[Finding]:
-    """Thrusters of one channel that make different pulses of a command."""
-    kinds = {facts.text("thrusters", index, "name"): _kind(facts, index) for index, _ in facts.children("thrusters")}
+def _alike(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
+    """Thrusters of one channel that make different pulses of a command; ``named`` are their thrusts, N."""
+    entries = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
+    kinds = {name: _kind(facts, index, named.get(name or "")) for name, index in entries.items()}
     for channel, node in facts.children("channels"):
         listed = [entry.value for _, entry in node.children() if isinstance(entry.value, str)]
         members = [name for name in listed if name in kinds]
@@ -141,17 +142,16 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
             yield Finding(("thrusters", index, "lever_arm"), problem)
 
 
-def _kind(facts: Facts, index: str | int) -> tuple[float | str | None, ...]:
-    """What a thruster makes of a command, to be compared."""
+def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:
+    """What a thruster of ``thrust`` N makes of a command, to be compared."""
     path: KeyPath = ("thrusters", index)
     valve = _valve_path(facts, path)
     if valve is not None:
         times = tuple(facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES)
         return (*times, facts.text(*valve, "on_time_is") or "command")
-    thrust = thrusts(facts).get(facts.text(*path, "name") or "") or math.inf
     cells: list[float | str | None] = []
     for row, _ in facts.children(*path, "impulse_bit"):
         impulse = facts.number("impulse", *path, "impulse_bit", row, 1)
         cells += [facts.number("time", *path, "impulse_bit", row, column) for column in (0, 2)]
-        cells.append(None if impulse is None else round(impulse / thrust, 12))
+        cells.append(None if impulse is None else round(impulse / (thrust or math.inf), 12))
     return tuple(cells) if cells else (*(0.0,) * len(VALVE_TIMES), "command")

@@ -10,6 +10,9 @@ import pytest
 
 from nutdamp import planning
 from nutdamp.errors import FaultyFile
+from nutdamp.files import thrust_rules
+from nutdamp.files.dispersion_rules import thrusts
+from nutdamp.files.facts import Facts
 from nutdamp.files.pulses_csv import EFFECTIVE, pulses_csv
 from nutdamp.files.schedule_file import read_pulses
 from nutdamp.files.spacecraft_file import read_spacecraft
@@ -151,6 +154,18 @@ def test_an_impulse_bit_needs_the_thrust() -> None:
 def test_thrusters_of_one_channel_have_the_same_valve() -> None:
     (found,) = faults(VALVE, "channels: {both: [a, c], other: [b, d]}\n", body=with_table())
     assert "channels.both: a and c make different pulses of a command" in found
+
+
+def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def counted(facts: Facts) -> dict[str, float | None]:
+        calls.append(facts)
+        return thrusts(facts)
+
+    monkeypatch.setattr(thrust_rules, "thrusts", counted)
+    read(body=with_table())
+    assert len(calls) == 1
 
 
 def test_a_valve_without_thrusters() -> None:
