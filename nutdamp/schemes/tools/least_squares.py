@@ -127,7 +127,8 @@ def correct(
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
     pulses = [_Movable(spacecraft, made.pulses[index], sized=not equal) for index in chosen]
     ends = np.cumsum([len(one.start) for one in pulses])
-    common = [_Common(spacecraft, made)] if equal and resizable and spacecraft.limits.tick is None else []
+    alike = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
+    common = [_Common(spacecraft, made)] if alike else []
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)

@@ -242,9 +242,8 @@ class Train:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
         start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
         pushes = np.array([_in_body(self.here, self.ahead, t) if one is None else one.transverse for t, one in shots])
-        pushes /= np.abs(pushes)
-        turned = np.exp(1j * a * spin * np.array([shot.t for shot in shots]))
-        sums = np.cumsum(pushes * turned)
+        turned = a * spin * np.array([shot.t for shot in shots])
+        sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
         counts = np.arange(1, len(shots) + 1)
         return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
 
