@@ -291,8 +291,8 @@ def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Pa
     ("momentum", "energy", "said"),
     [
         (0.0, 0.0, "On coasts neither |H| nor the energy changes by a single digit."),
-        (0.0, 2.3e-15, "rounding changes |H| by at most 0 of itself, the energy by < 1e-12."),
-        (3.1e-9, 0.0, "rounding changes |H| by at most 3.1e-09 of itself, the energy by 0."),
+        (0.0, 2.3e-15, "rounding changes |H| by 0 of itself, the energy by < 1e-12, at most."),
+        (3.1e-9, 0.0, "rounding changes |H| by 3.1e-09 of itself, the energy by 0, at most."),
     ],
 )
 def test_what_is_conserved_is_no_number_of_noughts(momentum: float, energy: float, said: str) -> None:

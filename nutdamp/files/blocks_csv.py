@@ -58,18 +58,23 @@ def blocks_csv(flown: Flight) -> str:
                 body.utc(pulses[last - block.count].start) or "",
                 number(block.delay),
                 _counts(block.delay, None if commands is None else commands.delay_step),
-                number(math.degrees(block.delay * abs(body.spin))),
+                _shown(math.degrees(block.delay * abs(body.spin))),
                 number(block.width),
                 ""
                 if commands is None or commands.width_step is None
                 else str(round(block.width / commands.width_step)),
                 str(block.count),
                 str(block.every),
-                number(block.count * block.width * strengths[block.channel]),
+                _shown(block.count * block.width * strengths[block.channel]),
                 number(math.degrees(float(after.nutation[last - 1]))),
             ]
         )
     return csv_text(HEADER, rows)
+
+
+def _shown(value: float) -> str:
+    """A number for people, without the noise of its last digits."""
+    return number(float(f"{value:.9g}"))
 
 
 def _counts(time: float, step: float | None) -> str:

@@ -127,7 +127,7 @@ def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
     if not facts.has(*path, "min") and not facts.has(*path, "max"):
         yield Finding((*path, "min"), "missing; give min, max or both, else the cone keeps nothing")
-    if least is not None and most is not None and least > most:
+    if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
         problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
         yield Finding((*path, "min"), problem)
 

@@ -48,7 +48,7 @@ def conservation(spacecraft: Spacecraft, found: Verification) -> str:
     if found.momentum_drift == 0.0 == found.energy_drift:
         return "On coasts neither |H| nor the energy changes by a single digit."
     momentum, energy = _difference(found.momentum_drift), _difference(found.energy_drift)
-    drifts = f"|H| by at most {momentum} of itself, the energy by {energy}"
+    drifts = f"|H| by {momentum} of itself, the energy by {energy}, at most"
     if spacecraft.disturbances or spacecraft.growth != 0.0:
         return f"On coasts disturbances or dissipation change {drifts}."
     return f"On coasts, where both should stay, rounding changes {drifts}."

@@ -195,8 +195,8 @@ class Search:
         blocks, form = chosen.found.blocks, self.model.left(chosen.found.state)
         flown = left_by(flight.flown(self.body, chosen.made))
         nutation, end = (math.degrees(abs(float(one) - other)) for one, other in zip(form[:2], flown[:2], strict=True))
-        what = "single block" if len(blocks) == 1 else f"sequence of the {self.looked:,} looked at"
-        scope = f"no other {what} does better in closed form" if first else "of those flown none does better"
+        others = "no other single block" if len(blocks) == 1 else f"none of the {self.looked:,} sequences compared"
+        scope = f"{others} does better in closed form" if first else "of those flown none does better"
         return (
             f"{scope}; flown from the Sun pulses of the nutating body, nutation differs by {nutation:.2g}° and the end "
             f"of H by {end:.2g}°"
