@@ -167,9 +167,12 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
 
 
 def commandable_widths(commands: Commands, channel: Channel) -> Vector:
-    """Widths (n,) s that a command block of a channel may have."""
+    """Widths (n,) s that a command block of a channel may have: those that give thrust."""
     widths = commands.widths
-    return widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
+    widths = widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
+    return (
+        widths if channel.valve is None else widths[[effective_on_time(channel, one) > 0.0 for one in widths.tolist()]]
+    )
 
 
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:

@@ -5,26 +5,28 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from nutdamp.actuators import STANDARD_GRAVITY
+from nutdamp.errors import Infeasible
 from nutdamp.schedule import Pulse, Schedule, commanded
 from nutdamp.spacecraft import Channel, Spacecraft
 
 
 @dataclass(eq=False)
 class Supply:
-    """What has been fired so far: pulses by channel, and propellant, kg."""
+    """What has been fired so far: pulses by channel, and propellant, kg: one number, or an array of cases."""
 
     spacecraft: Spacecraft
     fired: Counter[str] = field(default_factory=Counter)
-    used: float = 0.0
+    used: Any = 0.0
 
     @property
     def steady(self) -> bool:
         """Whether every pulse is as strong as the file says."""
         return self.spacecraft.cold is None and self.spacecraft.tank is None
 
-    def level(self, channel: str) -> float:
+    def level(self, channel: str) -> Any:
         """Thrust of the next pulse of ``channel``, over that of the file."""
         cold, tank = self.spacecraft.cold, self.spacecraft.tank
         level = 1.0 if cold is None else cold.factor(self.fired[channel])
@@ -35,15 +37,8 @@ class Supply:
         if channel is None or pulse.torque is None or self.steady:
             self.used += pulse.propellant or 0.0
             return pulse
-        level, tank = self.level(channel.name), self.spacecraft.tank
-        isp = None if tank is None else tank.isp_after(self.used)
-        flow = channel.mass_flow
-        if flow is not None and isp is not None and all(one.thrust is not None for one in channel.thrusters):
-            flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
-        propellant = None if flow is None else flow * pulse.on_time * level
+        level, propellant = self.take(channel, pulse.on_time)
         torque, force = channel.torque * level, channel.force
-        self.fired[channel.name] += 1
-        self.used += propellant or 0.0
         return replace(
             pulse,
             torque=torque,
@@ -51,6 +46,24 @@ class Supply:
             force=None if force is None else force * level,
             propellant=propellant,
         )
+
+    def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
+        """Level of a pulse of effective ``on_time`` s and its propellant, kg or None; it counts for those after it."""
+        level, tank = self.level(channel.name), self.spacecraft.tank
+        isp = None if tank is None else tank.isp_after(self.used)
+        flow: Any = channel.mass_flow
+        if flow is not None and isp is not None and all(one.thrust is not None for one in channel.thrusters):
+            flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
+        propellant = None if flow is None else flow * on_time * level
+        self.fired[channel.name] += 1
+        self.used = self.used + (0.0 if propellant is None else propellant)
+        return level, propellant
+
+    def expect_to_last(self) -> None:
+        """Raise Infeasible where more has been fired than the tank has."""
+        tank = self.spacecraft.tank
+        if tank is not None and self.used > tank.propellant:
+            raise Infeasible(f"takes {self.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
 
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:

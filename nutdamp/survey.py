@@ -19,6 +19,7 @@ from nutdamp.limits import (
 )
 from nutdamp.physics import cones, damping, forced, rates, stability, sun_train
 from nutdamp.schemes.tools import sun_pulses
+from nutdamp.schemes.tools.block_model import acts
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 
 
@@ -72,11 +73,12 @@ class Turns:
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
     """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
     found, commands, spin = [], spacecraft.commands, spacecraft.spin
-    for channel in () if commands is None or not spacecraft.plain else usable(spacecraft):
+    for channel in () if commands is None else usable(spacecraft):
         assert commands is not None
         widths = commandable_widths(commands, channel)
         if len(widths):
-            each = sun_train.turned_by(spacecraft.inertia.C * abs(spin), abs(channel.transverse), widths, spin)
+            given, momentum = acts(channel, widths), spacecraft.inertia.C * abs(spin)
+            each = sun_train.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
             least, most = int(np.argmin(each)), int(np.argmax(each))
             ends = (float(value[at]) for at in (least, most) for value in (each, widths))
             found.append(Turns(channel, *ends))

@@ -38,7 +38,14 @@ def fly(model: Model, bodies: Bodies, rates: Array, quaternion: Array, cases: Di
     assert body.sun_sensor is not None
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    shifts = [start - pulse.start for start, pulse in zip(cases.starts, model.schedule, strict=True)]
+    pulses, shifts, leads, ramps = model.schedule.pulses, [], [], []
+    for pulse, width, start in zip(pulses, model.on_times, cases.starts, strict=True):
+        begins = pulse.start if pulse.command is None else pulse.t - 0.5 * width
+        shifts.append(start - begins)
+        leads.append(begins - pulse.loaded[0])
+        thrust = None if pulse.command is None else pulse.command.ramps
+        back = -pulse.loaded[0]
+        ramps.append(thrust and [one._replace(begin=one.begin + back, end=one.end + back) for one in thrust])
     for begin in range(0, count, rigid_cases.BLOCK):
         rows = slice(begin, min(begin + rigid_cases.BLOCK, count))
 
@@ -52,8 +59,9 @@ def fly(model: Model, bodies: Bodies, rates: Array, quaternion: Array, cases: Di
         for index, (block, number) in enumerate(commanded):
             impulse, found = np.array([part(one) for one in cases.impulses[index]]), clock.sun_pulse(number)
             seen[index, rows] = body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
-            torque = np.where(seen[index, rows], impulse, 0.0) / block.width
-            starts[index, rows] = clock.fire(found, block.delay + part(shifts[index]), block.width, torque)
+            torque = np.where(seen[index, rows], impulse, 0.0) / (pulses[index].on_time or 1.0)
+            delay = block.delay + part(shifts[index])
+            starts[index, rows] = clock.fire(found, delay, block.width, torque, ramps[index]) + leads[index]
         rates[:, rows], quaternion[:, rows] = clock.here.rates, clock.here.quaternion
     return Fired(rates, quaternion, starts, seen)
 

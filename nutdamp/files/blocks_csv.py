@@ -46,7 +46,6 @@ def blocks_csv(flown: Flight) -> str:
     """The blocks of a flown schedule, one row each; what is not known is empty."""
     body, commands = flown.spacecraft, flown.spacecraft.commands
     _, after = flown.around_pulses()
-    strengths = {channel.name: channel.strength for channel in body.channels}
     pulses, rows = flown.schedule.pulses, []
     lasts = list(accumulate(block.count for block in flown.schedule.blocks))
     for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True), start=1):
@@ -55,7 +54,7 @@ def blocks_csv(flown: Flight) -> str:
                 str(index),
                 block.channel,
                 str(block.first),
-                body.utc(pulses[last - block.count].start) or "",
+                body.utc(pulses[last - block.count].loaded[0]) or "",
                 number(block.delay),
                 _counts(block.delay, None if commands is None else commands.delay_step),
                 _shown(math.degrees(block.delay * abs(body.spin))),
@@ -65,7 +64,7 @@ def blocks_csv(flown: Flight) -> str:
                 else str(round(block.width / commands.width_step)),
                 str(block.count),
                 str(block.every),
-                _shown(block.count * block.width * strengths[block.channel]),
+                _shown(math.fsum(pulse.magnitude for pulse in pulses[last - block.count : last])),
                 number(math.degrees(float(after.nutation[last - 1]))),
             ]
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -38,22 +39,22 @@ class Tank:
     exponent: float
     isp: tuple[tuple[float, float], ...] | None = None
 
-    def pressure_after(self, used: float) -> float:
-        """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it.
+    def pressure_after(self, used: Any) -> Any:
+        """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it: one number or an array.
 
         At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
         V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
         """
-        used = min(used, self.propellant)
+        used = np.minimum(used, self.propellant) if np.ndim(used) else min(used, self.propellant)
         return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
 
-    def thrust_factor(self, used: float) -> float:
+    def thrust_factor(self, used: Any) -> Any:
         """Thrust over that at t = 0."""
-        return float((self.pressure_after(used) / self.pressure) ** self.exponent)
+        return (self.pressure_after(used) / self.pressure) ** self.exponent
 
-    def isp_after(self, used: float) -> float | None:
+    def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""
         if self.isp is None:
             return None
         pressures, values = zip(*self.isp, strict=True)
-        return float(np.interp(self.pressure_after(used), pressures, values))
+        return np.interp(self.pressure_after(used), pressures, values)

@@ -7,12 +7,14 @@ nutation. Arrays carry the case last, as in `rigid_cases`, by which everything m
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics.rigid_cases import Bodies, advance
+from nutdamp.physics.valve import Ramp
 
 Array = NDArray[np.float64]
 
@@ -31,24 +33,28 @@ CIRCLE = 2.0 * math.pi
 class Stretch(NamedTuple):
     """Motion under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
 
-    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then.
+    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
     """
 
     since: Array
     rates: Array
     quaternion: Array
     torque: Array | None = None
+    slope: Array | None = None
 
     def some(self, cases: NDArray[np.intp]) -> Stretch:
         """That of some cases."""
-        torque = None if self.torque is None else self.torque[:, cases]
-        return Stretch(self.since[cases], self.rates[:, cases], self.quaternion[:, cases], torque)
+        torque, slope = (None if one is None else one[:, cases] for one in self[3:])
+        return Stretch(self.since[cases], self.rates[:, cases], self.quaternion[:, cases], torque, slope)
 
     def moved(self, bodies: Bodies, times: Array) -> Stretch:
         """The same from ``times`` (n,) s on."""
         rates, quaternion = self.rates.copy(), self.quaternion.copy()
-        advance(bodies, rates, quaternion, self.since, times - self.since, self.torque)
-        return Stretch(times, rates, quaternion, self.torque)
+        advance(bodies, rates, quaternion, self.since, times - self.since, self.torque, self.slope)
+        torque = self.torque
+        if torque is not None and self.slope is not None:
+            torque = torque + self.slope * (times - self.since)
+        return Stretch(times, rates, quaternion, torque, self.slope)
 
 
 class SunClock:
@@ -56,12 +62,13 @@ class SunClock:
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
     the sign of the spin. ``time`` (n,) s is that of the last Sun pulse looked for, ``lost`` (n,) where there was none:
-    the Sun stands too near to the axis to go round in the body.
+    the Sun stands too near to the axis to go round in the body. ``over`` (n,) s: when the last pulse, command and
+    thrust, is over.
     """
 
     def __init__(self, bodies: Bodies, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
         self.bodies, self.sun, self.sense, self.azimuth = bodies, sun, sense, azimuth
-        self._stretches = [start]
+        self._stretches, self.over = [start], start.since
         ahead, _ = self._ahead(start, sun)
         self._number, self.time = 0, start.since + (ahead - CIRCLE) / self._pace  # as if one had come before t = 0
         self.lost = np.zeros(len(start.since), dtype=bool)
@@ -71,20 +78,33 @@ class SunClock:
         """The motion since the last pulse was over."""
         return self._stretches[-1]
 
-    def fire(self, found: Stretch, delay: Array, width: float, torque: Array) -> Array:
+    def fire(
+        self, found: Stretch, delay: Array, width: float, torque: Array, ramps: Sequence[Ramp] | None = None
+    ) -> Array:
         """Fire ``torque`` (3, n) N m for ``width`` s, the ``delay`` (n,) s after the Sun pulse ``found``, the last one.
 
-        Returns the starts (n,) s: not before the pulse before is over.
+        ``ramps`` are the thrust that follows the command, in parts of the torque and s after its start; None is full
+        thrust for as long as the command. Returns the starts (n,) s of the commands: not before the pulse before is
+        over.
         """
         before = self.here
-        starts = np.maximum(found.since + delay, before.since)
-        begun = found.moved(self.bodies, starts)
+        starts = np.maximum(found.since + delay, self.over)
+        thrust = (Ramp(0.0, width, 1.0, 1.0),) if ramps is None else ramps
+        self.over = starts + max([width, *(ramp.end for ramp in thrust)])
+        if not thrust:
+            return starts
+        begun = found.moved(self.bodies, starts + thrust[0].begin)
         late = np.flatnonzero(found.since < before.since)  # it came while the pulse before was on
         if len(late):
-            again = before.some(late).moved(self.bodies.some(late), starts[late])
+            again = before.some(late).moved(self.bodies.some(late), begun.since[late])
             begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
-        firing = begun._replace(torque=torque)
-        self._stretches = [before, firing, firing.moved(self.bodies, starts + width)._replace(torque=None)]
+        self._stretches = [before]
+        for ramp in thrust:
+            slope = None if ramp.first == ramp.last else torque * ((ramp.last - ramp.first) / (ramp.end - ramp.begin))
+            firing = begun._replace(since=starts + ramp.begin, torque=torque * ramp.first, slope=slope)
+            begun = firing.moved(self.bodies, starts + ramp.end)._replace(torque=None, slope=None)
+            self._stretches.append(firing)
+        self._stretches.append(begun)
         return starts
 
     def sun_pulse(self, number: int) -> Stretch:

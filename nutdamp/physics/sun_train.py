@@ -56,11 +56,11 @@ def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]
     return heading, np.abs(np.where(parallel, np.sin(sun_angle) * ahead, along))
 
 
-def turned_by(momentum: Any, torque: float, width: Any, spin: Any) -> Any:
+def turned_by(momentum: Any, torque: float, width: Any, spin: Any, spread: Any = None) -> Any:
     """By how much a pulse of a ``torque`` (N m) fixed in the body turns H of size ``momentum``, rad: its mean over the
-    ``width`` s, in which the body turns at ``spin`` rad/s.
+    ``width`` s, in which the body turns at ``spin`` rad/s; ``spread`` s: over that time, where it is another.
     """
-    return torque * width * np.sinc(0.5 * spin * width / np.pi) / momentum
+    return torque * width * np.sinc(0.5 * spin * (width if spread is None else spread) / np.pi) / momentum
 
 
 def phasor_sum(count: Any, step: Any) -> Any:

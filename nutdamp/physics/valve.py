@@ -58,6 +58,10 @@ class Valve(Protocol):
         """Shortest and longest on-time (s) of which it is known what they give."""
         ...
 
+    def __hash__(self) -> int:
+        """Valves with the same numbers are the same."""
+        ...
+
     def thrust(self, on_time: float) -> Thrust:
         """What a command of ``on_time`` s gives."""
         ...

@@ -70,8 +70,9 @@ def _effects(flown: Flight) -> Table:
     before, after = flown.around_pulses()
     table = facts()
     for name, pulse in (("first pulse", made.pulses[0]), ("last pulse", made.pulses[-1])):
-        dated = body.utc(pulse.start, 3)
-        table.add_row(name, f"starts at {moment(pulse.start)}" + (f", {dated}" if dated else ""))
+        start = pulse.loaded[0]
+        dated = body.utc(start, 3)
+        table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
     table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
     table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
     largest = float(max(before.nutation.max(), after.nutation.max()))

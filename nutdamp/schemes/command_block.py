@@ -23,12 +23,11 @@ from nutdamp.compliance import Part
 from nutdamp.errors import Infeasible
 from nutdamp.limits import OFF_TICK, Windows, commandable_widths, keeps_limits, usable
 from nutdamp.outcome import left_by
-from nutdamp.physics.sun_train import phasor_sum
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import CommandBlockOptions
-from nutdamp.schemes.tools.block_model import BlockModel, State, Trial
+from nutdamp.schemes.tools.block_model import BlockModel, State, Trial, acts
 from nutdamp.schemes.tools.reasons import no_channels
-from nutdamp.schemes.tools.sun_pulses import ONLY_PLAIN, fired
+from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Channel, Spacecraft
 
 Array = NDArray[np.float64]
@@ -69,6 +68,9 @@ SURELY = 3.0
 LOWER = 0.98
 """Share of the nutation above which it does not count as lowered."""
 
+INVERTED = 6
+"""Steps by which the number of pulses is found that turns H by so much, cold and at falling pressure."""
+
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
 
@@ -102,8 +104,6 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     commands = spacecraft.commands
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file says nothing of commands: it needs the keys sun, sun_sensor and commands")
-    if not spacecraft.plain:
-        raise Infeasible(ONLY_PLAIN)
     steps = _steps(spacecraft, commands)
     spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     channels = usable(spacecraft)
@@ -207,7 +207,7 @@ class Search:
         number = 1
         for block in before.blocks[-1:]:
             number = block.first + (block.count - 1) * block.every + 1
-        spent = math.fsum(self._cost(block) for block in before.blocks)
+        tank = self.body.tank
         for channel, trial in trials:
             state = self.model.after(before.state, channel, trial)
             left = self.model.left(state)
@@ -216,9 +216,10 @@ class Search:
             work.spend(LOOKED * float(np.prod(shape)))
             severity = np.max(np.broadcast_arrays(*(self._share(bound, left) for bound in self.bounds)), axis=0)
             over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
-            over = over | self._dark(before.state, trial, state)
+            over = over | self._dark(before.state, channel, trial, state)
+            over = over if tank is None else over | (state.used > tank.propellant)
             severity = np.where(np.isnan(severity) | over, np.inf, severity)
-            cost = spent + channel.cost_rate(by_propellant=True) * np.broadcast_to(trial.count * trial.width, shape)
+            cost = np.broadcast_to(state.cost, shape)
             failed = np.where(severity <= 1.0, 0.0, severity).ravel()
             chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
             for index in dict.fromkeys(chosen):
@@ -226,16 +227,12 @@ class Search:
                     at = np.unravel_index(index, shape)
                     wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
                     block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, every)
-                    here = State(*(np.broadcast_to(part, shape)[at] for part in vars(state).values()))
+                    here = state.at(at, shape)
                     rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
                     yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
 
     def _share(self, bound: compliance.Bound, left: compliance.Left) -> Array:
         return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
-
-    def _cost(self, block: Block) -> float:
-        channel = next(one for one in self.channels if one.name == block.channel)
-        return channel.cost_rate(by_propellant=True) * block.count * block.width
 
     def _spaced(self, every: int) -> bool:
         """Whether pulses in one of ``every`` spins are as far apart as limits.gap asks for."""
@@ -281,12 +278,13 @@ class Search:
         widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
         bounds = {bound.part: bound.most for bound in self.bounds}
         if self.body.goal.axis is None:
-            kick = abs(channel.transverse) * widths
-            kicks = kick * np.abs(phasor_sum(counts, self.model.rate * self.body.spin * every * self.model.turn))
+            trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
+            kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
             left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
             return np.asarray(np.maximum(left, 0.0) / bounds[Part.NUTATION])
         way = float(self.model.course(state)[1])
-        length = counts * self.model.turned_by(channel, widths, self.body.spin)
+        full, _ = self.model.full_pulses(state, channel, widths, counts)
+        length = full * self.model.turned_by(channel, widths, self.body.spin)
         return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
 
     def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
@@ -306,7 +304,7 @@ class Search:
             if not len(widths):
                 continue
             step = self.model.turned_by(channel, widths, float(state.spin))
-            near = np.rint(float(way) / step)[:, None] + np.arange(-1, 2)
+            near = np.rint(self._pulses(state, channel, widths, float(way) / step))[:, None] + np.arange(-1, 2)
             few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
             counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
             for every in self.commands.every:
@@ -314,6 +312,14 @@ class Search:
                     continue
                 for wait in self._waits(state, least, LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
+
+    def _pulses(self, state: State, channel: Channel, widths: Array, full: Array) -> Array:
+        """Numbers of pulses (k,) that are worth so many ``full`` ones."""
+        needed = full
+        for _ in range(0 if self.model.steady else INVERTED):
+            count = np.rint(needed).clip(1, self.commands.max_count).astype(int)
+            needed = full + count - self.model.full_pulses(state, channel, widths, count)[0]
+        return needed
 
     def _parts(self, start: Found) -> Iterator[Found]:
         """First blocks that go a part of the way to the target."""
@@ -326,7 +332,7 @@ class Search:
             for width in widths.tolist():
                 step = float(self.model.turned_by(channel, width, float(start.state.spin)))
                 delay = self._commanded(self.model.delay(channel, heading, width))
-                first = float(start.state.sun_pulse) + float(delay) + width
+                first = float(start.state.sun_pulse) + float(delay) + float(acts(channel, width).over)
                 fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
                 counts = np.rint([*SHARES * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
                 for count in np.unique(counts.clip(1, self.commands.max_count).astype(int)).tolist():
@@ -340,7 +346,7 @@ class Search:
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
-    def _dark(self, state: State, trial: Trial, after: State) -> NDArray[np.bool_]:
+    def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
         """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
         found = np.zeros(shape, dtype=bool)
@@ -351,9 +357,9 @@ class Search:
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
         interval = np.where(np.asarray(trial.count) > 1, interval, turn)
-        aside = BESIDE * turn
+        aside, lasts = BESIDE * turn, acts(channel, trial.width).over
         for begins, ends in zip(*self.dark, strict=True):
-            low = np.ceil((begins - aside - trial.width - first - trial.delay) / interval)
+            low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
             found |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
         return found

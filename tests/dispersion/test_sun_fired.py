@@ -15,6 +15,7 @@ from builders import channel, cross, spinner
 from process import Run
 from spinners import FILE, commanded, flown_by_reference
 
+from nutdamp import flight
 from nutdamp.commands import Block, SunSensor
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
@@ -23,6 +24,8 @@ from nutdamp.dispersion.outputs import OUTPUTS, measure
 from nutdamp.dispersion.single import flown_outputs, realised
 from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
+from nutdamp.physics.feed import Cold, Tank
+from nutdamp.physics.valve import Trapezoid
 from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Disturbance
 from nutdamp.tolerances import Dispersions, Tolerance
@@ -84,6 +87,32 @@ def test_each_case_fires_as_its_own_body_alone(model: Model) -> None:
         assert np.array([start[case] for start in timed.starts]) == pytest.approx(starts, abs=1e-9)
         assert np.abs(starts - planned).max() > 0.05  # at planned times they would be elsewhere
         assert found[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
+
+
+def test_cases_fire_what_their_valves_give() -> None:
+    """Ramps, cold nozzles and falling pressure; a Sun pulse comes while the thrust is on."""
+    valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
+    model = model_of(cold=Cold(0.7, 3.0), tank=Tank(1.0, 2e6, 1e6, 1.0))
+    channels = tuple(
+        replace(one, thrusters=tuple(replace(thruster, valve=valve) for thruster in one.thrusters))
+        for one in model.spacecraft.channels
+    )
+    body = replace(model.spacecraft, channels=channels)
+    model = Model(body, fired(body, model.schedule.blocks))
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
+    timed = RealWidths(model).timed(model.cases(draws))
+    found = np.empty((len(OUTPUTS), CASES))
+    measure(model, RealWidths(model)(model.cases(draws)), found)
+    for case in (2, 11):
+        one = dispersed.one_of(draws, case)
+        true, _ = realised(model, one)
+        made = fired(true, model.schedule.blocks)
+        middles = [start[case] + 0.5 * width for start, width in zip(timed.starts, model.on_times, strict=True)]
+        assert middles == pytest.approx([pulse.t for pulse in made], abs=1e-9)
+        assert np.abs(np.array(middles) - [pulse.t for pulse in model.schedule]).max() > 0.05
+        settled = flight.flown(true, made).settled
+        assert found[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
+        assert found[OUTPUTS.index("spin_change"), case] == pytest.approx(settled.spin - true.spin, abs=1e-9)
 
 
 def test_and_as_the_reference_has_it() -> None:

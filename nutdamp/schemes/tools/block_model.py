@@ -1,14 +1,19 @@
 """What blocks of pulses fired from the Sun pulse do, in closed form, for very many blocks at once.
 
 H follows a rhumb line about the Sun (`physics.sun_train`), and the nutation is the impulse sum (17) over pulses at even
-times. What is left out: that the nutation jitters the Sun pulses, and what is of second order in the turn by one pulse.
+times. Commands count by the impulse, the centroid and the spread of the thrust that they give; cold nozzles and falling
+pressure by the impulse of each pulse, but for the nutation, which takes the mean pressure along a block. What is left
+out: that the nutation jitters the Sun pulses, and what is of second order in the turn by one pulse.
 """
 
 from __future__ import annotations
 
 import cmath
+import functools
 import math
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +21,10 @@ import numpy as np
 from nutdamp.compliance import Left
 from nutdamp.errors import Infeasible
 from nutdamp.physics import sun_train
+from nutdamp.physics.valve import Valve, spread
 from nutdamp.schemes.tools.sun_pulses import first_sun_pulse, spin_turn
 from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.supply import Supply
 
 
 class Trial(NamedTuple):
@@ -33,12 +40,39 @@ class Trial(NamedTuple):
     every: Any
 
 
+class Acts(NamedTuple):
+    """What commands give, s: effective ``on_time``, ``centroid`` after the start, the ``spread`` of the thrust (length
+    of the rectangle with its second moment), and when command and thrust are ``over``.
+    """
+
+    on_time: Any
+    centroid: Any
+    spread: Any
+    over: Any
+
+
+def acts(channel: Channel, widths: Any) -> Acts:
+    """What commands of ``widths`` s of a channel give."""
+    if channel.valve is None:
+        return Acts(widths, 0.5 * widths, widths, widths)
+    found, index = np.unique(widths, return_inverse=True)
+    rows = np.array([_acts(channel.valve, width) for width in found.tolist()])
+    return Acts(*(row[index].reshape(np.shape(widths)) for row in rows.T))
+
+
+@functools.lru_cache(maxsize=4096)
+def _acts(valve: Valve, width: float) -> Acts:
+    on_time, centroid, ramps = valve.thrust(width)
+    return Acts(on_time, centroid, spread(ramps, centroid), max([width, *(ramp.end for ramp in ramps)]))
+
+
 @dataclass(frozen=True)
 class State:
     """The motion between two blocks: one, or many at once.
 
     ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes, s; ``phasor``:
-    A ω (N m s) at that moment; ``spin`` rad/s.
+    A ω (N m s) at that moment; ``spin`` rad/s; ``used`` kg of propellant, 0 where every pulse is of full thrust;
+    ``cost`` as `Channel.cost_rate` counts it; ``fired``: pulses by channel.
     """
 
     sun_angle: Any
@@ -46,6 +80,18 @@ class State:
     phasor: Any
     sun_pulse: Any
     spin: Any
+    used: Any = 0.0
+    cost: Any = 0.0
+    fired: Mapping[str, Any] = field(default_factory=Counter)
+
+    def at(self, index: tuple[Any, ...], shape: tuple[int, ...]) -> State:
+        """That of one of many, which have a ``shape``."""
+
+        def one(value: Any) -> Any:
+            return np.broadcast_to(value, shape)[index]
+
+        parts = {part.name: one(getattr(self, part.name)) for part in fields(self) if part.name != "fired"}
+        return State(**parts, fired={name: int(one(count)) for name, count in self.fired.items()})
 
 
 class BlockModel:
@@ -75,23 +121,68 @@ class BlockModel:
             spin=spacecraft.spin,
         )
         self.turn = spin_turn(spacecraft)
+        self.steady = Supply(spacecraft).steady
+        self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """By how much one pulse turns H, rad."""
-        return sun_train.turned_by(self.inertia.C * abs(spin), abs(channel.transverse), width, spin)
+        given = acts(channel, width)
+        momentum = self.inertia.C * abs(spin)
+        return sun_train.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
+
+    def full_pulses(self, state: State, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
+        """How many pulses of full thrust blocks from ``state`` are worth, and the propellant used after them, kg."""
+        if self.steady:
+            return count, state.used
+        on_times, index = np.unique(acts(channel, width).on_time, return_inverse=True)
+        fired, used, most = int(state.fired.get(channel.name, 0)), float(state.used), int(np.max(count))
+        key = (channel.name, fired, used, most, on_times.tobytes())
+        if key not in self._tables:
+            supply = Supply(self.body, Counter({channel.name: fired}), np.full(len(on_times), used))
+            pulses = [(supply.take(channel, on_times)[0] + 0.0 * on_times, supply.used) for _ in range(most)]
+            levels, spent = (np.array(rows).T for rows in zip(*pulses, strict=True))
+            self._tables[key] = np.cumsum(levels, axis=1), spent
+        at = index.reshape(np.shape(width)), np.asarray(count) - 1
+        full, spent = self._tables[key]
+        return full[at], spent[at]
+
+    def kicks(self, state: State, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
+        """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step}; ``back``: the last
+        has none, those before it e^{-i step} each.
+        """
+        full, _ = self.full_pulses(state, channel, trial.width, trial.count)
+        total, cold = (
+            sun_train.phasor_sum(trial.count, -step if back else step),
+            self._cold(state, channel, trial, step),
+        )
+        mean = full / (trial.count - np.real(self._cold(state, channel, trial, 0.0)))
+        if back and self.body.cold is not None:
+            cold = cold * np.exp(-1j * (trial.count - 1) * step)
+        return acts(channel, trial.width).on_time * mean * (total - cold)
+
+    def _cold(self, state: State, channel: Channel, trial: Trial, step: Any) -> Any:
+        """What the sum of e^{ik step} lacks by cold pulses: a geometric series, as the factor of the k-th decays."""
+        cold = self.body.cold
+        if cold is None:
+            return 0.0
+        ratio = np.exp(-1.0 / cold.pulses + 1j * step)
+        lacks = (1.0 - cold.first) * cold.decay(int(state.fired.get(channel.name, 0)))
+        return lacks * (1.0 - ratio**trial.count) / (1.0 - ratio)
 
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
         """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
 
-        At the centre of a pulse the Sun has turned in the body by -ω3 (delay + width/2) from the sensor.
+        At the centroid of a pulse, width/2 without a valve, the Sun has turned in the body by -ω3 (delay + centroid)
+        from the sensor.
         """
-        from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + self.body.spin * (delay + 0.5 * width)
+        turned = self.body.spin * (delay + acts(channel, width).centroid)
+        from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + turned
         return self.sense * (from_sun - math.pi)
 
     def delay(self, channel: Channel, heading: Any, width: Any) -> Any:
         """The delay in [0, one spin turn) s that gives a ``heading``: the inverse of `heading`."""
         azimuth = self.sense * heading + math.pi - cmath.phase(channel.transverse) + self.sensor.azimuth
-        return (azimuth / self.body.spin - 0.5 * width) % (2.0 * math.pi / abs(self.body.spin))
+        return (azimuth / self.body.spin - acts(channel, width).centroid) % (2.0 * math.pi / abs(self.body.spin))
 
     def damping_delay(self, state: State, channel: Channel, trial: Trial) -> Any:
         """The first delay, s, at which blocks take most of the nutation; ``trial.delay`` is not looked at.
@@ -99,9 +190,13 @@ class BlockModel:
         The kicks of the block, each carried to the first one, add up to a phasor; ω must then point against it.
         """
         interval, rate = trial.every * self.turn, self.rate * self.body.spin
-        kicks = channel.transverse * sun_train.phasor_sum(trial.count, rate * interval)
+        kicks = channel.transverse * self.kicks(state, channel, trial, rate * interval)
         to_go = np.angle(-kicks / (state.phasor * np.exp(-1j * rate * trial.wait * self.turn)))
-        return (-to_go / rate - 0.5 * trial.width) % (2.0 * math.pi / abs(rate)) if rate != 0.0 else 0.0 * to_go
+        return (
+            (-to_go / rate - acts(channel, trial.width).centroid) % (2.0 * math.pi / abs(rate))
+            if rate != 0.0
+            else 0.0 * to_go
+        )
 
     def course(self, state: State) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""
@@ -112,26 +207,32 @@ class BlockModel:
 
     def after(self, state: State, channel: Channel, trial: Trial) -> State:
         """The motion after blocks of a ``channel`` from ``state``."""
-        gained = channel.axial * trial.width / self.inertia.C
-        spin = state.spin + 0.5 * trial.count * gained  # on average along the block
+        given = acts(channel, trial.width)
+        full, used = self.full_pulses(state, channel, trial.width, trial.count)
+        gained = channel.axial * given.on_time / self.inertia.C
+        spin = state.spin + 0.5 * full * gained  # on average along the block
         step = self.turned_by(channel, trial.width, spin)
         heading = self.heading(channel, trial.delay, trial.width)
-        rhumb = sun_train.rhumb_end(state.sun_angle, heading, trial.count * step)
+        rhumb = sun_train.rhumb_end(state.sun_angle, heading, full * step)
         turn = self.turn * np.abs(self.body.spin / spin)
         # As H goes round the Sun, its meridian turns about H, and the Sun pulse comes later by as much.
         interval = trial.every * turn + rhumb.turn / trial.count * turn / (2.0 * math.pi)
         first = state.sun_pulse + trial.wait * self.turn * np.abs(self.body.spin / state.spin)
         following = first + (trial.count - 1) * interval + turn
         rate = self.rate * spin
-        kick = channel.transverse * trial.width * np.sinc(0.5 * rate * trial.width / np.pi)
-        since_last = turn - trial.delay - 0.5 * trial.width
-        gathered = kick * np.exp(-1j * rate * since_last) * sun_train.phasor_sum(trial.count, -rate * interval)
+        kick = channel.transverse * np.sinc(0.5 * rate * given.spread / np.pi)
+        since_last = turn - trial.delay - given.centroid
+        kicks = self.kicks(state, channel, trial, rate * interval, back=True)
+        gathered = kick * np.exp(-1j * rate * since_last) * kicks
         return State(
             sun_angle=rhumb.sun_angle,
             longitude=state.longitude + rhumb.longitude,
             phasor=state.phasor * np.exp(-1j * rate * (following - state.sun_pulse)) + gathered,
             sun_pulse=following,
-            spin=state.spin + trial.count * gained,
+            spin=state.spin + full * gained,
+            used=used,
+            cost=state.cost + channel.cost_rate(by_propellant=True) * (full * given.on_time),
+            fired={**state.fired, channel.name: state.fired.get(channel.name, 0) + trial.count},
         )
 
     def left(self, state: State) -> Left:

@@ -187,9 +187,7 @@ def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = Fal
             raise Infeasible(f"{text}, longer than limits.horizon")
         given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
         pulses.append(supply.fire(given, channel))
-    tank = spacecraft.tank
-    if tank is not None and supply.used > tank.propellant:
-        raise Infeasible(f"takes {supply.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
+    supply.expect_to_last()
     return tuple(pulses)
 
 

@@ -15,8 +15,9 @@ from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.physics.rigid_cases import Bodies
 from nutdamp.physics.sun_clock import Stretch, SunClock
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.schedule import Pulse, Schedule, commanded
 from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.supply import Supply
 
 SAMPLES = 32
 """Samples of the Sun's azimuth in each spin turn, between which a Sun pulse is found."""
@@ -29,9 +30,6 @@ EXACT = 1e-13
 
 FIRED = 1.0
 """Units of `work` of a pulse that is fired."""
-
-ONLY_PLAIN = "command blocks are planned and fired for full thrust at once: leave valve, impulse_bit, cold and tank out"
-"""Why there are none for a spacecraft with valves or cold nozzles."""
 
 
 def spin_turn(spacecraft: Spacecraft) -> float:
@@ -119,26 +117,28 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
     """The pulses that ``blocks`` fire, with the Sun pulses of the motion that they make.
 
     With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. Raises Infeasible
-    where there is no Sun pulse, where a channel is not known, and where a pulse would begin before the one before is
-    over.
+    where there is no Sun pulse, where a channel is not known, where a pulse would begin before the one before is over,
+    and where the propellant does not last.
     """
-    if not spacecraft.plain:
-        raise Infeasible(ONLY_PLAIN)
     channels = {channel.name: channel for channel in spacecraft.channels}
     clock, sensor, errors = sun_clock(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter = 0.0 if seed is None or sensor is None else sensor.jitter
-    pulses: list[Pulse] = []
+    supply, pulses = Supply(spacecraft), list[Pulse]()
     for block in blocks:
         channel = channels.get(block.channel)
         if channel is None:
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
         for number in block.sun_pulses:
             work.spend(FIRED)
-            found, over = sun_pulse(spacecraft, clock, number), clock.here.since[0]
+            found, over = sun_pulse(spacecraft, clock, number), clock.over[0]
             delay = found.since * 0.0 + jitter * errors.standard_normal() + block.delay
             due = float(found.since[0] + delay[0])
             if due < over - 1e-9:
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
-            start = float(clock.fire(found, delay, block.width, channel.torque[:, None])[0])
-            pulses.append(channel_pulse(channel, start + 0.5 * block.width, block.width))
+            given = supply.fire(commanded(channel, 0.0, block.width), channel)
+            torque = channel.torque if given.torque is None else given.torque
+            ramps = None if given.command is None else given.command.ramps
+            start = float(clock.fire(found, delay, block.width, torque[:, None], ramps)[0])
+            pulses.append(given.moved(start))
+    supply.expect_to_last()
     return Schedule(tuple(pulses), blocks=tuple(blocks))
