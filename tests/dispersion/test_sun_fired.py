@@ -93,11 +93,7 @@ def test_cases_fire_what_their_valves_give() -> None:
     """Ramps, cold nozzles and falling pressure; a Sun pulse comes while the thrust is on."""
     valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
     model = model_of(cold=Cold(0.7, 3.0), tank=Tank(1.0, 2e6, 1e6, 1.0))
-    channels = tuple(
-        replace(one, thrusters=tuple(replace(thruster, valve=valve) for thruster in one.thrusters))
-        for one in model.spacecraft.channels
-    )
-    body = replace(model.spacecraft, channels=channels)
+    body = replace(model.spacecraft, channels=tuple(one.of(valve=valve) for one in model.spacecraft.channels))
     model = Model(body, fired(body, model.schedule.blocks))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
     timed = RealWidths(model).timed(model.cases(draws))

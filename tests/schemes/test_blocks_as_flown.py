@@ -29,11 +29,7 @@ UNEVEN = Trapezoid(open_delay=0.015, close_delay=0.006, rise_time=0.01, fall_tim
 
 def through(body: Spacecraft, valve: Valve) -> Spacecraft:
     """The body with that valve at every thruster."""
-    channels = (
-        replace(one, thrusters=tuple(replace(thruster, valve=valve) for thruster in one.thrusters))
-        for one in body.channels
-    )
-    return replace(body, channels=tuple(channels))
+    return replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
 
 
 def at_rest(name: str) -> Spacecraft:
