@@ -68,9 +68,6 @@ SURELY = 3.0
 LOWER = 0.98
 """Share of the nutation above which it does not count as lowered."""
 
-INVERTED = 6
-"""Steps by which the number of pulses is found that turns H by so much, cold and at falling pressure."""
-
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
 
@@ -304,7 +301,8 @@ class Search:
             if not len(widths):
                 continue
             step = self.model.turned_by(channel, widths, float(state.spin))
-            near = np.rint(self._pulses(state, channel, widths, float(way) / step))[:, None] + np.arange(-1, 2)
+            near = self.model.pulses(state, channel, widths, float(way) / step, self.commands.max_count)
+            near = np.rint(near)[:, None] + np.arange(-1, 2)
             few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
             counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
             for every in self.commands.every:
@@ -312,14 +310,6 @@ class Search:
                     continue
                 for wait in self._waits(state, least, LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
-
-    def _pulses(self, state: State, channel: Channel, widths: Array, full: Array) -> Array:
-        """Numbers of pulses (k,) that are worth so many ``full`` ones."""
-        needed = full
-        for _ in range(0 if self.model.steady else INVERTED):
-            count = np.rint(needed).clip(1, self.commands.max_count).astype(int)
-            needed = full + count - self.model.full_pulses(state, channel, widths, count)[0]
-        return needed
 
     def _parts(self, start: Found) -> Iterator[Found]:
         """First blocks that go a part of the way to the target."""

@@ -26,6 +26,9 @@ from nutdamp.schemes.tools.sun_pulses import first_sun_pulse, spin_turn
 from nutdamp.spacecraft import Channel, Spacecraft
 from nutdamp.supply import Supply
 
+INVERTED = 6
+"""Steps by which the number of pulses is found that turns H by so much, cold and at falling pressure."""
+
 
 class Trial(NamedTuple):
     """Blocks that are tried, as arrays that broadcast.
@@ -145,6 +148,14 @@ class BlockModel:
         at = index.reshape(np.shape(width)), np.asarray(count) - 1
         full, spent = self._tables[key]
         return full[at], spent[at]
+
+    def pulses(self, state: State, channel: Channel, widths: Any, full: Any, most: int) -> Any:
+        """Numbers of pulses, nearly whole and about ``most`` at most, that are worth so many ``full`` ones."""
+        needed = full
+        for _ in range(0 if self.steady else INVERTED):
+            count = np.rint(needed).clip(1, most).astype(int)
+            needed = full + count - self.full_pulses(state, channel, widths, count)[0]
+        return needed
 
     def kicks(self, state: State, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
         """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step}; ``back``: the last
