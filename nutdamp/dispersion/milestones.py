@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -74,5 +73,5 @@ def first_pulses(schedule: Schedule, count: int) -> Schedule:
 
 
 def even(count: int, most: int) -> list[int]:
-    """At most so many of the numbers 1 … ``count``, evenly, the last of them among them."""
-    return sorted({math.ceil(count * (index + 1) / min(most, count)) for index in range(min(most, count))})
+    """At most so many (two or more) of the numbers 1 … ``count``, evenly, the first and the last of them among them."""
+    return sorted({round(number) for number in np.linspace(1, count, min(most, count)).tolist()})

@@ -202,12 +202,12 @@ def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
     """How far the true values may differ from the file's, and which tolerances touch nothing that can fire."""
     from nutdamp.dispersion.inputs import reachable  # few files have dispersions
-    from nutdamp.presentation.dispersion_tables import size_text, unused_table
+    from nutdamp.presentation.dispersion_tables import in_words, size_text, unused_table
 
     inputs, unused = reachable(spacecraft)
     alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in inputs:
-        names = alike.setdefault((entry.tolerance.replace("_", " "), entry.kind, size_text(entry)), [])
+        names = alike.setdefault((in_words(entry.tolerance), entry.kind, size_text(entry)), [])
         by_thruster = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
         if isinstance(by_thruster, Mapping):

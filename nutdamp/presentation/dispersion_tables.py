@@ -131,7 +131,7 @@ def budget_rows(study: Study) -> list[BudgetRow]:
     scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
     order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
     named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
-    groups = [(inputs[row].name, size_text(inputs[row]), [row]) for row in named]
+    groups = [(in_words(inputs[row].name), size_text(inputs[row]), [row]) for row in named]
     if named != order:
         groups.append((f"{len(order) - len(named)} others", "", order[len(named) :]))
     rows = []
@@ -183,7 +183,8 @@ def _dominating(results: Results) -> list[RenderableType]:
         for entry, share in zip(first.inputs, first.shares(output).tolist(), strict=True):
             sums[entry.tolerance] = sums.get(entry.tolerance, 0.0) + share
         ranked = sorted(sums.items(), key=lambda one: -one[1])
-        leading = [f"{key} ({_percent(share)})" for key, share in ranked if share >= 0.1] or [ranked[0][0]]
+        leading = [f"{in_words(key)} ({_percent(share)})" for key, share in ranked if share >= 0.1]
+        leading = leading or [in_words(ranked[0][0])]
         verb = "dominates" if len(leading) == 1 else "dominate"
         named = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
         if any(sums.values()):
@@ -197,6 +198,14 @@ def _share(share: float) -> str:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if share >= 5e-4 else "0"
+
+
+def in_words(name: str) -> str:
+    """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the file."""
+    key, blank, whose = name.partition(" ")
+    if key.startswith("omega0"):
+        return f"initial ω{key.removeprefix('omega0').removeprefix('_')}"
+    return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
 
 
 def size_text(entry: Input) -> str:
@@ -225,7 +234,8 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         outputs = np.degrees(study.outputs_of(draws)[:3])
         sigmas = [draws[entry.name] / entry.sigma if entry.sigma else 0.0 for entry in study.model.inputs.drawn]
         order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
-        drawn = ", ".join(f"{study.model.inputs.drawn[row].name} {sigmas[row]:+.1f}" for row in order if sigmas[row])
+        names = [in_words(entry.name) for entry in study.model.inputs.drawn]
+        drawn = ", ".join(f"{names[row]} {sigmas[row]:+.1f}" for row in order if sigmas[row])
         table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), drawn)
     again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
@@ -236,7 +246,7 @@ def unused_table(unused: Iterable[Unused]) -> Table:
     table = facts()
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
-        reasons.setdefault(reason, []).append(name)
+        reasons.setdefault(reason, []).append(in_words(name))
     for reason, names in reasons.items():
         table.add_row(", ".join(names), reason)
     return table
@@ -256,7 +266,7 @@ def case_screen(
         sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
         off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
         estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
-        inputs.add_row(Text(entry.name, style="dim"), estimate, truth, off, sigmas)
+        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
     ways = "impulses", "flown"
     outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
     closed = Study(study.model, study.seed)

@@ -26,7 +26,7 @@ from nutdamp.dispersion.statistics import Exact
 from nutdamp.dispersion.study import Results, run
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
-from nutdamp.presentation.dispersion_tables import budget_rows
+from nutdamp.presentation.dispersion_tables import budget_rows, in_words
 from nutdamp.presentation.figures import dispersion as drawing
 from nutdamp.presentation.figures import schemes
 from nutdamp.recommendation import Standing
@@ -216,7 +216,7 @@ def test_the_tornado_has_the_rows_and_effects_of_the_table() -> None:
             expected = math.sqrt(sum(float(effects[index]) ** 2 for index in row.inputs))
             assert float(bar.get_extents().transformed(axes.transData.inverted()).x1) == pytest.approx(expected)
             if len(row.inputs) == 1:
-                assert row.name == names[row.inputs[0]]
+                assert row.name == in_words(names[row.inputs[0]])
             assert (bar.get_hatch() == "////") == row.bias
             assert (bar.get_label() == "bias, not one sigma") == row.bias
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]

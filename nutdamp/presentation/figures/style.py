@@ -116,7 +116,7 @@ def sheet(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=200, layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.07, w_pad=0.08)  # type: ignore[union-attr, call-arg]
+    figure.get_layout_engine().set(h_pad=0.07)  # type: ignore[union-attr, call-arg]
     return figure
 
 
@@ -218,6 +218,8 @@ _COVERED = {"_vital": np.inf, "_label": 14.0, "_number": np.inf}
 
 def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
+    for axes in figure.axes:  # drawn later outside this style, as many ticks fit between labels of the same size
+        axes.tick_params(labelsize=_SETTINGS["xtick.labelsize"])
     before = np.zeros(1)
     for _ in range(PASSES):
         figure.draw_without_rendering()

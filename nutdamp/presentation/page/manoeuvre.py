@@ -23,7 +23,7 @@ from nutdamp.spacecraft import Spacecraft, Vector
 if TYPE_CHECKING:  # few reports disperse
     from nutdamp.dispersion.study import Results
 
-CHECKED = 8
+CHECKED = 12
 """Pulses after which there are abort criteria, at most."""
 
 RPM = 30.0 / math.pi
@@ -149,9 +149,12 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     share = verdicts.exact_percent(probability)
     yield Prose(
         f"Abort, and plan anew from the measured attitude, where after a pulse one of these is exceeded: {share} of "
-        f"{CASES:,} dispersed cases (seed {dispersed.study.seed}) stay within each, those without a fault of thruster, "
-        f"valve or sensor."
+        f"{CASES:,} cases stay within each, those without a fault of thruster, valve or sensor. They are drawn from "
+        f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone, as many however "
+        "many --disperse has."
     )
+    if len(counts) < len(flown.schedule):
+        yield Prose(f"There are criteria after {CHECKED} pulses at most: the first, the last and some evenly between.")
 
 
 def _when(body: Spacecraft, times: Vector) -> list[tuple[Column, list[str]]]:
