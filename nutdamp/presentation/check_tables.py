@@ -28,10 +28,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
         parts += [Text(), turns_table(turns)]
     if survey.acting(spacecraft):
         parts += [Text(), valve_table(spacecraft)]
-    if spacecraft.cold is not None:
-        parts += [Text(), Text(_cold(spacecraft.cold))]
-    if spacecraft.tank is not None:
-        parts += [Text(), Text(_tank(spacecraft.tank))]
+    for said in thrust_changes(spacecraft):
+        parts += [Text(), Text(said)]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -143,6 +141,14 @@ def valve_table(spacecraft: Spacecraft) -> Table:
     for cells, channels in alike.items():
         table.add_row(", ".join(channels), *cells)
     return table
+
+
+def thrust_changes(spacecraft: Spacecraft) -> Iterator[str]:
+    """What cold nozzles and a tank in blowdown do to the thrust, a sentence or two each."""
+    if spacecraft.cold is not None:
+        yield _cold(spacecraft.cold)
+    if spacecraft.tank is not None:
+        yield _tank(spacecraft.tank)
 
 
 def _cold(cold: Cold) -> str:

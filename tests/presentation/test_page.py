@@ -216,6 +216,17 @@ def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     }
 
 
+def test_valves_and_tank_are_among_what_the_spacecraft_is() -> None:
+    more = (
+        "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"
+        "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
+    )
+    plain, text = page(example_text()), page(example_text() + more)
+    for said in ("Valves: what the shortest and the longest command", "Tank: 22 bar full; 11.73 bar"):
+        assert said not in plain
+        assert said in text
+
+
 def test_without_a_feasible_plan_the_page_says_why() -> None:
     text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n").replace("two-pulse", "")
     assert "No recommendation" not in text

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from nutdamp import survey
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
-from nutdamp.presentation.check_tables import channel_table, disturbance_table
+from nutdamp.presentation.check_tables import channel_table, disturbance_table, thrust_changes, valve_table
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
@@ -24,6 +25,9 @@ def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
         yield thruster_sheet(body)
         steps = "Channels, and the nutation that their shortest and longest pulse takes"
         yield sheet_of(steps, channel_table(body))
+    if survey.acting(body):
+        yield sheet_of("Valves: what the shortest and the longest command of each channel give", valve_table(body))
+    yield from map(Prose, thrust_changes(body))
     if body.disturbances:
         yield sheet_of("Disturbances, and what each does alone", disturbance_table(body))
 
