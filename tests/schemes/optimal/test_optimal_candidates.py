@@ -13,11 +13,12 @@ from checker import violations
 from samples import some
 from test_optimal import random_layout
 
+from nutdamp.compliance import SAME_COST
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.planning import plan
 from nutdamp.remarks import infeasibility
 from nutdamp.schemes import Options
-from nutdamp.schemes.optimal import candidates
+from nutdamp.schemes.optimal import candidates, search
 from nutdamp.spacecraft import Limits, Spacecraft
 
 MICRODEGREE = math.radians(1e-6)
@@ -44,6 +45,13 @@ def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
         assert violations(body, one) == []
 
 
+@pytest.fixture
+def as_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the search over the whole horizon finds, not what ends earlier and costs up to 0.1 % more."""
+    monkeypatch.setattr(search, "hastened", lambda _problem, best, *_: best)
+
+
+@pytest.mark.usefixtures("as_found")
 @pytest.mark.parametrize("seed", [0, 1, 3, 9, 11, 14, 35, 38])
 def test_a_free_axis_never_costs_more_than_h_kept(seed: int) -> None:
     """The search alone was up to 0.7 % dearer with more freedom."""
@@ -55,11 +63,20 @@ def test_a_free_axis_never_costs_more_than_h_kept(seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("as_found")
 @pytest.mark.parametrize("seed", range(40))
 def test_a_free_axis_never_costs_more_than_h_kept_in_many_layouts(seed: int) -> None:
     test_a_free_axis_never_costs_more_than_h_kept(seed)
 
 
+@pytest.mark.parametrize("seed", [1, 4, 36])
+def test_a_free_axis_that_ends_earlier_costs_as_much_within_what_counts_as_equal(seed: int) -> None:
+    body = random_layout(seed)
+    kept, free = (plan(body, "optimal", Options(free_axis=free)) for free in (False, True))
+    assert free.pulses.cost <= kept.pulses.cost * (1.0 + SAME_COST)
+
+
+@pytest.mark.usefixtures("as_found")
 @pytest.mark.parametrize("shift", [0.05, 1.0])
 def test_a_shift_allowed_never_costs_more_than_none(shift: float) -> None:
     for seed in (0, 14):
