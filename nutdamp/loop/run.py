@@ -92,26 +92,22 @@ def fly(
     until: float | None = None,
     *,
     seed: int = SEED,
-    known: Spacecraft | None = None,
     dynamics: Mover | None = None,
 ) -> Run:
-    """The loop of a ``spacecraft`` flown to ``until`` s.
+    """The loop of a ``spacecraft`` flown to ``until`` s; ``dynamics`` flies it by another integrator.
 
-    ``known`` is the spacecraft as the law on board knows it, where that is not the truth; ``dynamics`` flies it by
-    another integrator. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
+    Raises Infeasible where no law can work, or the flight takes too many samples or firings.
     """
     end = until_default(spacecraft, loop) if until is None else until
-    return _Pilot(spacecraft, loop, end, seed, known or spacecraft, dynamics or make_dynamics(spacecraft)).fly()
+    return _Pilot(spacecraft, loop, end, seed, dynamics or make_dynamics(spacecraft)).fly()
 
 
 class _Pilot:
     """One flight in the making."""
 
-    def __init__(
-        self, truth: Spacecraft, loop: Loop, until: float, seed: int, known: Spacecraft, dynamics: Mover
-    ) -> None:
+    def __init__(self, truth: Spacecraft, loop: Loop, until: float, seed: int, dynamics: Mover) -> None:
         self.truth, self.loop, self.until, self.seed, self.dynamics = truth, loop, until, seed, dynamics
-        self.law, self.signal = Law(known, loop), Signal(truth, loop.sensor, seed)
+        self.law, self.signal = Law(truth, loop), Signal(truth, loop.sensor, seed)
         self.diagnosis = Diagnosis(self.law.period)
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference
+import spinners
 from builders import aimed, channel, cross, events, spinner
 
 from nutdamp import planning
@@ -21,19 +22,7 @@ from nutdamp.files.spin_table import HEADER, spin_table
 from nutdamp.schedule import Schedule, channel_pulse, commanded
 from nutdamp.spacecraft import Limits, Spacecraft
 
-SUNLIT = """
-name: Spinner
-mass: 300 kg
-inertia: {A: 120 kg m^2, C: 150 kg m^2}
-state: {spin: 12 rpm, nutation: 0 deg}
-attitude: {epoch: 1998-01-07T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
-thrusters:
-  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, max_on_time: 2 s}
-sun: epoch
-sun_sensor: {azimuth: 35 deg}
-commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, every: [1, 2]}
-limits: {horizon: 1200 s}
-"""
+SUNLIT = spinners.FILE.replace("C: 180", "C: 150")
 
 
 def table(text: str) -> list[dict[str, str]]:

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
-# Okabe & Ito's palette, distinguished by colour-blind readers and, with the line styles, in grey print
-# (jfly.uni-koeln.de/color).
+# Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too, for grey print.
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
 """Spin axis, body cone and what moves; firings; angular momentum and space cone."""
 
