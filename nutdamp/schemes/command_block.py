@@ -174,10 +174,12 @@ class Search:
                 firsts = _promising(firsts, FIRST // 2)
             firsts = [more for first in firsts for more in self._behind(first, self._rest(first), few=4)]
             found += firsts
-        # The flight differs a little: half of them are the cheapest that comply, half those that do most clearly.
-        cheap = sorted(found, key=lambda one: one.rank)[: FLOWN // 2]
-        clear = sorted(found, key=lambda one: one.share)[: FLOWN // 2]
-        return list({one.blocks: one for one in (*cheap, *clear)}.values())
+        # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
+        # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
+        ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
+        clear = sorted(ranked, key=lambda one: one.share)[: FLOWN // 2]
+        each = {len(one.blocks): one for one in reversed(ranked)}.values()
+        return list({one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}.values())
 
     def flown(self, found: Found) -> Flown:
         """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
@@ -223,7 +225,8 @@ class Search:
                 if math.isfinite(failed[index]):
                     at = np.unravel_index(index, shape)
                     wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
-                    block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, every)
+                    interval = every if count > 1 else self.commands.every[0]
+                    block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, interval)
                     here = state.at(at, shape)
                     rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
                     yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
