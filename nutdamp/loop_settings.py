@@ -23,7 +23,8 @@ class Sensor:
     ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an accelerometer, which is at
     ``position`` (3,) m from the centre of mass and measures along the unit vector ``axis`` (3,), both in principal
     axes. ``rate`` Hz is that of its samples, None is a continuous signal; ``delay`` s until a sample can be used;
-    ``low_pass`` s the time constant of a first-order filter over the samples, 0 is none.
+    ``low_pass`` s the time constant of a first-order filter over the samples, 0 is none. ``second`` is what the gyro
+    about axis 2 has as scale and bias, where that differs.
     """
 
     kind: str = GYRO
@@ -36,6 +37,22 @@ class Sensor:
     low_pass: float = 0.0
     position: Vector = field(default_factory=lambda: np.zeros(3))
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    second: tuple[float, float] | None = None
+
+    @property
+    def scales(self) -> tuple[float, ...]:
+        """Scale of each column of the signal."""
+        return self._each(self.scale, 0)
+
+    @property
+    def biases(self) -> tuple[float, ...]:
+        """Bias of each column, rad/s or m/s²."""
+        return self._each(self.bias, 1)
+
+    def _each(self, value: float, which: int) -> tuple[float, ...]:
+        if self.kind == ACCELEROMETER:
+            return (value,)
+        return (value, value if self.second is None else self.second[which])
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,8 @@ class Law:
         inertia = spacecraft.inertia
         if inertia.body_rate == 0.0:
             raise Infeasible("a sphere nutates without a turn of ω in the body: there is no phase to fire by")
-        self.loop, self.inertia, self.windows = loop, inertia, Windows(spacecraft, endless=True)
+        self.spacecraft, self.loop, self.inertia = spacecraft, loop, inertia
+        self.windows = Windows(spacecraft, endless=True)
         self.gauge = _gauge(inertia.moments)
         self.period, self.growth = spacecraft.body_period, spacecraft.growth
         channels = usable(spacecraft)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from enum import Enum
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +17,14 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Leg
 from nutdamp.limits import commandable
 from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
-from nutdamp.loop.law import Firing, Law
-from nutdamp.loop.sensor import Signal
-from nutdamp.loop.watch import GRID, MOST, Coast, Found, Mover, Seen
+from nutdamp.loop.law import ComplexArray, Firing, Law
+from nutdamp.loop.sensor import Estimator, Signal
+from nutdamp.loop.watch import GRID, MOST, Coast, Found, Mover, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER, Loop
 from nutdamp.motion import Path
 from nutdamp.physics import rigid
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.spacecraft import Spacecraft, SpinState
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, commanded
+from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.supply import Supply
 
 SEED = 1
@@ -60,7 +62,7 @@ class Run:
     spacecraft: Spacecraft
     loop: Loop
     until: float
-    seed: int
+    seed: int | tuple[int, ...]
     fired: tuple[Fired, ...]
     stop: Stop
     channel: str | None
@@ -91,50 +93,59 @@ def fly(
     loop: Loop,
     until: float | None = None,
     *,
-    seed: int = SEED,
+    seed: int | tuple[int, ...] = SEED,
+    law: Law | None = None,
+    scatter: Scatter | None = None,
     dynamics: Mover | None = None,
 ) -> Run:
     """The loop of a ``spacecraft`` flown to ``until`` s; ``dynamics`` flies it by another integrator.
 
-    Raises Infeasible where no law can work, or the flight takes too many samples or firings.
+    ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and ``scatter`` what
+    its firings are off by. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
     """
     end = until_default(spacecraft, loop) if until is None else until
-    return _Pilot(spacecraft, loop, end, seed, dynamics or make_dynamics(spacecraft)).fly()
+    moves = dynamics or make_dynamics(spacecraft)
+    pilot = Pilot(spacecraft, loop, end, law or Law(spacecraft, loop), free=moves.free, scatter=scatter)
+    return _Flown(pilot, Signal(spacecraft, loop.sensor, seed), moves, seed).fly()
 
 
-class _Pilot:
-    """One flight in the making."""
+class Scatter(Protocol):
+    """By what single firings are off: the factor on the thrust of each, and by how many s it comes late."""
 
-    def __init__(self, truth: Spacecraft, loop: Loop, until: float, seed: int, dynamics: Mover) -> None:
-        self.truth, self.loop, self.until, self.seed, self.dynamics = truth, loop, until, seed, dynamics
-        self.law, self.signal = Law(truth, loop), Signal(truth, loop.sensor, seed)
-        self.diagnosis = Diagnosis(self.law.period)
-        self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
-        self.channels = {channel.name: channel for channel in truth.channels}
-        self.supply = Supply(truth)
-        self.fired: list[Fired] = []
+    def of(self, number: int) -> tuple[float, float]:
+        """Of the firing of a ``number`` from 0."""
+        ...
+
+
+class _Flown:
+    """One flight in the making, each stretch by itself."""
+
+    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Mover, seed: int | tuple[int, ...]) -> None:
+        self.pilot, self.signal, self.dynamics, self.seed = pilot, signal, dynamics, seed
         self.legs: list[Leg] = []
-        self.quiet: list[float] = []
-        self.active, self.looked_at = False, 0
-        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
-        self._pending: tuple[Pulse, Firing, Glimpse] | None = None
-        self._seen: list[Seen] = []
 
     def fly(self) -> Run:
         """Coast and fire until the end, or until something is wrong."""
-        state, now = self.truth.initial, 0.0
-        while True:
-            found = self._next(Coast(self.law, self.signal, self.dynamics, state, now))
-            pulse = None if found is None else self._pulse(found)
-            if found is None or pulse is None:
+        pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
+        coast = self._coast(state, now)
+        while (seen := coast.look(pilot.until, active=pilot.active)) is not None:
+            step = pilot.step(coast, seen)
+            if step is Course.OVER:
                 break
-            path, begin = self.dynamics.path(state, now, pulse.thrust[0], most=rigid.MOST_STEPS)
-            self._leg(now, pulse.thrust[0], path)
-            self._take(found, pulse, begin)
-            state, now = self._fire(pulse, begin), pulse.thrust[1]
-        last = max(self.until, now)
+            if isinstance(step, float):
+                coast = self._coast(coast.at(step), step)
+            elif isinstance(step, Pulse):
+                path, begin = self.dynamics.path(state, now, step.thrust[0], most=rigid.MOST_STEPS)
+                self._leg(now, step.thrust[0], path)
+                pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
+                state, now = self._fire(step, begin), step.thrust[1]
+                coast = self._coast(state, now)
+        last = max(pilot.until, now)
         self._leg(now, last, self.dynamics.path(state, now, last, most=rigid.MOST_STEPS)[0])
         return self._run(state)
+
+    def _coast(self, state: SpinState, since: float) -> Coast:
+        return Coast(self.pilot.law, self.signal, self.dynamics, state, since)
 
     def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
         """The motion through the thrust of a pulse, from its beginning to its end."""
@@ -146,34 +157,91 @@ class _Pilot:
         return state
 
     def _leg(self, start: float, end: float, path: Path, *, firing: bool = False, last: bool = False) -> None:
-        done = len(self.fired) - firing
+        done = len(self.pilot.fired) - firing
         self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
 
     def _run(self, settled: SpinState) -> Run:
         """The run, which ends its firings with the motion ``settled``."""
-        stop, channel = self.ending
-        schedule = Schedule(tuple(one.pulse for one in self.fired))
+        pilot = self.pilot
+        schedule = Schedule(tuple(one.pulse for one in pilot.fired))
         spans = tuple(pulse.thrust for pulse in schedule)
-        made = Flight(self.truth, schedule, tuple(self.legs), settled, self.dynamics.moments, spans, until=self.until)
+        moments = self.dynamics.moments
+        made = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
         return Run(
-            self.truth,
-            self.loop,
-            self.until,
+            pilot.truth,
+            pilot.loop,
+            pilot.until,
             self.seed,
-            tuple(self.fired),
-            stop,
-            channel or None,
-            tuple(self.quiet),
-            self.looked_at,
+            tuple(pilot.fired),
+            pilot.ending[0],
+            pilot.ending[1] or None,
+            tuple(pilot.quiet),
+            pilot.looked_at,
             made,
         )
 
+
+class Course(Enum):
+    """What a loop does next where it neither fires nor waits: looks on, or is over."""
+
+    ON = "on"
+    OVER = "over"
+
+
+class Pilot:
+    """The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+
+    The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
+    ``free``: coasts are those of a symmetric body without torque from outside.
+    """
+
+    def __init__(
+        self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
+    ) -> None:
+        self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
+        self.diagnosis = Diagnosis(law.period)
+        self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
+        self.channels = {channel.name: channel for channel in truth.channels}
+        self.supply = Supply(truth)
+        self.fired: list[Fired] = []
+        self.quiet: list[float] = []
+        self.active, self.looked_at = False, 0
+        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
+        self._found: Found | None = None
+        self._pending: tuple[Pulse, Firing, Glimpse] | None = None
+        self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
+
+    def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
+        """What comes after a stretch of a coast: a pulse; nothing to be seen until a time, s; or `Course`."""
+        self.looked_at += len(seen.times)
+        if self.looked_at > MOST:
+            raise Infeasible(
+                f"more than {MOST:.2g} samples by {seen.times[0]:.6g} s; an earlier end, or a lower rate, helps"
+            )
+        self._seen.append((seen.times, seen.best, seen.spin))
+        self._latest, self._shown = len(seen.times), seen.shown
+        self._found = self._decide(coast, seen)
+        if self.ending[0].fault:
+            return Course.OVER
+        if self._found is not None:
+            return self._pulse(self._found) or Course.OVER
+        self._forget()
+        later = None if self.active or self._pending is not None else self._idle_until(seen)
+        if later is None:
+            return Course.ON
+        self._seen = []
+        return later
+
     def _pulse(self, found: Found) -> Pulse | None:
         """What the channel does in truth when it is commanded; None where it may not, or not before the end."""
-        channel = self.channels[found.actuator.channel.name]
-        made = channel_pulse(channel, found.start + found.firing.lead, found.firing.on_time)
-        if channel.valve is not None:
-            made = commandable(self.truth, made)
+        known, channel = found.actuator.channel, self.channels[found.actuator.channel.name]
+        made = channel_pulse(known, found.start + found.firing.lead, found.firing.on_time)
+        if known.valve is not None:
+            made = commandable(self.law.spacecraft, made)
+        factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
+        if channel is not known or late != 0.0:
+            begins, lasts = made.loaded
+            made = commanded(channel, max(begins + late, found.now), lasts)
         if made.over > self.until:
             return None
         if len(self.fired) == self.most:
@@ -182,27 +250,39 @@ class _Pilot:
                 raise Infeasible(f"more than {MOST_FIRINGS} firings by {made.start:.6g} s; an earlier end helps")
             return None
         made = self.supply.fire(made, channel)
-        if channel.name not in self.loop.reversed:
-            return made
-        torque, force = (None if one is None else -one for one in (made.torque, made.force))
-        return replace(made, impulse=-made.impulse, torque=torque, force=force)
+        sense = -factor if channel.name in self.loop.reversed else factor
+        return made if sense == 1.0 else _scaled(made, sense)
 
-    def _take(self, found: Found, pulse: Pulse, begin: SpinState) -> None:
-        """Notes a firing, and what was seen before it."""
-        seen = self._seen[-1]
-        spin = float(seen.spin[found.row])
-        shown = float(self.law.nutation(abs(seen.z[found.row]), spin))
-        true = float(self.law.nutation(abs(complex(self.law.seen(begin.omega))), begin.spin))
-        self.fired.append(Fired(pulse, found.now, shown, true))
+    def take(self, pulse: Pulse, size: float, spin: float) -> None:
+        """Notes a firing, with |z| and ω3 (rad/s) in truth as it begins, and what was seen before it."""
+        found = self._found
+        assert found is not None
+        true = float(self.law.nutation(size, spin))
+        self.fired.append(Fired(pulse, found.now, float(self._shown[found.row]), true))
         glimpse = self._glimpse(pulse.t, found.row, last=True)
         self._pending = None if glimpse is None else (pulse, found.firing, glimpse)
-        self.ready = pulse.over + max(self.loop.min_interval, self.truth.limits.gap)
+        self._seen = []
+        self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+
+    def _forget(self) -> None:
+        """Keeps of what was seen the last period, or all since a firing that is not judged yet."""
+        if self._pending is None:
+            last = self._seen[-1][0]
+            edge = last[-1] - self.law.period
+            if last[0] <= edge:
+                row = int(np.searchsorted(last, edge))
+                times, best, spin = self._seen[-1]
+                self._seen = [(times[row:].copy(), best[row:].copy(), spin[row:].copy())]
+            else:
+                self._seen = self._seen[-3:]
 
     def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
         """What was seen on this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
-        parts = [one if one is not self._seen[-1] else one.up_to(row) for one in self._seen]
-        times = np.concatenate([one.times for one in parts])
-        best, spin = np.concatenate([one.best for one in parts]), np.concatenate([one.spin for one in parts])
+        times, best, spin = (
+            self._seen[0] if len(self._seen) == 1 else map(np.concatenate, zip(*self._seen, strict=True))
+        )
+        count = len(times) - self._latest + row + 1
+        times, best, spin = times[:count], best[:count], spin[:count]
         known = ~np.isnan(best)
         if not known.any():
             return None
@@ -212,39 +292,17 @@ class _Pilot:
         rate = complex(self.law.rate(float(spin[-1])), self.law.growth)
         return Glimpse.of(times[near], best[near], rate, centre)
 
-    def _next(self, coast: Coast) -> Found | None:
-        """The next firing; None where the end, or a fault, comes first."""
-        self._seen = []
-        while (seen := coast.look(self.until)) is not None:
-            self.looked_at += len(seen.times)
-            if self.looked_at > MOST:
-                raise Infeasible(
-                    f"more than {MOST:.2g} samples by {coast.since:.6g} s; an earlier end, or a lower rate, helps"
-                )
-            self._seen.append(seen)
-            found = self._decide(coast, seen)
-            if found is not None or self.ending[0].fault:
-                return None if self.ending[0].fault else found
-            self._seen = self._seen[-3:] if self._pending is None else self._seen
-            later = None if self.active or self._pending is not None else self._idle_until(coast, seen)
-            if later is not None:
-                coast = Coast(self.law, self.signal, self.dynamics, coast.at(later), later)
-                self._seen = []
-        return None
-
-    def _decide(self, coast: Coast, seen: Seen) -> Found | None:
+    def _decide(self, coast: Watch, seen: Seen) -> Found | None:
         """The first firing among the moments of a stretch; thresholds and firings are judged in their order."""
-        waits = coast.waits(seen)
-        fires = coast.triggered(waits)
-        shown = self.law.nutation(np.abs(seen.z), seen.spin)
-        row, count = 0, len(seen.times)
+        shown, fires, count, row = seen.shown, seen.fires, len(seen.times), 0
         while row < count:
             if not self.active:
-                begins = _first(np.asarray(shown >= self.loop.start), row)
+                begins = _first(np.asarray(shown >= self.law.loop.start), row)
                 if begins is None:
                     break
                 self.active, row = True, begins
-            downs, fire = _first(np.asarray(shown <= self.loop.stop), row), _first(np.asarray(fires.any(axis=0)), row)
+            downs = _first(np.asarray(shown <= self.law.loop.stop), row)
+            fire = _first(np.asarray(fires.any(axis=0)), row)
             if downs is not None and (fire is None or downs <= fire):
                 self.active, row = False, downs + 1
                 self.diagnosis.rest()
@@ -262,11 +320,11 @@ class _Pilot:
             self._faulty(coast, seen, count - 1)
         return None
 
-    def _known(self, coast: Coast) -> float:
+    def _known(self, coast: Watch) -> float:
         """When enough has been seen of the coast after a firing to judge it, s."""
-        return coast.estimator.first + 0.25 * self.law.period
+        return float(coast.estimator.first) + 0.25 * self.law.period
 
-    def _faulty(self, coast: Coast, seen: Seen, row: int) -> bool:
+    def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
         """Judges the last firing by what was seen since, up to a ``row``; whether the loop has to stop."""
         if self._pending is not None:
             pulse, firing, before = self._pending
@@ -286,7 +344,7 @@ class _Pilot:
                 self.ending = overdue
         return self.ending[0].fault
 
-    def _allowed(self, coast: Coast, seen: Seen, row: int, channels: list[int]) -> Found | None:
+    def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Found | None:
         """The firing at a row, on a tick, if the limits allow it."""
         usable = [index for index in channels if self.law.actuators[index].channel.name != self.diagnosis.suspect]
         found = coast.found(seen, row, usable)
@@ -297,25 +355,34 @@ class _Pilot:
         start = windows.tick_after(found.start) if start < found.now else start
         return found._replace(start=start) if windows.allows(start, found.firing.lasts, self.ready) else None
 
-    def _idle_until(self, coast: Coast, seen: Seen) -> float | None:
+    def _idle_until(self, seen: Seen) -> float | None:
         """When the sensor can first show the start threshold, less what it takes to be looking; None where soon."""
-        body, law = self.truth, self.law
-        if not self.dynamics.free or not len(seen.times):
+        law, sensor = self.law, self.loop.sensor
+        if not self.free:
             return None
-        estimator, loop = coast.estimator, self.loop
         now, spin = float(seen.times[-1]), float(seen.spin[-1])
-        threshold = law.size(loop.start, spin)
-        margin = estimator.offset + NO_NOISE * estimator.doubt(1)
-        share = 0.5 if loop.sensor.kind == ACCELEROMETER else 1.0
-        reach = (share * threshold - margin) / abs(loop.sensor.scale)
-        size = abs(complex(law.seen(coast.at(now).omega)))
-        if reach <= size:
+        share = 0.5 if sensor.kind == ACCELEROMETER else 1.0
+        reach = (share * law.size(law.loop.start, spin) - self._margin) / max(map(abs, sensor.scales))
+        if reach <= seen.size:
             return None
-        growth = body.growth
+        growth = self.truth.growth
         # tan θ grows by e^{κt}, and |ω| by no more.
-        waits = math.log(reach / size) / growth if growth > 0.0 < size else math.inf
-        later = min(now + waits, self.until) - max(law.period, WAVES * loop.sensor.low_pass) - law.period / GRID
+        waits = math.log(reach / seen.size) / growth if growth > 0.0 < seen.size else math.inf
+        later = min(now + waits, self.until) - max(law.period, WAVES * sensor.low_pass) - law.period / GRID
         return later if later > now + law.period else None
+
+    @cached_property
+    def _margin(self) -> float:
+        """By how much the sensor may show too much of |z|, rad/s."""
+        estimator = Estimator(self.law, self.loop.sensor, 0.0)
+        return estimator.offset + NO_NOISE * estimator.doubt(1)
+
+
+def _scaled(pulse: Pulse, factor: float) -> Pulse:
+    """A pulse of so many times the thrust; backwards where that is negative."""
+    torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
+    used = None if pulse.propellant is None else abs(factor) * pulse.propellant
+    return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:

@@ -17,8 +17,10 @@ period, and the first of the sines gives ω.
 from __future__ import annotations
 
 import cmath
+import copy
 import math
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,56 +58,99 @@ def is_blind(moments: Sequence[float], position: Vector, axis: Vector) -> bool:
     return math.hypot(*gain(moments, position, axis)) <= BLIND * math.hypot(*position.tolist())
 
 
-class Signal:
-    """The samples of a sensor on a ``spacecraft``, as it is in truth, with the noise of a ``seed``."""
+class Noise:
+    """Normal numbers for samples, the same for the same sample however it is come by; ``key`` is seed and case."""
 
-    def __init__(self, spacecraft: Spacecraft, sensor: Sensor, seed: int) -> None:
-        self.sensor, self.seed = sensor, seed
-        self.moments, self.mass = np.asarray(spacecraft.inertia.moments), spacecraft.mass
-        self.columns = 1 if sensor.kind == ACCELEROMETER else 2
+    def __init__(self, key: tuple[int, ...], columns: int) -> None:
+        self.key, self.columns = key, columns
         self._blocks: dict[int, Vector] = {}
+
+    def of(self, first: int, count: int) -> Vector:
+        """Those of ``count`` samples from number ``first`` on, (count, columns)."""
+        begin, end = first // BLOCK, max(first + count - 1, first) // BLOCK
+        for block in range(begin, end + 1):
+            if block not in self._blocks:
+                self._blocks[block] = np.random.default_rng((*self.key, block)).normal(size=(BLOCK, self.columns))
+        for block in [one for one in self._blocks if one < begin]:
+            del self._blocks[block]
+        drawn = self._blocks[begin]
+        if end > begin:
+            drawn = np.concatenate([self._blocks[block] for block in range(begin, end + 1)])
+        return drawn[first - begin * BLOCK : first - begin * BLOCK + count]
+
+
+def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[Any, ...]:
+    """What there is to be shown, by columns: rad/s of two gyros, or m/s² of an accelerometer in free motion.
+
+    Of principal ``moments`` and body ``rates``, three numbers or arrays each; a ``torque`` N m changes the rates.
+    """
+    x, y, z = rates
+    if sensor.kind != ACCELEROMETER:
+        return x, y
+    first, second, third = moments
+    m1, m2, m3 = (0.0, 0.0, 0.0) if torque is None else torque
+    turned = ((second - third) * y * z + m1, (third - first) * z * x + m2, (first - second) * x * y + m3)
+    changes = (turned[0] / first, turned[1] / second, turned[2] / third)
+    at, axis = sensor.position.tolist(), sensor.axis.tolist()
+    # u·(dω/dt × r) = dω/dt·(r × u), and u·(ω × (ω × r)) = (ω·u)(ω·r) - (u·r)ω².
+    arm = np.cross(sensor.position, sensor.axis).tolist()
+    value = sum(change * part for change, part in zip(changes, arm, strict=True))
+    along, out = (sum(rate * part for rate, part in zip(rates, one, strict=True)) for one in (axis, at))
+    return (value + along * out - float(sensor.position @ sensor.axis) * (x * x + y * y + z * z),)
+
+
+class Signal:
+    """The samples of a sensor on a ``spacecraft``, as it is in truth, with the noise of a ``seed`` (and a case)."""
+
+    def __init__(self, spacecraft: Spacecraft, sensor: Sensor, seed: int | tuple[int, ...]) -> None:
+        self.sensor = sensor
+        self.moments, self.mass = spacecraft.inertia.moments, spacecraft.mass
+        columns = 1 if sensor.kind == ACCELEROMETER else 2
+        self.noise = Noise(seed if isinstance(seed, tuple) else (seed,), columns)
 
     def shown(self, rates: Vector, torque: Vector | None = None, force: Vector | None = None) -> Vector:
         """The signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3)."""
         sensor = self.sensor
-        if sensor.kind != ACCELEROMETER:
-            return sensor.scale * rates[:, :2] + sensor.bias
-        momentum = rates * self.moments
-        change = (-np.cross(rates, momentum) + (0.0 if torque is None else torque)) / self.moments
-        at = np.broadcast_to(sensor.position, rates.shape)
-        felt = np.cross(change, at) + np.cross(rates, np.cross(rates, at))
-        if force is not None and self.mass is not None:
-            felt = felt + force / self.mass
-        return sensor.scale * (felt @ sensor.axis)[:, None] + sensor.bias
+        values = np.column_stack(felt(sensor, self.moments, rates.T, torque))
+        if force is not None and self.mass is not None and sensor.kind == ACCELEROMETER:
+            values = values + force @ sensor.axis / self.mass
+        return np.asarray(sensor.scales * values + sensor.biases)
 
     def sampled(self, numbers: NDArray[np.int64], shown: Vector) -> Vector:
-        """Samples by their ``numbers`` (n,) from 0 at t = 0: ``shown`` with noise and steps."""
+        """Samples by their ``numbers`` (n,), one after the other from 0 at t = 0: ``shown`` with noise and steps."""
         sensor = self.sensor
-        values = shown + sensor.noise * self._noise(numbers) if sensor.noise > 0.0 else shown
-        return values if sensor.quantisation == 0.0 else np.rint(values / sensor.quantisation) * sensor.quantisation
+        values = shown + sensor.noise * self.noise.of(int(numbers[0]), len(numbers)) if sensor.noise > 0.0 else shown
+        return stepped(sensor, values)
 
-    def _noise(self, numbers: NDArray[np.int64]) -> Vector:
-        """Normal numbers (n, columns), the same for the same sample however it is come by."""
-        first, last = int(numbers[0]) // BLOCK, int(numbers[-1]) // BLOCK
-        for block in range(first, last + 1):
-            if block not in self._blocks:
-                self._blocks[block] = np.random.default_rng((self.seed, block)).normal(size=(BLOCK, self.columns))
-        for block in [one for one in self._blocks if one < first]:
-            del self._blocks[block]
-        drawn = np.concatenate([self._blocks[block] for block in range(first, last + 1)])
-        return drawn[numbers - first * BLOCK]
+
+def stepped(sensor: Sensor, values: Vector) -> Vector:
+    """Values in steps of the quantisation."""
+    return values if sensor.quantisation == 0.0 else np.rint(values / sensor.quantisation) * sensor.quantisation
 
 
 class Estimator:
-    """From samples to z, the rate that the `Law` works on, along one coast that begins at ``since`` s."""
+    """From samples to z, the rate that the `Law` works on, along a coast that begins at ``since`` s.
 
-    def __init__(self, law: Law, sensor: Sensor, since: float) -> None:
+    Samples are the last axis of times, spins and estimates, the last but one of values (n, columns). Before it there
+    may be cases, which began at ``since`` (cases, 1).
+    """
+
+    def __init__(self, law: Law, sensor: Sensor, since: Any) -> None:
         self.law, self.sensor = law, sensor
         self.since = since + max(law.loop.settle, SETTLED * sensor.low_pass)
         self.step = 0.0 if sensor.rate is None else 1.0 / sensor.rate
         self._filtered: Vector | None = None
-        self._kept: tuple[Vector, Vector] = (np.empty(0), np.empty(0))
-        self._rate: float | None = None
+        self._kept: _Kept | None = None
+        self._fit: _Fit | None = None
+
+    def some(self, cases: NDArray[Any]) -> Estimator:
+        """That of some of the cases."""
+        found = copy.copy(self)
+        found.since = self.since[cases]
+        found._filtered = None if self._filtered is None else self._filtered[cases]
+        found._kept = None if self._kept is None else _Kept(*(part[cases] for part in self._kept))
+        found._fit = None if self._fit is None else _Fit(self._fit.rate[cases], self._fit.weights[cases])
+        return found
 
     @property
     def window(self) -> int:
@@ -113,29 +158,31 @@ class Estimator:
         return max(round(self.law.period / self.step), 4)
 
     @property
-    def first(self) -> float:
+    def first(self) -> Any:
         """When the first estimate is there after the last firing, s."""
         return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
 
     def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
-        """z (n,) at the times of the samples (n,), filter reckoned with; NaN where there is none yet.
+        """z at the ``times`` (s) of samples, filter reckoned with; NaN where there is none yet.
 
-        ``values`` (n, 2) or (n, 1) are the samples, ``spin`` (n,) is ω3; call by call they go on.
+        ``values`` are the samples, ``spin`` is ω3; call by call they go on.
         """
         smooth = self._low_pass(values)
         if self.sensor.kind == ACCELEROMETER:
             # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
             x, y, _ = (self.sensor.position * self.sensor.axis).tolist()
-            found = self._fitted(times, smooth[:, 0] + (x + y) * spin * spin, spin)
-        else:
-            found = np.where(times >= self.since, self.law.seen(smooth[:, 0] + 1j * smooth[:, 1]), math.nan)
-        return np.asarray(found)
+            return self._fitted(times, smooth[..., 0] + (x + y) * spin * spin, spin)
+        seen = self.law.seen(smooth[..., 0] + 1j * smooth[..., 1])
+        return np.asarray(np.where(times >= self.since, seen, math.nan))
 
     def on_board(self, z: ComplexArray, spin: Vector) -> ComplexArray:
         """What the law takes for z as it decides, the delay after the sample: brought up to then where it predicts."""
         if not self.law.loop.predict:
             return z
-        return np.asarray(self.best(z, spin) * np.exp(-1j * self.law.rate(spin) * self.sensor.delay))
+        best = self.best(z, spin)
+        if self.sensor.delay == 0.0:
+            return best
+        return np.asarray(best * np.exp(-1j * self.law.rate(spin) * self.sensor.delay))
 
     def best(self, z: ComplexArray, spin: Vector) -> ComplexArray:
         """z without what the filter does to it in the steady state."""
@@ -151,52 +198,51 @@ class Estimator:
 
     def _low_pass(self, values: Vector) -> Vector:
         """y = βy' + (1 - β)x over the samples; it begins anew with the first one after a firing."""
-        if self.sensor.low_pass == 0.0 or not len(values):
+        count = values.shape[-2]
+        if self.sensor.low_pass == 0.0 or not count:
             return values
         memory = self._memory
-        before = values[0] if self._filtered is None else self._filtered
+        before = values[..., :1, :] if self._filtered is None else self._filtered
         found = np.empty_like(values)
         size = max(int(FILTERED * self.sensor.low_pass / self.step), 1)
-        for begin in range(0, len(values), size):
-            part = values[begin : begin + size]
-            weights = memory ** -np.arange(1.0, len(part) + 1.0)
-            sums = np.cumsum(part * (1.0 - memory) * weights[:, None], axis=0)
-            found[begin : begin + size] = (before + sums) / weights[:, None]
-            before = found[begin + len(part) - 1]
+        for begin in range(0, count, size):
+            part = values[..., begin : begin + size, :]
+            weights = memory ** -np.arange(1.0, part.shape[-2] + 1.0)[:, None]
+            sums = np.cumsum(part * (1.0 - memory) * weights, axis=-2)
+            found[..., begin : begin + size, :] = (before + sums) / weights
+            before = found[..., begin + part.shape[-2] - 1 : begin + part.shape[-2], :]
         self._filtered = before
         return found
 
     def _fitted(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
-        """z by an offset and a sine of the nutation rate, fitted to the samples of the last period."""
-        if self._rate is None:
-            self._rate = float(self.law.rate(float(spin[0])))
-        used = times >= self.since
-        all_times = np.concatenate([self._kept[0], times[used]])
-        all_values = np.concatenate([self._kept[1], values[used]])
-        fresh, count, size = int(used.sum()), len(all_times), self.window
-        found = np.full(len(times), math.nan, dtype=complex)
-        self._kept = all_times[-size:], all_values[-size:]
-        if not fresh:
-            return found
-        angle = self._rate * (all_times - all_times[0])
-        turns = np.exp(1j * angle[:, None] * (np.array([1.0, 2.0]) if size >= HARMONIC else np.array([1.0])))
-        basis = np.column_stack([np.ones(count), turns.real, turns.imag])
-        sines = 1 + turns.shape[1]
-        normal = np.cumsum(basis[:, :, None] * basis[:, None, :], axis=0)
-        right = np.cumsum(basis * all_values[:, None], axis=0)
-        last = np.arange(count - fresh, count)
-        first = last - size
-        inside = first >= 0
-        window, moment = normal[last], right[last]
-        window[inside] -= normal[first[inside]]
-        moment[inside] -= right[first[inside]]
-        enough = last + 1 >= size
-        sine = np.full(fresh, math.nan, dtype=complex)
-        if enough.any():
-            fit = np.linalg.solve(window[enough], moment[enough][:, :, None])[:, :, 0]
-            sine[enough] = (fit[:, 1] + 1j * fit[:, sines]) * np.exp(-1j * angle[last][enough])
-        found[used] = sine / (np.conj(self._seen_gain) * spin[used])
-        return found
+        """z by an offset and a sine of the nutation rate, fitted to the samples of the last period.
+
+        Samples come evenly, so that the fit is a fixed combination of their sum and of the sums of their products with
+        sines of the rate and of twice it, over as many samples as the window has.
+        """
+        if not times.shape[-1]:
+            return np.empty(times.shape, dtype=complex)
+        if self._fit is None:
+            self._fit = _fit(np.asarray(self.law.rate(spin[..., :1])), self.step, self.window)
+        fresh, size, rate = times.shape[-1], self.window, self._fit.rate
+        used = np.cumsum(times >= self.since, axis=-1)
+        if self._kept is not None:
+            used = used + self._kept.used
+            times, values = (
+                np.concatenate(both, axis=-1) for both in ((self._kept.times, times), (self._kept.values, values))
+            )
+        self._kept = _Kept(times[..., -size:], values[..., -size:], used[..., -1:])
+        turns = np.exp(-1j * rate * (times - times[..., :1]))
+        sums = [_windows(values, size, fresh)]
+        for power in (1, 2) if self._fit.weights.shape[-1] == 5 else (1,):
+            turned = turns if power == 1 else turns * turns
+            # The sum over the window of v e^{-iφ}, with φ from its last sample.
+            both = _windows(values * turned, size, fresh) * turned[..., -fresh:].conj()
+            sums += [both.real, -both.imag]
+        weights = self._fit.weights
+        sine = sum(one * weights[..., place, None] for place, one in enumerate(sums))
+        found = sine / (np.conj(self._seen_gain) * spin)
+        return np.asarray(np.where(used >= size, found, math.nan))
 
     @property
     def _seen_gain(self) -> complex:
@@ -215,12 +261,48 @@ class Estimator:
         """By how much |z| may be off in every estimate, rad/s: by bias and steps of the sensor."""
         sensor = self.sensor
         if sensor.kind != ACCELEROMETER:
-            return (math.sqrt(2.0) * abs(sensor.bias) + sensor.quantisation / math.sqrt(2.0)) * max(self.law.gauge)
+            return (math.hypot(*sensor.biases) + sensor.quantisation / math.sqrt(2.0)) * max(self.law.gauge)
         return sensor.quantisation / self._least_gain
 
     @property
     def _least_gain(self) -> float:
         return abs(self._seen_gain) * 2.0 * math.pi / (self.law.period * abs(self.law.inertia.body_rate))
+
+
+class _Kept(NamedTuple):
+    """The last samples of a coast, and how many there were that may be used."""
+
+    times: Vector
+    values: Vector
+    used: Vector
+
+
+class _Fit(NamedTuple):
+    """Nutation ``rate`` rad/s of a fit, and the ``weights`` of its sums: 1, cos φ, sin φ, cos 2φ, sin 2φ."""
+
+    rate: Vector
+    weights: ComplexArray
+
+
+def _fit(rate: Vector, step: float, size: int) -> _Fit:
+    """The least-squares fit of an offset and sines to so many even samples, as weights of their sums."""
+    angle = rate[..., None] * (step * np.arange(1.0 - size, 1.0))[:, None]
+    powers = np.arange(1.0, 3.0 if size >= HARMONIC else 2.0)
+    turns = np.stack([np.cos(angle * powers), np.sin(angle * powers)], axis=-1)
+    basis = np.concatenate([np.ones(angle.shape), turns.reshape(*angle.shape[:-1], -1)], axis=-1)
+    inverse = np.linalg.inv(np.swapaxes(basis, -1, -2) @ basis)
+    return _Fit(rate, inverse[..., 1, :] + 1j * inverse[..., 2, :])
+
+
+def _windows(values: Any, size: int, fresh: int) -> Any:
+    """Sums of the last ``size`` values at each of the last ``fresh``; of fewer, where there are no more."""
+    sums = np.cumsum(values, axis=-1)
+    count = sums.shape[-1]
+    found = sums[..., count - fresh :].copy()
+    later = max(count - fresh, size)
+    if later < count:
+        found[..., later - count :] -= sums[..., later - size : count - size]
+    return found
 
 
 def lag(law: Law, sensor: Sensor, spin: float) -> float:
