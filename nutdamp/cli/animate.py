@@ -4,20 +4,10 @@ from __future__ import annotations
 
 import click
 
-from nutdamp.cli.common import (
-    Flown,
-    Input,
-    deliver,
-    expect_places,
-    flown_options,
-    load,
-    plan_or_read,
-    quiet_option,
-    remarks,
-    spacecraft_argument,
-)
-from nutdamp.cli.parameters import FILE, Quantity
-from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
+from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.job import begin, deliver
+from nutdamp.cli.parameters import FILE, EndTime
 from nutdamp.cli.progress import progress
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.schemes import Options
@@ -28,7 +18,7 @@ from nutdamp.schemes import Options
 @flown_options("Show")
 @goal_options
 @click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
-@click.option("--until", type=Quantity("time"), help="End of the motion; default soon after the last pulse.")
+@click.option("--until", type=EndTime(), help="End of the motion; default soon after the last pulse.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
 @click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
 @click.option(
@@ -52,16 +42,12 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as GIF.
     """
-    if until is not None and until <= 0.0:
-        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    expect_outputs(spacecraft, flown.schedule, output=output)
     from nutdamp.presentation.figures import animation
 
     animation.film_format(output)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark, aim)
-    expect_places(output)
-    pulses = plan_or_read(body, flown, options, remark, quiet=quiet).pulses
+    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, output=output)
+    body, remark = job.spacecraft, job.remark
+    pulses = plan_or_read(job, flown, options).pulses
 
     from nutdamp import flight
     from nutdamp.presentation.geometry import shown_until

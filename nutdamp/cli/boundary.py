@@ -64,6 +64,16 @@ def run(group: click.Group) -> None:
     sys.exit(status if isinstance(status, int) else DONE)
 
 
+def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = False) -> None:
+    """End with the exit status of the first that holds, if any.
+
+    ``failed``: something has a bug or disagrees; ``infeasible``: there is no result; ``missed``: the requirement is.
+    """
+    for holds, status in ((failed, INTERNAL), (infeasible, INFEASIBLE), (missed, REQUIREMENT_MISSED)):
+        if holds:
+            sys.exit(status)
+
+
 def interruption(number: int) -> BaseException:
     """What ends a run after a signal."""
     return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE, tell
-from nutdamp.cli.common import DEFAULT_FILE, Input, deliver, load, quiet_option, remarks, set_option
+from nutdamp.cli.common import DEFAULT_FILE, Input, load, quiet_option, set_option
+from nutdamp.cli.job import deliver, remarks
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.screen import show

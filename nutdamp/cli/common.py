@@ -1,26 +1,19 @@
-"""What several commands share: the spacecraft argument, quantities as options, the two output streams."""
+"""What several commands share: the spacecraft argument, options of pictures, what a file must have."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
-from nutdamp.cli.failures import show_failures
-from nutdamp.cli.parameters import FILE, Named, SchemeName
-from nutdamp.cli.scheme_options import Aim, expect_read
-from nutdamp.cli.screen import say, show
+from nutdamp.cli.parameters import FILE, Named
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
-from nutdamp.schemes import NAMES, Options, SchemeOptions
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from nutdamp.errors import CannotWrite, Fault
+    from nutdamp.cli.scheme_options import Aim
     from nutdamp.files.settings import Setting
-    from nutdamp.planning import Plan
     from nutdamp.spacecraft import Spacecraft
 
 DEFAULT_FILE = "spacecraft.yaml"
@@ -46,12 +39,6 @@ loop:
   start: 0.5 deg
   stop: 0.05 deg"""
 """What is said of a file that should have a loop."""
-
-File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
-"""What `write_whole` takes."""
-
-Output = tuple[str | None, Callable[[], "File | dict[str, Any]"]]
-"""Path of a file to write, if one is requested, and what makes its content; a dict is written as JSON."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -119,24 +106,21 @@ def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Calla
     return lambda command: where(which(command))
 
 
-def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
-    """Say at once, not after the work, that a picture cannot be made; a usage error for a ``figure`` without file."""
-    if path is None:
-        if figure != FIGURES[0]:
-            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
-        return
-    from nutdamp.presentation import figures
-
-    figures.ending(path)
-
-
 def load(
     given: Input, remark: Callable[[str], None], aim: Aim | None = None, doubts: list[Fault] | None = None
 ) -> Spacecraft:
-    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example.
+    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example; see `parsed`."""
+    return parsed(source(given.path, remark), given.settings, remark, aim, doubts)
 
-    ``aim`` takes the place of the goal in the file; warnings are added to ``doubts``.
-    """
+
+def parsed(
+    text: tuple[str, str],
+    settings: tuple[Setting, ...],
+    remark: Callable[[str], None],
+    aim: Aim | None = None,
+    doubts: list[Fault] | None = None,
+) -> Spacecraft:
+    """The spacecraft in what `source` gives; ``aim`` replaces the goal in it, warnings are added to ``doubts``."""
     from nutdamp.files.spacecraft_file import read_spacecraft
 
     def warn(doubt: Fault) -> None:
@@ -144,7 +128,7 @@ def load(
         if doubts is not None:
             doubts.append(doubt)
 
-    body = read_spacecraft(*source(given.path, remark), given.settings, warn)
+    body = read_spacecraft(*text, settings, warn)
     return body if aim is None else aim.applied(body, remark)
 
 
@@ -164,103 +148,6 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
     return example_text(), "example.yaml"
 
 
-JITTER_SEED = 1
-"""Of the errors of the Sun pulses from which blocks are fired: the same in every run."""
-
-
-class Flown(NamedTuple):
-    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, else the recommended plan."""
-
-    scheme: str | None
-    schedule: str | None
-
-
-def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme`` and ``--schedule``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
-
-    ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
-    A usage error for both.
-    """
-    default = f"{verb} this scheme with default options; without it the recommended one."
-
-    def decorate(command: Command) -> Command:
-        @functools.wraps(command)
-        def gathered(*args: Any, scheme: str | None, schedule: str | None, **parameters: Any) -> Any:
-            if scheme is not None and schedule is not None:
-                raise click.UsageError(f"name what to {verb.lower()}: either --scheme or --schedule")
-            return command(*args, flown=Flown(scheme, schedule), **parameters)
-
-        read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
-        option = click.option("--schedule", type=FILE, help=read)(gathered)
-        return cast(Command, click.option("--scheme", type=SchemeName(NAMES), help=scheme or default)(option))
-
-    return decorate
-
-
-def plan_or_read(
-    body: Spacecraft,
-    flown: Flown,
-    options: Options,
-    remark: Callable[[str], None],
-    *,
-    quiet: bool,
-) -> Plan:
-    """What a command flies, as a plan; raises Infeasible where there is none."""
-    scheme, schedule = flown
-    from nutdamp import planning
-    from nutdamp.cli.progress import working
-    from nutdamp.comparison import compare, usual
-    from nutdamp.errors import Infeasible
-    from nutdamp.remarks import infeasibility
-    from nutdamp.remarks import remarks as sentences
-
-    expect_read(() if schedule else (scheme,) if scheme else usual(body), options, body, remark)
-    if schedule is not None:
-        from nutdamp.files.schedule_file import read_plan
-
-        read, warnings = read_plan(schedule, body, options.of(SchemeOptions))
-        for warning in warnings:
-            remark(f"warning: {warning}")
-        return read
-    with working("planning", quiet=quiet):
-        if scheme:
-            plan: Plan | None = planning.plan(body, scheme, options)
-        else:
-            from nutdamp.presentation import verdicts
-
-            compared = compare(body, usual(body), options)
-            plan = compared.recommended
-            show_failures(compared)
-            if plan is not None:
-                remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
-            for warning in verdicts.warnings(compared):
-                remark(f"warning: {warning}")
-    if plan is None:
-        raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
-    if not plan.feasible:
-        raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
-    for text in sentences(plan):
-        remark(text)
-    return plan
-
-
-def fire_blocks(path: str, body: Spacecraft, options: Options, remark: Callable[[str], None]) -> Plan:
-    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
-    from nutdamp.errors import printable
-    from nutdamp.files.blocks_csv import read_blocks
-    from nutdamp.planning import Plan
-    from nutdamp.remarks import broken_limits
-    from nutdamp.schemes.tools.sun_pulses import fired
-
-    blocks, warnings = read_blocks(path, body)
-    if body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
-        remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
-    made = fired(body, blocks, JITTER_SEED)
-    for warning in (*warnings, *broken_limits(body, made)):
-        remark(f"warning: {warning}")
-    return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)
-
-
 def require_dispersions(body: Spacecraft) -> None:
     """Raises BadRequest, which shows what to write, for a spacecraft without dispersions."""
     from nutdamp.errors import BadRequest
@@ -275,54 +162,3 @@ def require_loop(body: Spacecraft) -> None:
 
     if body.loop is None:
         raise BadRequest(LOOP)
-
-
-def remarks(quiet: bool) -> Callable[[str], None]:
-    """Prints remarks on standard error, unless ``quiet``."""
-    return (lambda _: None) if quiet else say
-
-
-def expect_places(*paths: str | None) -> None:
-    """Say at once, not after the work, that a file cannot be written where it is to be."""
-    from nutdamp.files.output import check_place
-
-    for path in paths:
-        if path is not None:
-            check_place(path)
-
-
-def deliver(
-    outputs: Sequence[Output], *screens: Callable[[], RenderableType], unsaved: Sequence[CannotWrite] = ()
-) -> None:
-    """Write the files requested, and show results on standard output.
-
-    A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
-    those that are ``unsaved`` already. Raises CannotWrite.
-    """
-    failures = list(unsaved)
-    # All is made before anything is written: what cannot be made leaves nothing behind.
-    contents = [(path, _file_of(make())) for path, make in outputs if path is not None]
-    results = [make() for make in screens]
-    if contents:
-        from nutdamp.errors import CannotWrite
-        from nutdamp.files.output import write_whole
-
-        for path, content in contents:
-            try:
-                write_whole(path, content)
-            except CannotWrite as wrong:
-                failures.append(wrong)
-    for result in results:
-        show(result)
-    for failure in failures[:-1]:
-        say(f"nutdamp: {failure}")
-    if failures:
-        raise failures[-1]
-
-
-def _file_of(content: File | dict[str, Any]) -> File:
-    if not isinstance(content, dict):
-        return content
-    from nutdamp.files.output import json_text
-
-    return json_text(content)

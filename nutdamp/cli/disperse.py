@@ -4,41 +4,31 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from nutdamp.cli.boundary import REQUIREMENT_MISSED, interruption
-from nutdamp.cli.common import (
-    Flown,
-    Input,
-    deliver,
-    expect_picture,
-    expect_places,
-    flown_options,
-    load,
-    plan_or_read,
-    plot_options,
-    quiet_option,
-    remarks,
-    require_dispersions,
-    spacecraft_argument,
-)
+from nutdamp.cli.boundary import interruption, leave
+from nutdamp.cli.common import Input, plot_options, quiet_option, require_dispersions, spacecraft_argument
+from nutdamp.cli.flown import Flown, flown_options, plan_or_read
 from nutdamp.cli.impulses import expect_impulses, impulse_options
+from nutdamp.cli.job import Job, Output, begin
 from nutdamp.cli.parameters import FILE, Count
-from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from nutdamp.dispersion.statistics import Array
     from nutdamp.dispersion.study import Collect, Results, Study
     from nutdamp.errors import CannotWrite
+    from nutdamp.planning import Plan
 
 SAMPLES = 20_000
 """Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
@@ -95,53 +85,57 @@ def command(
     if real and impulses:
         raise click.UsageError("--flown or --impulses: the cases are flown in one way")
     expect_impulses(impulses, force, True, "disperse")
-    if case is not None and (csv or plot or resume):
-        raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
-    if resume == "-":
-        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
-    silent = expect_outputs(spacecraft, flown.schedule, csv=csv, json=json, plot=plot, resume=resume)
-    expect_picture(plot, figure)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark, aim)
-    expect_places(csv, json, plot, resume)
+    files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
+    _expect_study(case, files)
+    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, figure=figure, **files)
+    require_dispersions(job.spacecraft)
+    plan = plan_or_read(job, flown, options)
 
-    require_dispersions(body)
-    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
+    from nutdamp.files.dispersion_json import dispersion_json
 
-    from nutdamp.dispersion import study_of
-
-    study = study_of(body, plan.pulses, seed=seed, flown=not impulses)
-    if impulses:
-        from nutdamp.dispersion.agreement import check_impulses
-
-        remark(check_impulses(study, force=force))
+    study, note = study_of_cases(plan, seed, impulses=impulses, force=force)
+    if note:
+        job.remark(note)
     if case is not None:
-        _one_case(study, case - 1, plan.scheme, json, silent)
+        _one_case(job, study, case - 1, plan.scheme, json)
         return
     results, unsaved, stopped_by = fly(study, samples, threads, csv, resume, quiet)
-
-    def data() -> dict[str, Any]:
-        from nutdamp.files.dispersion_json import dispersion_json
-
-        return dispersion_json(results, scheme=plan.scheme, worst=worst)
-
-    def picture() -> bytes:
-        from nutdamp.presentation import figures
-
-        assert plot is not None
-        return figures.rendered(figures.dispersion_figure(figure, results, scheme=plan.scheme), plot)
-
-    def screen() -> RenderableType:
-        from nutdamp.presentation.dispersion_tables import dispersion_screen
-
-        return dispersion_screen(results, scheme=plan.scheme, worst=worst, nominal=study.nominal)
-
-    deliver([(json, data), (plot, picture)], *[screen] * (not silent), unsaved=unsaved)
+    data = partial(dispersion_json, results, scheme=plan.scheme, worst=worst)
+    outputs: list[Output] = [(json, data), (plot, partial(_picture, results, figure, plan.scheme))]
+    job.deliver(outputs, partial(_screen, results, plan.scheme, worst), unsaved=unsaved)
     if stopped_by is not None and results.done < results.requested:
         say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
-    if results.meets_requirement is False:
-        sys.exit(REQUIREMENT_MISSED)
+    leave(missed=results.meets_requirement is False)
+
+
+def _expect_study(case: int | None, files: Mapping[str, str | None]) -> None:
+    """A usage error for files of a study where a single ``case`` is shown, or which cannot be read again."""
+    if case is not None and (files["csv"] or files["plot"] or files["resume"]):
+        raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
+    if files["resume"] == "-":
+        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
+
+
+def _picture(results: Results, figure: str, scheme: str) -> Figure:
+    from nutdamp.presentation import figures
+
+    return figures.dispersion_figure(figure, results, scheme=scheme)
+
+
+def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
+    from nutdamp.presentation.dispersion_tables import dispersion_screen
+
+    return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
+
+
+def study_of_cases(plan: Plan, seed: int, *, impulses: bool, force: bool) -> tuple[Study, str]:
+    """The study of a plan, and how far ``impulses`` err with it, if they are used; raises as `check_impulses` does."""
+    from nutdamp.dispersion import study_of
+    from nutdamp.dispersion.agreement import check_impulses
+
+    study = study_of(plan.spacecraft, plan.pulses, seed=seed, flown=not impulses)
+    return study, check_impulses(study, force=force) if impulses else ""
 
 
 class Run(NamedTuple):
@@ -219,21 +213,19 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
             raise full
 
 
-def _one_case(study: Study, case: int, scheme: str, json: str | None, silent: bool) -> None:
+def _one_case(job: Job, study: Study, case: int, scheme: str, json: str | None) -> None:
     """Show a single case, by the impulse sum and flown."""
     from nutdamp.dispersion.single import flown_outputs
+    from nutdamp.files.dispersion_json import case_json
+    from nutdamp.presentation.dispersion_tables import case_screen
 
     draws = study.draws_of(case)
 
     def data() -> dict[str, Any]:
-        from nutdamp.files.dispersion_json import case_json
-
         return {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
 
     def screen() -> RenderableType:
-        from nutdamp.presentation.dispersion_tables import case_screen
-
         flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
         return case_screen(study, case, draws, flown, scheme=scheme)
 
-    deliver([(json, data)], *[screen] * (not silent))
+    job.deliver([(json, data)], screen)

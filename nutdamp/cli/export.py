@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import shlex
-import sys
 
 import click
 
-from nutdamp.cli.boundary import REQUIREMENT_MISSED
-from nutdamp.cli.common import (
-    Flown,
-    Input,
-    deliver,
-    expect_places,
-    flown_options,
-    load,
-    plan_or_read,
-    quiet_option,
-    remarks,
-    spacecraft_argument,
-)
-from nutdamp.cli.parameters import FILE, Named, Quantity
-from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.boundary import leave
+from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
+from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.job import begin, deliver
+from nutdamp.cli.parameters import FILE, EndTime, Named
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text, lacking
 from nutdamp.schemes import PLANNED, Options
@@ -42,7 +31,7 @@ from nutdamp.schemes import PLANNED, Options
 @goal_options
 @click.option(
     "--until",
-    type=Quantity("time"),
+    type=EndTime(),
     help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
 )
 @click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
@@ -68,23 +57,18 @@ def command(
     from nutdamp.decision import Decision
 
     form = _format(form, spacecraft, ctx.args)
-    if until is not None and until <= 0.0:
-        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    expect_outputs(spacecraft, flown.schedule, output=output)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark, aim)
-    expect_places(output)
-    plan = plan_or_read(body, flown, options, remark, quiet=quiet)
+    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, output=output)
+    plan = plan_or_read(job, flown, options)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
     missing = lacking(plan, form)
     if missing is not None:
-        remark(f"warning: {missing}")
+        job.warn([missing])
     if output != "-":
-        remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
+        job.remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
     if Decision(plan).met is False and (flown.scheme is None or flown.scheme in PLANNED):
-        remark(f"{plan.scheme} does not meet the requirement")
-        sys.exit(REQUIREMENT_MISSED)
+        job.remark(f"{plan.scheme} does not meet the requirement")
+        leave(missed=True)
 
 
 def _format(form: str | None, spacecraft: Input, more: list[str]) -> str:

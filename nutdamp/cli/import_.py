@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from nutdamp.cli.common import deliver, quiet_option, remarks
+from nutdamp.cli.common import quiet_option
+from nutdamp.cli.job import deliver, remarks
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.common import DEFAULT_FILE, quiet_option, remarks
+from nutdamp.cli.common import DEFAULT_FILE, quiet_option
+from nutdamp.cli.job import remarks
 from nutdamp.cli.parameters import FILE
 
 

@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, REQUIREMENT_MISSED
-from nutdamp.cli.common import (
-    Input,
-    Output,
-    deliver,
-    expect_picture,
-    expect_places,
-    load,
-    quiet_option,
-    remarks,
-    require_loop,
-    spacecraft_argument,
-)
-from nutdamp.cli.parameters import FILE, Quantity
-from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.boundary import leave
+from nutdamp.cli.common import Input, quiet_option, require_loop, spacecraft_argument
+from nutdamp.cli.job import Output, begin, expect_picture
+from nutdamp.cli.parameters import FILE, EndTime
 from nutdamp.cli.screen import say
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from matplotlib.figure import Figure
+
+    from nutdamp.loop.plan import LoopPlan
+    from nutdamp.loop.run import Run
+    from nutdamp.spacecraft import Spacecraft
 
 
 @click.command("loop")
 @spacecraft_argument
-@click.option("--until", type=Quantity("time"), help="End; default: the horizon after the nutation is at start.")
+@click.option("--until", type=EndTime(), help="End; default: the horizon after the nutation is at start.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the noise of the sensor.")
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
@@ -60,72 +53,58 @@ def command(
     A channel wired backwards, a reversed sensor and firings that come too late are found and named before they feed
     the nutation for more than a period: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    if until is not None and until <= 0.0:
-        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
-    silent = expect_outputs(spacecraft, csv=csv, track=track, json=json, plot=plot, map=mapped)
-    expect_picture(plot)
     drawn = mapped is not None and Path(mapped).suffix.lower() not in ("", ".csv")
     if drawn:
         expect_picture(mapped)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark)
-    expect_places(csv, track, json, plot, mapped)
+    job = begin(spacecraft, quiet=quiet, csv=csv, track=track, json=json, plot=plot, map=mapped)
+    body = job.spacecraft
+    require_loop(body)
 
     from nutdamp.cli.progress import working
+    from nutdamp.files.loop_json import loop_json
+    from nutdamp.files.pulses_csv import pulses_csv
     from nutdamp.loop.plan import loop_of
     from nutdamp.presentation.loop_tables import loop_screen, stopped, warnings
 
-    require_loop(body)
     with working("flying", quiet=quiet):
         plan = loop_of(body, until, seed=seed)
     run = plan.flown_run
-
-    def pulses() -> str:
-        from nutdamp.files.pulses_csv import pulses_csv
-
-        return pulses_csv(run.flight)
-
-    def rows() -> Callable[[IO[bytes]], None]:
-        from nutdamp.files.track_csv import write_track
-
-        return lambda stream: write_track(stream, run.flight.pieces(samples, run.until), body.inertia)
-
-    def data() -> dict[str, Any]:
-        from nutdamp.files.loop_json import loop_json
-
-        return loop_json(plan)
-
-    def picture() -> bytes:
-        from nutdamp.presentation import figures
-        from nutdamp.presentation.figures.loop import loop_figure
-
-        assert plot is not None
-        return figures.rendered(loop_figure(plan), plot)
-
-    def regions() -> str | bytes:
-        from nutdamp.files.loop_json import map_csv
-        from nutdamp.loop.stability import delay_map
-
-        assert body.loop is not None
-        found = delay_map(body, body.loop)
-        if not drawn:
-            return map_csv(found)
-        from nutdamp.presentation import figures
-        from nutdamp.presentation.figures.loop import map_figure
-
-        assert mapped is not None
-        return figures.rendered(map_figure(found, body.inertia.C / body.inertia.A), mapped)
-
-    def screen() -> RenderableType:
-        return loop_screen(plan)
-
-    if silent:
-        for warning in warnings(body):
-            remark(f"warning: {warning}")
-    outputs: list[Output] = [(csv, pulses), (track, rows), (json, data), (plot, picture), (mapped, regions)]
-    deliver(outputs, *[screen] * (not silent))
+    if job.silent:
+        job.warn(warnings(body))
+    outputs: list[Output] = [
+        (csv, lambda: pulses_csv(run.flight)),
+        (track, partial(_rows, run, samples)),
+        (json, lambda: loop_json(plan)),
+        (plot, partial(_picture, plan)),
+        (mapped, partial(_map, body, drawn)),
+    ]
+    job.deliver(outputs, lambda: loop_screen(plan))
     if run.stop.fault:
         say(f"nutdamp: the loop was stopped {stopped(run)}")
-        sys.exit(INFEASIBLE)
-    if plan.meets_requirement is False:
-        sys.exit(REQUIREMENT_MISSED)
+    leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
+
+
+def _rows(run: Run, samples: int) -> Callable[[IO[bytes]], None]:
+    from nutdamp.files.track_csv import write_track
+
+    return lambda stream: write_track(stream, run.flight.pieces(samples, run.until), run.flight.spacecraft.inertia)
+
+
+def _picture(plan: LoopPlan) -> Figure:
+    from nutdamp.presentation.figures.loop import loop_figure
+
+    return loop_figure(plan)
+
+
+def _map(body: Spacecraft, drawn: bool) -> str | Figure:
+    """Where delay and C/A let the loop damp: a table, or drawn."""
+    from nutdamp.files.loop_json import map_csv
+    from nutdamp.loop.stability import delay_map
+
+    assert body.loop is not None
+    found = delay_map(body, body.loop)
+    if not drawn:
+        return map_csv(found)
+    from nutdamp.presentation.figures.loop import map_figure
+
+    return map_figure(found, body.inertia.C / body.inertia.A)

@@ -113,6 +113,20 @@ class Quantity(ParamType[float]):
         return self.kind.upper()
 
 
+class EndTime(Quantity):
+    """A time after t = 0."""
+
+    def __init__(self) -> None:
+        super().__init__("time")
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The time in s; a usage error for anything else."""
+        time = super().convert(value, param, ctx)
+        if time <= 0.0:
+            self.fail("expected a time after t = 0", param, ctx)
+        return time
+
+
 class FinalSpin(Quantity):
     """A rate, or ``keep``."""
 

@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED
+from nutdamp.cli.boundary import leave
 from nutdamp.cli.common import (
     FIGURES,
     Input,
-    Output,
-    deliver,
-    expect_picture,
-    expect_places,
-    load,
     plot_options,
     quiet_option,
-    remarks,
     require_dispersions,
     spacecraft_argument,
 )
 from nutdamp.cli.failures import show_failures
+from nutdamp.cli.flown import compared_with
 from nutdamp.cli.impulses import expect_impulses, impulse_options
+from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, SchemeName
-from nutdamp.cli.places import expect_outputs
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options, scheme_options
+from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options, scheme_options
 from nutdamp.cli.screen import say
 from nutdamp.errors import BadRequest
 from nutdamp.schemes import PLANNED, Options
 from nutdamp.words import listed
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from nutdamp.comparison import Comparison
@@ -87,68 +82,44 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    names = tuple(dict.fromkeys(names))
     expect_impulses(impulses, force, robust, "--robust")
-    one_plan = plot if figure != SCHEMES else None
-    for option, path in (("--csv", csv), ("--plot", one_plan)):
-        if path is not None and len(names) > 1:
-            raise click.UsageError(f"{option} writes one schedule: name one --scheme, or none for the recommended one")
-    silent = expect_outputs(spacecraft, csv=csv, blocks=blocks, table=table, json=json, plot=plot)
-    expect_picture(plot, figure)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark, aim)
-    expect_places(csv, blocks, table, json, plot)
-
+    one_plan, all_plans = (None, plot) if figure == SCHEMES else (plot, None)
+    _expect_one_scheme(names, csv=csv, plot=one_plan)
+    files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "plot": plot}
+    job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
     if robust:
-        require_dispersions(body)
+        require_dispersions(job.spacecraft)
 
-    from nutdamp.cli.progress import working
-    from nutdamp.comparison import compare, usual
     from nutdamp.decision import decide
+    from nutdamp.presentation import verdicts
 
-    names = names or usual(body)
-    expect_read(names, options, body, remark)
-    with working("planning", quiet=quiet):
-        compared = compare(body, names, options)
+    compared = compared_with(job, names, options)
     dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
-    for path in (csv, blocks, one_plan):
-        if path is not None and chosen is None:
-            say(f"{path} was not written: no plan is feasible")
-    commanded = None if blocks is None else _commanded(compared, chosen, remark)
+    for path in filter(None, () if chosen else (csv, blocks, one_plan)):
+        say(f"{path} was not written: no plan is feasible")
+    outputs: list[Output] = [
+        (json, partial(_data, compared, decided, dispersed)),
+        (table, partial(_schemes, compared, decided)),
+        (all_plans, partial(_schemes_picture, compared, decided)),
+        *_outputs_of(chosen, csv, one_plan, figure),
+        *_outputs_of_blocks(compared, chosen, blocks, job.remark),
+    ]
+    if job.silent:
+        job.warn(verdicts.warnings(compared))
+    job.deliver(outputs, partial(_screen, compared, dispersed))
+    missed = decided is not None and decided.met is False
+    leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
-    def data() -> dict[str, Any]:
-        from nutdamp.library.views import comparison_data
 
-        made = comparison_data(compared, decided)
-        if dispersed is None:
-            return made
-        from nutdamp.files.robust_json import robust_json
-        from nutdamp.presentation import verdicts
-
-        return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
-
-    outputs: list[Output] = [(json, data), (table, partial(_schemes, compared, decided))]
-    if chosen is not None:
-        outputs.append((csv, partial(_pulses, chosen)))
-        outputs.append((one_plan, partial(_picture, chosen, figure, one_plan)))
-    if commanded is not None:
-        outputs.append((blocks, partial(_blocks, commanded)))
-    if figure == SCHEMES:
-        outputs.append((plot, partial(_schemes_picture, compared, decided, plot)))
-    if silent:
-        from nutdamp.presentation import verdicts
-
-        for warning in verdicts.warnings(compared):
-            remark(f"warning: {warning}")
-    deliver(outputs, *[partial(_screen, compared, dispersed)] * (not silent))
-    if show_failures(compared):
-        sys.exit(INTERNAL)
-    if chosen is None:
-        sys.exit(INFEASIBLE)
-    if decided is not None and decided.met is False:
-        sys.exit(REQUIREMENT_MISSED)
+def _expect_one_scheme(names: Sequence[str], **written: str | None) -> None:
+    """A usage error where the pulses of one plan are to be written, and several schemes are named."""
+    for option, path in written.items():
+        if path is not None and len(set(names)) > 1:
+            raise click.UsageError(
+                f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
+            )
 
 
 def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: bool, force: bool) -> RobustComparison:
@@ -161,30 +132,45 @@ def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: 
         return robust.compare(compared, trials, advance, impulses=impulses, force=force)
 
 
-def _commanded(compared: Comparison, chosen: Plan | None, remark: Callable[[str], None]) -> Plan | None:
-    """The plan whose blocks are written: the one to fly, or else one that was compared; None without any plan.
+def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: str) -> list[Output]:
+    """The files of the plan to fly, if there is one."""
+    if chosen is None:
+        return []
+    from nutdamp.files.pulses_csv import pulses_csv
+
+    return [(csv, partial(pulses_csv, chosen.flight)), (plot, partial(_picture, chosen, figure))]
+
+
+def _outputs_of_blocks(
+    compared: Comparison, chosen: Plan | None, path: str | None, remark: Callable[[str], None]
+) -> list[Output]:
+    """The file of command blocks: of the plan to fly, or else of one that was compared; none without any plan.
 
     Raises BadRequest where plans have pulses, but no blocks.
     """
-    plans = [one for one in (chosen, *compared) if one is not None and one.feasible]
+    plans: list[Plan] = [one for one in (chosen, *compared) if one is not None and one.feasible]
+    if path is None or not plans:
+        return []
     found = next((one for one in plans if one.pulses.blocks), None)
-    if plans and found is None:
+    if found is None:
         raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
-    if found is not None and found is not chosen:
+    if found is not chosen:
         remark(f"writing the blocks of {found.scheme}, which is not the recommended plan")
-    return found
-
-
-def _pulses(chosen: Plan) -> str:
-    from nutdamp.files.pulses_csv import pulses_csv
-
-    return pulses_csv(chosen.flight)
-
-
-def _blocks(chosen: Plan) -> str:
     from nutdamp.files.blocks_csv import blocks_csv
 
-    return blocks_csv(chosen.flight)
+    return [(path, partial(blocks_csv, found.flight))]
+
+
+def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:
+    from nutdamp.library.views import comparison_data
+
+    made = comparison_data(compared, decided)
+    if dispersed is None:
+        return made
+    from nutdamp.files.robust_json import robust_json
+    from nutdamp.presentation import verdicts
+
+    return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
 
 
 def _schemes(compared: Comparison, decided: Decision | None) -> str:
@@ -193,18 +179,16 @@ def _schemes(compared: Comparison, decided: Decision | None) -> str:
     return schemes_csv(compared, decided)
 
 
-def _picture(chosen: Plan, figure: str, path: str | None) -> bytes:
+def _picture(chosen: Plan, figure: str) -> Figure:
     from nutdamp.presentation import figures
 
-    assert path is not None
-    return figures.plan_picture(figure, chosen, path)
+    return figures.flight_figure(figure, *figures.shown(chosen))
 
 
-def _schemes_picture(compared: Comparison, decided: Decision | None, path: str | None) -> bytes:
+def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
     from nutdamp.presentation import figures
 
-    assert path is not None
-    return figures.rendered(figures.schemes_figure(compared, decided), path)
+    return figures.schemes_figure(compared, decided)
 
 
 def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Callable
@@ -9,31 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, INTERNAL, REQUIREMENT_MISSED, interruption
-from nutdamp.cli.common import (
-    Input,
-    deliver,
-    expect_places,
-    quiet_option,
-    remarks,
-    require_dispersions,
-    source,
-    spacecraft_argument,
-)
-from nutdamp.cli.disperse import SAMPLES, fly
+from nutdamp.cli.boundary import interruption, leave
+from nutdamp.cli.common import Input, quiet_option, require_dispersions, spacecraft_argument
+from nutdamp.cli.disperse import SAMPLES, fly, study_of_cases
 from nutdamp.cli.failures import show_failures
+from nutdamp.cli.flown import compared_with
 from nutdamp.cli.impulses import expect_impulses, impulse_options
+from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
-from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.progress import working
-from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, expect_read, goal_options
+from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, goal_options
+from nutdamp.cli.trade import trade_with
 from nutdamp.schemes import PLANNED, Options
+from nutdamp.schemes.options import LEAST
 
 if TYPE_CHECKING:
     from nutdamp.comparison import Comparison
     from nutdamp.dispersion.study import Results
-    from nutdamp.fronts import Front
-    from nutdamp.spacecraft import Spacecraft
 
 
 POINTS = 6
@@ -125,55 +118,33 @@ def command(
     from nutdamp.presentation.page.formats import form_of
 
     form_of(output)
-    expect_outputs(spacecraft, output=output)
     expect_impulses(impulses, force, disperse is not None, "--disperse")
-    remark = remarks(quiet)
-    text, name = source(spacecraft.path, remark)
+    job = begin(spacecraft, aim=aim, quiet=quiet, output=output)
 
-    from nutdamp.comparison import compare, usual
-    from nutdamp.files.spacecraft_file import read_spacecraft
     from nutdamp.files.yaml_tree import dotted
     from nutdamp.library.reports import controlled, made_of
     from nutdamp.presentation.page.content import Repeat
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
+    text, name = job.source
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
-    body = aim.applied(read_spacecraft(text, name, spacecraft.settings, lambda doubt: remark(doubt.as_warning)), remark)
-    expect_places(output)
     if disperse is not None:
-        require_dispersions(body)
-    schemes = tuple(dict.fromkeys(names)) or usual(body)
-    expect_read(schemes, options, body, remark)
-    with working("planning", quiet=quiet):
-        compared = compare(body, schemes, options)
-    chosen, note = compared.recommended, ""
+        require_dispersions(job.spacecraft)
+    compared = compared_with(job, names, options)
     dispersed: dict[str, Results] = {}
-    if chosen is not None and disperse is not None:
+    note = ""
+    if compared.recommended is not None and disperse is not None:
         dispersed, note = _dispersed(compared, disperse, impulses=impulses, force=force, quiet=quiet)
-    fronts = () if trade is None else _traded(body, trade, options, quiet)
+    fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
         made = made_of(compared, repeat, output, dispersed, note, kept, fronts)
     deliver([(output, lambda: made.content)])
     if not made.good:
-        remark(made.verdict)
+        job.remark(made.verdict)
     if output != "-":
-        remark(f"wrote {output}")
-    if show_failures(compared):
-        sys.exit(INTERNAL)
-    if chosen is None:
-        sys.exit(INFEASIBLE)
-    if made.met is False:
-        sys.exit(REQUIREMENT_MISSED)
-
-
-def _traded(body: Spacecraft, points: int, options: Options, quiet: bool) -> tuple[Front, ...]:
-    """Fronts of time against cost, with a bar."""
-    from nutdamp.cli.progress import progress
-    from nutdamp.library.studies import trade
-
-    with progress("searching", 2 * points, quiet=quiet) as step:
-        return trade(body, points, with_disturbances=options.with_disturbances, progress=step).fronts
+        job.remark(f"wrote {output}")
+    leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=made.met is False)
 
 
 def _dispersed(
@@ -183,19 +154,16 @@ def _dispersed(
 
     Of the others none is there whose cases cannot be flown. Interrupted, nothing is written.
     """
-    from nutdamp.dispersion import study_of
+    from nutdamp.dispersion import SEED
     from nutdamp.errors import BadRequest, Infeasible
     from nutdamp.library.reports import feasible_first
 
     found: dict[str, Results] = {}
     notes = []
     for plan in feasible_first(compared):
-        study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
         try:
-            if impulses:
-                from nutdamp.dispersion.agreement import check_impulses
-
-                notes.append(check_impulses(study, force=force))
+            study, note = study_of_cases(plan, SEED, impulses=impulses, force=force)
+            notes.append(note)
             results, _, stopped_by = fly(study, samples, None, None, None, quiet)
         except (BadRequest, Infeasible):
             if not found:

@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.common import (
-    FIGURES,
-    Flown,
-    Input,
-    deliver,
-    expect_picture,
-    expect_places,
-    fire_blocks,
-    flown_options,
-    load,
-    plan_or_read,
-    plot_options,
-    quiet_option,
-    remarks,
-    spacecraft_argument,
-)
-from nutdamp.cli.parameters import FILE, Quantity
-from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.common import FIGURES, Input, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.flown import Flown, fire_blocks, flown_options, plan_or_read
+from nutdamp.cli.job import Output, begin
+from nutdamp.cli.parameters import FILE, EndTime
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.schemes import Options
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
+
+    from nutdamp.simulation import Simulation
+    from nutdamp.track import Track
 
 
 PICTURED = 100_000
@@ -47,7 +37,7 @@ PICTURED = 100_000
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(
     "--until",
-    type=Quantity("time"),
+    type=EndTime(),
     help="End, of which the outcome is shown; default last pulse + one inertial period.",
 )
 @click.option(
@@ -79,71 +69,57 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
     example. A FILE of - is standard output, for --schedule standard input.
     """
-    if until is not None and until <= 0.0:
-        raise click.BadParameter("expected a time after t = 0", param_hint="--until")
     if blocks is not None and flown != (None, None):
         raise click.UsageError("name what to propagate: one of --scheme, --schedule and --blocks")
-    silent = expect_outputs(spacecraft, flown.schedule, blocks, csv=csv, json=json, plot=plot)
-    if drawn and silent:
+    if drawn and "-" in (csv, json, plot):
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
-    expect_picture(plot, figure)
-    remark = remarks(quiet)
-    body = load(spacecraft, remark, aim)
-    expect_places(csv, json, plot)
+    job = begin(spacecraft, flown.schedule, blocks, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
+    plan = plan_or_read(job, flown, options) if blocks is None else fire_blocks(job, blocks, options)
 
-    from nutdamp import flight
-    from nutdamp.decision import Decision
-    from nutdamp.outcome import seen_at
     from nutdamp.presentation.geometry import shown_until
-    from nutdamp.track import extremes
+    from nutdamp.presentation.verdicts import model_warnings
+    from nutdamp.simulation import Simulation
 
-    if blocks is None:
-        plan = plan_or_read(body, flown, options, remark, quiet=quiet)
-    else:
-        plan = fire_blocks(blocks, body, options, remark)
-    pulses = plan.pulses
-    end = pulses.end + body.inertial_period if until is None else until
-    flights = flight.by_impulses(body, pulses, end), flight.flown(body, pulses, end)
-    ends = tuple(seen_at(one, end) for one in flights)
-    moving, chosen = flights[real], replace(ends[real], scheme=plan.scheme)
-    pictured = shown_until(body, pulses) if until is None else until
-    found, decided = extremes(moving.pieces(samples, end)), Decision(plan, seen=ends[1])
-    track = moving.sampled(min(samples, PICTURED), pictured) if plot is not None or drawn else None
+    body, pulses = plan.spacecraft, plan.pulses
+    made = Simulation(plan, pulses.end + body.inertial_period if until is None else until, real, samples)
+    if job.silent:
+        job.warn(model_warnings(made.impulses, made.flown))
+    track = None
+    if plot is not None or drawn:
+        track = made.track(min(samples, PICTURED), shown_until(body, pulses) if until is None else until)
+    outputs: list[Output] = [(csv, partial(_rows, made)), (json, partial(_data, made))]
+    outputs.append((plot, partial(_picture, made, track, figure)))
+    job.deliver(outputs, partial(_screen, made), *[partial(_drawing, made, track)] * drawn)
 
-    def rows() -> Callable[[IO[bytes]], None]:
-        from nutdamp.files.track_csv import write_track
 
-        return lambda stream: write_track(stream, moving.pieces(samples, end), body.inertia)
+def _rows(made: Simulation) -> Callable[[IO[bytes]], None]:
+    from nutdamp.files.track_csv import write_track
 
-    def data() -> dict[str, Any]:
-        from nutdamp.files.simulation_json import simulation_json
-        from nutdamp.presentation.decisions import verdict
+    return lambda stream: write_track(stream, made.pieces(), made.plan.spacecraft.inertia)
 
-        return simulation_json(chosen, found, ends[0], decided, verdict(decided), real=real)
 
-    def picture() -> bytes:
-        from nutdamp.presentation import figures
+def _data(made: Simulation) -> dict[str, Any]:
+    from nutdamp.files.simulation_json import simulation_json
+    from nutdamp.presentation.decisions import verdict
 
-        assert plot is not None
-        assert track is not None
-        return figures.picture(figure, chosen, track, plot)
+    return simulation_json(made, verdict(made.decision))
 
-    def screen() -> RenderableType:
-        from nutdamp.presentation.simulate_tables import simulation_screen
 
-        how = f"{plan.scheme}, propagated by the {chosen.model}"
-        return simulation_screen(chosen, found, ends[0], decided, how=how)
+def _picture(made: Simulation, track: Track | None, figure: str) -> Figure:
+    from nutdamp.presentation import figures
 
-    def drawing() -> RenderableType:
-        from nutdamp.presentation.terminal import motion_drawing
+    assert track is not None
+    return figures.flight_figure(figure, made.shown, track)
 
-        assert track is not None
-        return motion_drawing(chosen, track)
 
-    if silent:
-        from nutdamp.presentation.verdicts import model_warnings
+def _screen(made: Simulation) -> RenderableType:
+    from nutdamp.presentation.simulate_tables import simulation_screen
 
-        for warning in model_warnings(*ends):
-            remark(f"warning: {warning}")
-    screens = [*[screen] * (not silent), *[drawing] * drawn]
-    deliver([(csv, rows), (json, data), (plot, picture)], *screens)
+    return simulation_screen(made)
+
+
+def _drawing(made: Simulation, track: Track | None) -> RenderableType:
+    from nutdamp.presentation.terminal import motion_drawing
+
+    assert track is not None
+    return motion_drawing(made.shown, track)

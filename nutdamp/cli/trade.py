@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import math
-import sys
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE
-from nutdamp.cli.common import (
-    Input,
-    Output,
-    deliver,
-    expect_picture,
-    expect_places,
-    load,
-    quiet_option,
-    remarks,
-    spacecraft_argument,
-)
+from nutdamp.cli.boundary import leave
+from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Job, Output, begin, remarks
 from nutdamp.cli.parameters import FILE, FOLDER, Bare, Named, Quantity, reading_of
-from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
 from nutdamp.schemes.options import LEAST, Options
 from nutdamp.schemes.registry import OPTIMAL
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from nutdamp.errors import CannotWrite
+    from nutdamp.fronts import Front
+    from nutdamp.library.studies import Trade
 
 
 class Allowance(Quantity):
@@ -84,56 +77,59 @@ def command(
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
-    from nutdamp.files.trade_files import schedule_files, schedule_path, trade_csv
+    from nutdamp.files.trade_files import schedule_paths, trade_csv
     from nutdamp.fronts import numbered
-    from nutdamp.library.studies import trade
     from nutdamp.remarks import CUT
 
     shifts = allow or (0.0, math.inf)
     most = points * len(set(shifts))
-    written = [] if schedules is None else [schedule_path(schedules, index) for index in range(1, most + 1)]
-    silent = expect_outputs(spacecraft, csv=csv, json=json, plot=plot, schedules=written)
-    expect_picture(plot)
-    remark = remarks(quiet)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
-            remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
-    body = load(spacecraft, remark, aim)
-    expect_places(csv, json, plot)
-    expect_read((OPTIMAL.name,), options, body, remark)
-
-    from nutdamp.cli.progress import progress
-
-    known = options.with_disturbances
-    with progress("searching", most, quiet=quiet) as step:
-        traded = trade(body, points, shifts, least, with_disturbances=known, progress=step)
+            remarks(quiet)(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
+    paths = [] if schedules is None else schedule_paths(schedules, most)
+    job = begin(spacecraft, aim=aim, quiet=quiet, csv=csv, json=json, plot=plot, schedules=paths)
+    expect_read((OPTIMAL.name,), options, job.spacecraft, job.remark)
+    traded = trade_with(job, points, shifts, least, options)
     found = traded.fronts
     for index, _, point in numbered(found):
         if point.plan.cut:
-            remark(f"point {index}: {CUT}")
+            job.remark(f"point {index}: {CUT}")
+    outputs: list[Output] = [(csv, lambda: trade_csv(found)), (json, traded.to_dict), (plot, partial(_picture, traded))]
+    files, unsaved = ([], []) if schedules is None else _schedules(found, schedules)
+    job.deliver([*outputs, *files], partial(_screen, traded), unsaved=unsaved)
+    leave(infeasible=not any(front.points for front in found))
 
-    def picture() -> bytes:
-        from nutdamp.presentation import figures
 
-        assert plot is not None
-        return figures.rendered(figures.trade_figure(body, found), plot)
+def trade_with(job: Job, points: int, shifts: Sequence[float], least: str, options: Options) -> Trade:
+    """The fronts, with a bar."""
+    from nutdamp.cli.progress import progress
+    from nutdamp.library.studies import trade
 
-    def screen() -> RenderableType:
-        from nutdamp.presentation.trade_tables import trade_screen
+    with progress("searching", points * len(set(shifts)), quiet=job.quiet) as step:
+        known = options.with_disturbances
+        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, progress=step)
 
-        return trade_screen(body, found)
 
-    outputs: list[Output] = [(csv, lambda: trade_csv(found)), (json, traded.to_dict), (plot, picture)]
-    unsaved: list[CannotWrite] = []
-    if schedules is not None:
-        from nutdamp.errors import CannotWrite
-        from nutdamp.files.output import make_folder
+def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
+    """A file of each schedule, or why the folder cannot be made."""
+    from nutdamp.errors import CannotWrite
+    from nutdamp.files.output import make_folder
+    from nutdamp.files.trade_files import schedule_files
 
-        try:
-            make_folder(schedules)
-            outputs += [(path, partial(str, text)) for path, text in schedule_files(found, schedules)]
-        except CannotWrite as wrong:
-            unsaved.append(wrong)
-    deliver(outputs, *[screen] * (not silent), unsaved=unsaved)
-    if not any(front.points for front in found):
-        sys.exit(INFEASIBLE)
+    try:
+        make_folder(folder)
+    except CannotWrite as wrong:
+        return [], [wrong]
+    return [(path, partial(str, text)) for path, text in schedule_files(found, folder)], []
+
+
+def _picture(traded: Trade) -> Figure:
+    from nutdamp.presentation import figures
+
+    return figures.trade_figure(traded.spacecraft, traded.fronts)
+
+
+def _screen(traded: Trade) -> RenderableType:
+    from nutdamp.presentation.trade_tables import trade_screen
+
+    return trade_screen(traded.spacecraft, traded.fronts)

@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from typing import TYPE_CHECKING, Any
-
 import click
 
-from nutdamp.cli.boundary import INFEASIBLE, UNREADABLE
-from nutdamp.cli.common import (
-    Flown,
-    Input,
-    deliver,
-    expect_places,
-    flown_options,
-    load,
-    plan_or_read,
-    quiet_option,
-    remarks,
-    spacecraft_argument,
-)
+from nutdamp.cli.boundary import leave
+from nutdamp.cli.common import Input, quiet_option, require_loop, spacecraft_argument
+from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.job import Job, begin
 from nutdamp.cli.parameters import FILE
-from nutdamp.cli.places import expect_outputs
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import Options
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from nutdamp.spacecraft import Spacecraft
 
 
 @click.command("verify", cls=PlanningCommand)
@@ -55,61 +37,42 @@ def command(
     """
     if looped and flown != (None, None):
         raise click.UsageError("name what to verify: one of --scheme, --schedule and --loop")
-    silent = expect_outputs(spacecraft, flown.schedule, json=json)
-    body = load(spacecraft, remarks(quiet), aim)
-    expect_places(json)
+    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, json=json)
     if looped:
-        _loop(body, json, silent=silent, quiet=quiet)
+        _verify_loop(job, json)
         return
 
     from nutdamp.cli.progress import working
     from nutdamp.library.studies import verify
+    from nutdamp.presentation.verify_tables import verification_screen
 
-    plan = plan_or_read(body, flown, options, remarks(quiet), quiet=quiet)
+    plan = plan_or_read(job, flown, options)
     with working("verifying", quiet=quiet):
         verified = verify(plan)
     found = verified.core
-
-    def screen() -> RenderableType:
-        from nutdamp.presentation.verify_tables import verification_screen
-
-        return verification_screen(body, plan.scheme, found)
-
-    deliver([(json, verified.to_dict)], *[screen] * (not silent))
+    job.deliver([(json, verified.to_dict)], lambda: verification_screen(job.spacecraft, plan.scheme, found))
     if found.disagreeing:
         others = " and ".join(found.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
-        sys.exit(UNREADABLE)
-    if not found.checks:
+    elif not found.checks:
         say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
-        sys.exit(INFEASIBLE)
+    leave(failed=bool(found.disagreeing), infeasible=not found.checks)
 
 
-def _loop(body: Spacecraft, json: str | None, *, silent: bool, quiet: bool) -> None:
+def _verify_loop(job: Job, json: str | None) -> None:
     """The closed loop of the file against the same by DOP853."""
-    from nutdamp.cli.common import require_loop
     from nutdamp.cli.progress import working
-
-    require_loop(body)
+    from nutdamp.files.loop_json import verified_json
     from nutdamp.loop.verify import verify_loop
+    from nutdamp.presentation.loop_tables import verification_screen
 
-    with working("verifying", quiet=quiet):
-        found = verify_loop(body)
-
-    def data() -> dict[str, Any]:
-        from nutdamp.files.loop_json import verified_json
-
-        return verified_json(found)
-
-    def screen() -> RenderableType:
-        from nutdamp.presentation.loop_tables import verification_screen
-
-        return verification_screen(found)
-
-    deliver([(json, data)], *[screen] * (not silent))
+    require_loop(job.spacecraft)
+    with working("verifying", quiet=job.quiet):
+        found = verify_loop(job.spacecraft)
+    job.deliver([(json, lambda: verified_json(found))], lambda: verification_screen(found))
     if found.missing:
         say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {found.missing}")
-        sys.exit(INFEASIBLE)
+        leave(infeasible=True)
     if not found.agree:
         say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
-        sys.exit(UNREADABLE)
+        leave(failed=True)

@@ -7,28 +7,21 @@ from typing import Any
 
 from nutdamp import __version__, outcome
 from nutdamp.aspect import aspects
-from nutdamp.decision import Decision
 from nutdamp.files.decision_json import decision_json
 from nutdamp.files.plan_json import aspects_json, final_json, pulses_json, residual_json, spacecraft_json, target_json
-from nutdamp.flight import Flight
 from nutdamp.physics.attitude import full_turn
-from nutdamp.track import Extremes
+from nutdamp.simulation import Simulation
 
 
-def simulation_json(
-    flight: Flight, found: Extremes, impulses: Flight, decided: Decision, verdict: str, *, real: bool
-) -> dict[str, Any]:
-    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees.
-
-    All flights as `outcome.seen_at` the end of the track; ``flight`` is the one that is ``decided`` on, by real widths,
-    if ``real``, else by ``impulses``.
-    """
-    attitude, flown = flight.spacecraft.attitude, decided.flight
+def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
+    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees."""
+    flight, found, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
+    attitude = flight.spacecraft.attitude
     return {
         "nutdamp": __version__,
         "spacecraft": spacecraft_json(flight.spacecraft),
-        "scheme": decided.plan.scheme,
-        "propagated": "flown" if real else "residual",
+        "scheme": simulation.plan.scheme,
+        "propagated": "flown" if simulation.real else "residual",
         "pulses": pulses_json(flight),
         "residual": residual_json(impulses.residual),
         "flown": residual_json(flown.residual),
@@ -37,7 +30,7 @@ def simulation_json(
         "differ": [one.part.value for one in outcome.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
         **aspects_json(aspects(flight, found.until)),
-        "decision": decision_json(decided, verdict),
+        "decision": decision_json(simulation.decision, verdict),
         "until_s": found.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,

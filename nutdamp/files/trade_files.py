@@ -70,9 +70,11 @@ def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]
 
 def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    return [(schedule_path(folder, index), pulses_csv(point.plan.flight)) for index, _, point in numbered(found)]
+    points = list(numbered(found))
+    paths = schedule_paths(folder, len(points))
+    return [(path, pulses_csv(point.plan.flight)) for path, (_, _, point) in zip(paths, points, strict=True)]
 
 
-def schedule_path(folder: str, index: int) -> str:
-    """Where the pulses of the point ``index`` (from 1) go."""
-    return str(Path(folder) / f"point-{index}.csv")
+def schedule_paths(folder: str, count: int) -> list[str]:
+    """Where the pulses of ``count`` points go."""
+    return [str(Path(folder) / f"point-{index}.csv") for index in range(1, count + 1)]

@@ -98,10 +98,8 @@ def integrate(
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
-    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
     jerk = None if slope is None else slope / inertia
-    if jerk is not None:
-        strength = max(strength, float(np.linalg.norm(acceleration + jerk * (end - start))))
+    strength = _strength(acceleration, jerk, forcing, min(moments), end - start)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     if moments[0] == moments[1] and forcing.growth == 0.0 and jerk is None and not turned <= SHORT:
@@ -130,6 +128,12 @@ def integrate(
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
     raise _too_many(start, end)
+
+
+def _strength(acceleration: Array, jerk: Array | None, forcing: Forcing, least: float, duration: float) -> float:
+    """rad/s²: the most that all torques accelerate in ``duration`` s; ``least`` is the smallest principal moment."""
+    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / least
+    return strength if jerk is None else max(strength, float(np.linalg.norm(acceleration + jerk * duration)))
 
 
 def _too_long(start: float, end: float, angle: float) -> Infeasible:

@@ -9,7 +9,6 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.aspect import aspects
-from nutdamp.decision import Decision
 from nutdamp.flight import Flight
 from nutdamp.presentation.block_tables import blocks_screen, shown_pulses
 from nutdamp.presentation.decisions import decision_table, requirement
@@ -18,17 +17,15 @@ from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import channel_text, header
 from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
 from nutdamp.presentation.verdicts import model_warnings
+from nutdamp.simulation import Simulation
 from nutdamp.track import Extremes
 
 
-def simulation_screen(
-    flight: Flight, found: Extremes, impulses: Flight, decided: Decision, *, how: str
-) -> RenderableType:
-    """Everything that ``simulate`` shows; ``how`` names what was propagated.
-
-    All flights as `outcome.seen_at` the end of the track; ``flight`` is that by ``impulses``, or that ``decided`` on.
-    """
-    flown, pulses = decided.flight, len(decided.plan.pulses)
+def simulation_screen(simulation: Simulation) -> RenderableType:
+    """Everything that ``simulate`` shows."""
+    flight, found, decided = simulation.shown, simulation.extremes, simulation.decision
+    impulses, flown, pulses = simulation.impulses, simulation.flown, len(simulation.plan.pulses)
+    how = f"{simulation.plan.scheme}, propagated by the {flight.model}"
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule) < pulses:
         begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"

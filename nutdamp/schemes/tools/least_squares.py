@@ -146,15 +146,20 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    start, scale, lower, upper = (
-        np.concatenate([getattr(one, name) for one in (*pulses, *common)])
-        for name in ("start", "scale", "lower", "upper")
-    )
-    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > INTEGRATED or work.exhausted())
+    freedom = _stacked(*pulses, *common)
+    x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, made.notes, made.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
+
+
+def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
+    """Start, scale, lower and upper bound of all that is free."""
+    start, scale, lower, upper = (
+        np.concatenate([getattr(one, name) for one in parts]) for name in ("start", "scale", "lower", "upper")
+    )
+    return start, scale, lower, upper
 
 
 class _Movable:

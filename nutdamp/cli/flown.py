@@ -1,0 +1,132 @@
+"""What a command flies: the plan of a scheme, the pulses of a schedule file, or those that command blocks fire."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+
+import click
+
+from nutdamp.cli.failures import show_failures
+from nutdamp.cli.parameters import FILE, SchemeName
+from nutdamp.cli.scheme_options import expect_read
+from nutdamp.schemes import NAMES, Options, SchemeOptions
+
+if TYPE_CHECKING:
+    from nutdamp.cli.job import Job
+    from nutdamp.comparison import Comparison
+    from nutdamp.planning import Plan
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+JITTER_SEED = 1
+"""Of the errors of the Sun pulses from which blocks are fired: the same in every run."""
+
+
+class Flown(NamedTuple):
+    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, else the recommended plan."""
+
+    scheme: str | None
+    schedule: str | None
+
+
+def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
+    """``--scheme`` and ``--schedule``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
+
+    ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
+    A usage error for both.
+    """
+    default = f"{verb} this scheme with default options; without it the recommended one."
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def gathered(*args: Any, scheme: str | None, schedule: str | None, **parameters: Any) -> Any:
+            if scheme is not None and schedule is not None:
+                raise click.UsageError(f"name what to {verb.lower()}: either --scheme or --schedule")
+            return command(*args, flown=Flown(scheme, schedule), **parameters)
+
+        read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
+        option = click.option("--schedule", type=FILE, help=read)(gathered)
+        return cast(Command, click.option("--scheme", type=SchemeName(NAMES), help=scheme or default)(option))
+
+    return decorate
+
+
+def compared_with(job: Job, names: Sequence[str], options: Options) -> Comparison:
+    """The schemes named, else the usual ones, compared; which options none of them reads is said before."""
+    from nutdamp.cli.progress import working
+    from nutdamp.comparison import compare, usual
+
+    names = tuple(dict.fromkeys(names)) or usual(job.spacecraft)
+    expect_read(names, options, job.spacecraft, job.remark)
+    with working("planning", quiet=job.quiet):
+        return compare(job.spacecraft, names, options)
+
+
+def plan_or_read(job: Job, flown: Flown, options: Options) -> Plan:
+    """What a command flies, as a plan; raises Infeasible where there is none."""
+    from nutdamp.errors import Infeasible
+    from nutdamp.remarks import infeasibility, remarks
+
+    if flown.schedule is not None:
+        return _read(job, flown.schedule, options)
+    plan = _recommended(job, options) if flown.scheme is None else _planned(job, flown.scheme, options)
+    if not plan.feasible:
+        raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
+    for text in remarks(plan):
+        job.remark(text)
+    return plan
+
+
+def _read(job: Job, schedule: str, options: Options) -> Plan:
+    """The pulses of a file."""
+    from nutdamp.files.schedule_file import read_plan
+
+    expect_read((), options, job.spacecraft, job.remark)
+    plan, warnings = read_plan(schedule, job.spacecraft, options.of(SchemeOptions))
+    job.warn(warnings)
+    return plan
+
+
+def _planned(job: Job, scheme: str, options: Options) -> Plan:
+    """The plan of a scheme."""
+    from nutdamp import planning
+    from nutdamp.cli.progress import working
+
+    expect_read((scheme,), options, job.spacecraft, job.remark)
+    with working("planning", quiet=job.quiet):
+        return planning.plan(job.spacecraft, scheme, options)
+
+
+def _recommended(job: Job, options: Options) -> Plan:
+    """The plan that is recommended; raises Infeasible where there is none."""
+    from nutdamp.errors import Infeasible
+    from nutdamp.presentation import verdicts
+
+    compared = compared_with(job, (), options)
+    plan = compared.recommended
+    show_failures(compared)
+    if plan is not None:
+        job.remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
+    job.warn(verdicts.warnings(compared))
+    if plan is None:
+        raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
+    return plan
+
+
+def fire_blocks(job: Job, path: str, options: Options) -> Plan:
+    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
+    from nutdamp.errors import printable
+    from nutdamp.files.blocks_csv import read_blocks
+    from nutdamp.planning import Plan
+    from nutdamp.remarks import broken_limits
+    from nutdamp.schemes.tools.sun_pulses import fired
+
+    body = job.spacecraft
+    blocks, warnings = read_blocks(path, body)
+    if body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
+        job.remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
+    made = fired(body, blocks, JITTER_SEED)
+    job.warn((*warnings, *broken_limits(body, made)))
+    return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)
