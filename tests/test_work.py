@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from builders import cross, spinner
+from builders import aimed, cross, spinner
 from cases_dir import CASES
 
 from nutdamp import dynamics, flight, planning, remarks, work
 from nutdamp.comparison import compare
 from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.schedule import Schedule
+from nutdamp.schemes.optimal import lp_solver
+from nutdamp.spacecraft import Limits
 
 
 def test_work_counts_for_all_budgets_around_it() -> None:
@@ -82,3 +85,34 @@ def test_a_comparison_shares_one_budget(monkeypatch: pytest.MonkeyPatch) -> None
         compared = compare(body, ("one-pulse", "optimal"))
     assert compared.plans[-1].cut
     assert spent.done < 330.0
+
+
+@pytest.mark.parametrize("scheme", ["rhumb-line", "half-cone"])
+def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
+    scheme: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of its pulses takes a thousand steps of integration, and neither it nor a longer horizon is tried twice."""
+    body = replace(spinner(200.0, 250.0, -0.44, degrees=89.9, channels=cross(30.0)), dissipation=1e4)
+    monkeypatch.setattr(work, "SCHEME", 300.0)
+    with work.budget("test", 1e9) as spent:
+        plan = planning.plan(aimed(body, 40.0, 10.0), scheme)
+    assert plan.cut
+    assert not plan.feasible
+    assert spent.done < 1500.0  # of 39,000 without a bound
+
+
+def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a sphere pulses of every turn do alike, and all slots of a long horizon get into the program."""
+    body = spinner(7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5))
+    monkeypatch.setattr(work, "SCHEME", 300.0)
+    sizes: list[int] = []
+    optimum = lp_solver.GrowingProgram.optimum
+
+    def counted(self: lp_solver.GrowingProgram) -> lp_solver.Optimum | None:
+        sizes.append(self._highs.getNumNz())
+        return optimum(self)
+
+    monkeypatch.setattr(lp_solver.GrowingProgram, "optimum", counted)
+    plan = planning.plan(aimed(body, 3.0, 0.0), "optimal")
+    assert plan.cut
+    assert sum(sizes) < 200_000  # of 1.2 million

@@ -12,6 +12,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
+from nutdamp import work
 from nutdamp.arguments import shown
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.options import LEAST, Options, SchemeOptions
@@ -111,7 +112,10 @@ LONGER = 4.0
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
-    """A horizon within which the whole schedule is ``planned``, in words: it was tried; else that none was found."""
+    """A horizon within which the whole schedule is ``planned``, in words: it was tried; else that none was found.
+
+    Empty where the budget of work ends before that is known.
+    """
 
     def end(horizon: float) -> float | None:
         """When the schedule within a horizon ends; None where there is none."""
@@ -122,12 +126,14 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
 
     usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
     for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
-        over = end(horizon) if horizon > spacecraft.horizon else None
+        over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
         if over:
             step = 10.0 ** (math.floor(math.log10(over)) - 3)
             shortest = math.ceil(over / step) * step  # four digits, rounded up
             needed = shortest if end(shortest) is not None else horizon
             return f"limits.horizon = {needed:.4g} s is long enough"
+    if work.exhausted():
+        return ""
     return f"not even limits.horizon = {horizon:.4g} s is long enough"
 
 

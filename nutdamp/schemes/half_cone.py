@@ -71,7 +71,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         raise Infeasible(no_channels(spacecraft))
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
-        builder.fire(predamping.damping(builder.here, one_pulse.schedule))
+        builder = predamping.damped(builder, one_pulse.schedule)
     if options.cones is not None:
         return _row(builder, options.cones)
     here = builder.here

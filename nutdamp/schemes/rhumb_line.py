@@ -74,7 +74,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    builder.fire(predamping.damping(builder.here, one_pulse.schedule))
+    builder = predamping.damped(builder, one_pulse.schedule)
     if builder.left <= ROUNDING:
         return builder.schedule("what damps the nutation brings H to the target already: no train is needed")
     return _best(builder, Train(builder.here, options))
@@ -85,7 +85,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
-            builder.fire(predamping.damping(builder.here, one_pulse.schedule))
+            builder = predamping.damped(builder, one_pulse.schedule)
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
@@ -136,13 +136,13 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
     count = attempt.pulses
     for remaining in range(count, 0, -1):
         pulse = train.next_pulse(builder.here, remaining, attempt)
-        if pulse is None:
+        if pulse is None or work.exhausted():
             break
         builder.fire((pulse,))
     fired = min(count, len(builder.pulses))
     for last in MOVED:
         before = builder.left
-        if before < EXACT:
+        if before < EXACT or work.exhausted():
             break
         builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
         if train.here.limits.tick is not None and builder.left > 0.5 * before:

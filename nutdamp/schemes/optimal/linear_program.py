@@ -151,7 +151,7 @@ class Program:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
             unmet = self._unmet(found)
-            if enough and (unmet <= SOME or self._out_of_reach(found.prices)):
+            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(found.prices))):
                 break
             new = self._priced(found.prices, chosen, unmet)
             if not len(new.t):

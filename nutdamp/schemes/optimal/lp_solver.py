@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 import highspy
 import numpy as np
 
+from nutdamp import work
 from nutdamp.spacecraft import Vector
 
 WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
@@ -23,6 +24,10 @@ costs, against which its tolerances count, it mostly does not at another; interi
 
 MOST_STEPS = 100_000
 """Of the simplex or of the interior points, in one way of solving."""
+
+
+SMALL, NONZERO = 10_000, 1e-2
+"""Coefficients other than zero up to which a solution counts for nothing here, and units of `work` of each above it."""
 
 
 class Optimum(NamedTuple):
@@ -79,6 +84,7 @@ class GrowingProgram:
         every = np.arange(len(self._costs), dtype=np.int32)
         if factor != 1.0:
             highs.changeColsCost(len(every), every, factor * self._costs)
+        work.spend(NONZERO * max(highs.getNumNz() - SMALL, 0))
         if highs.run() == highspy.HighsStatus.kError:
             # Threads are set once in a process, by whoever solves first; zero takes what there is.
             highs.setOptionValue("threads", 0)

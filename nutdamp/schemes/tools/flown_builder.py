@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from nutdamp import flight
+from nutdamp import flight, work
+from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes.tools import least_squares
@@ -60,10 +61,15 @@ class FlownBuilder:
         other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
         return other
 
-    def fire(self, pulses: Iterable[Pulse]) -> None:
-        """Take ``pulses``, in order and with times from ``now``, into the schedule and fly them."""
+    def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
+        """Take ``pulses``, in order and with times from ``now``, into the schedule and fly them.
+
+        Raises Infeasible where they are ``bounded`` by the budget of work and it ends before them.
+        """
         base = self.now
         for pulse in pulses:
+            if bounded and work.exhausted():
+                raise Infeasible("the flight of the pulses for that was not finished")
             self._before.append((self.now, self.here))
             timed = pulse.moved(base)
             self.here, steps = _after(self.here, timed.moved(-self.now))

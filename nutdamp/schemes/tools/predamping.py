@@ -24,17 +24,18 @@ IN_REACH = 0.5
 """Share of the horizon within which the damping begins: the rest is for the turn."""
 
 
-def damping(here: Spacecraft, scheme: Scheme) -> Schedule:
-    """The damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
+def damped(start: FlownBuilder, scheme: Scheme) -> FlownBuilder:
+    """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
 
     H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
     C|ω3| times its angle, differs by the cone.
-    Raises Infeasible where no channel can damp.
+    Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
     """
+    here = start.here
     h = here.inertia.C * abs(here.spin)
     # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
     span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
-    best: tuple[float, Schedule] | None = None
+    best: tuple[float, FlownBuilder] | None = None
     reason: Infeasible | None = None
     steps = 0
     for number in range(MOMENTS):
@@ -46,11 +47,15 @@ def damping(here: Spacecraft, scheme: Scheme) -> Schedule:
         except Infeasible as why:
             reason = why
             continue
-        builder = FlownBuilder(here)
-        builder.fire(made)
+        builder = start.fork()
+        try:
+            builder.fire(made, bounded=True)
+        except Infeasible as why:
+            reason = why
+            break
         cost = made.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
         if best is None or cost < best[0]:
-            best = cost, made
+            best = cost, builder
         steps += builder.steps
         if steps > INTEGRATED or work.exhausted():
             break
