@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp import flight
-from nutdamp.demands import Keep
+from nutdamp.demands import SLACK, Keep
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -16,11 +16,8 @@ from nutdamp.spacecraft import Spacecraft, Vector
 ROWS = 48
 """Rows in each nutation period; between them the moment is found by a parabola, and the angle is that of the moment."""
 
-TRIED = 4
+TRIED = 8
 """Of the turns of the axis those at which it is looked at closely."""
-
-SLACK = 1e-9
-"""rad by which a bound may be passed: rounding."""
 
 
 class Aspect(NamedTuple):
@@ -40,7 +37,7 @@ class Aspect(NamedTuple):
     @property
     def kept(self) -> bool:
         """Whether the axis stays as near and as far as it is to."""
-        return not self.too_near and self.largest <= self.keep.most + SLACK
+        return bool(self.keep.used(self.least, self.largest) <= 1.0)
 
 
 def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
@@ -96,14 +93,15 @@ def _seen(axis: Vector, keep: Keep, time: float) -> Aspect:
 def _peaks(times: Vector, values: Vector) -> Vector:
     """The times at which ``values`` (n,) may be largest: of the largest row, and on parabolas through three in a row.
 
-    Of the parabolas the `TRIED` highest count. Rows at the same time, before and after a jump, are no neighbours.
+    Of the parabolas with their top between the three the `TRIED` highest count. Rows at the same time, before and after
+    a jump, are no neighbours.
     """
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
-    slope, next_slope = np.diff(values)[:-1], np.diff(values)[1:]
-    peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (slope > 0.0) & (next_slope < 0.0))
-    before, after, slope, next_slope = (one[peaked] for one in (before, after, slope, next_slope))
-    rise, fall = slope / before, next_slope / after
-    way = 0.5 * (rise * after + fall * before) / (rise - fall)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after
+        way = 0.5 * (rise * after + fall * before) / (rise - fall)
+        peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
+    before, after, rise, fall, way = (one[peaked] for one in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
     highest = np.argsort(-heights)[:TRIED]
     return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

@@ -93,6 +93,11 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     return tuple(bounds)
 
 
+def judged(spacecraft: Spacecraft) -> bool:
+    """Whether cases comply or not: something is required at the end, or the spin axis has cones to keep on the way."""
+    return bool(spacecraft.keep or required(spacecraft))
+
+
 def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     """The bounds `required`; for nutation and target axis, where none is, those within which they count as damped."""
     found = required(spacecraft)

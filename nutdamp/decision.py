@@ -129,7 +129,7 @@ class Decision:
         dispersed = cases.levels.get(bound.part)
         if not bound.required or cases.met is None:
             return Line(bound, nominal, dispersed, kept if dispersed is None else kept and dispersed <= bound.most)
-        alone = len(compliance.required(self.plan.spacecraft)) == 1
+        alone = len(compliance.required(self.plan.spacecraft)) == 1 and not self.plan.spacecraft.keep
         if cases.met or alone:  # the count of cases and the percentile, which lies between two of them, say the same
             return Line(bound, nominal, dispersed, kept and cases.met)
         return Line(bound, nominal, dispersed, None if dispersed is None else kept and dispersed <= bound.most)

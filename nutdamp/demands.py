@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
+
+SLACK = 1e-9
+"""rad by which a bound of `Keep` may be passed: rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +64,11 @@ class Keep:
     direction: Vector
     least: float = 0.0
     most: float = math.pi
+
+    def used(self, least: Any, largest: Any) -> Any:
+        """The share of a bound that is used up where the angles on the way are from ``least`` to ``largest`` rad.
+
+        1 or less is kept. Numbers, or arrays over cases.
+        """
+        near = (self.least - SLACK) / np.maximum(least, SLACK)
+        return np.maximum(near, largest / (self.most + SLACK))

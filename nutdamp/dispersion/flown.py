@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from nutdamp.dispersion import sun_fired
 from nutdamp.dispersion.cases import DispersedCases, Model, Triple, rotated
 from nutdamp.dispersion.kernel import Ends, carried
+from nutdamp.dispersion.watched import number_of, watch_of
 from nutdamp.dynamics import Dynamics, make_dynamics
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
+from nutdamp.physics.axis_watch import AxisWatch
 
 Array = NDArray[np.float64]
 
@@ -34,11 +36,12 @@ class RealWidths:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
-        count = _count(cases)
+        count = number_of(cases)
+        watch = watch_of(self.model, cases) if self.model.spacecraft.keep else None
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
         propellant = cases.propellant
         if self.model.schedule.blocks:
-            settled, turned, _, seen = self._fired(cases)
+            settled, turned, _, seen, over = self._fired(cases, watch)
             propellant = None if propellant is None else propellant * self._share(seen)
         else:
             starts = _whole(cases.starts, count)
@@ -46,7 +49,10 @@ class RealWidths:
             pulses = rigid_cases.Pulses(starts, np.array(self.model.on_times), impulses)
             if self.model.schedule.through_valves:
                 pulses = self._ramps(starts, impulses)
-            settled, turned = rigid_cases.fly(self._bodies(moments), rates, _upright(count), pulses)
+            settled, turned = rigid_cases.fly(self._bodies(moments), rates, _upright(count), pulses, watch)
+            over = np.max(pulses.edges, axis=0, initial=0.0)
+        if watch is not None:
+            watch.turn(self._bodies(moments), settled, turned, over)
         momentum = _triple(moments * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)
@@ -59,6 +65,7 @@ class RealWidths:
             spin_change=settled[2] - rates[2],
             propellant=propellant,
             nutation=None if cases.moments[0] is cases.moments[1] else largest_nutation(moments, momentum, sense),
+            aspects=None if watch is None else watch.angles,
         )
 
     def timed(self, cases: DispersedCases) -> DispersedCases:
@@ -73,10 +80,10 @@ class RealWidths:
     def _bodies(self, moments: Array) -> rigid_cases.Bodies:
         return rigid_cases.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
 
-    def _fired(self, cases: DispersedCases) -> sun_fired.Fired:
-        count = _count(cases)
+    def _fired(self, cases: DispersedCases, watch: AxisWatch | None = None) -> sun_fired.Fired:
+        count = number_of(cases)
         bodies = self._bodies(_whole(cases.moments, count))
-        return sun_fired.fly(self.model, bodies, _whole(cases.omega0, count), _upright(count), cases)
+        return sun_fired.fly(self.model, bodies, _whole(cases.omega0, count), _upright(count), cases, watch)
 
     def _share(self, seen: NDArray[np.bool_]) -> Array:
         """Share of the propellant that pulses (k, n) take of which only those ``seen`` are fired."""
@@ -102,11 +109,6 @@ class RealWidths:
         count = starts.shape[1]
         starts, impulses = np.array(begins).reshape(-1, count), np.array(parts).reshape(-1, 3, count)
         return rigid_cases.Pulses(starts, np.array(lengths), impulses, np.array(leans))
-
-
-def _count(cases: DispersedCases) -> int:
-    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt)
-    return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))
 
 
 def _upright(count: int) -> Array:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -22,8 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import TINY, Cases, DispersedCases, Model, Triple, plus, rotated, times
+from nutdamp.dispersion.watched import watch_of
 from nutdamp.physics import energy_sink
-from nutdamp.physics.rigid_cases import cos_sin
+from nutdamp.physics.axis_watch import AxisWatch
+from nutdamp.physics.rigid import Forcing
+from nutdamp.physics.rigid_cases import Bodies, cos_sin
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
@@ -39,7 +42,8 @@ class Ends:
     ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
     H at t = 0 and at the end in the true body axes of t = 0, which stand still in space; ``pointed``: the end in the
     estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
-    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2).
+    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
+    rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
     """
 
     momentum: Triple
@@ -50,6 +54,7 @@ class Ends:
     spin_change: Cases
     propellant: Cases | None
     nutation: Cases | None = None
+    aspects: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +72,20 @@ class ClosedForm:
         nodes = self._nodes
         mixed = _out_of_order(cases.starts, on_times)
         growth = self.model.spacecraft.growth
-        ends = _fly(cases, on_times, nodes, growth)
-        if mixed is None:
-            return ends
-        # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
-        return _replaced(ends, mixed, _fly(*_reordered(cases, on_times, mixed), (max(nodes),) * len(nodes), growth))
+        watch = self._watch(cases)
+        ends = _fly(cases, on_times, nodes, growth, watch)
+        if mixed is not None:
+            # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
+            again = None if watch is None else watch.anew(mixed)
+            others = _fly(*_reordered(cases, on_times, mixed), (max(nodes),) * len(nodes), growth, again)
+            ends = _replaced(ends, mixed, others)
+        return ends if watch is None else replace(ends, aspects=watch.angles)
+
+    def _watch(self, cases: DispersedCases) -> AxisWatch | None:
+        """Sees the spin axis where the body has cones to keep; not while derivatives are taken by a complex step."""
+        if not self.model.spacecraft.keep or any(map(np.iscomplexobj, (*cases.moments, *cases.omega0))):
+            return None
+        return watch_of(self.model, cases)
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
@@ -86,8 +100,13 @@ class ClosedForm:
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _fly(cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: float) -> Ends:
-    """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse, ``growth`` κ in 1/s."""
+def _fly(
+    cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: float, watch: AxisWatch | None = None
+) -> Ends:
+    """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse, ``growth`` κ in 1/s.
+
+    ``watch`` sees the motion, and one turn of the axis after the last pulse.
+    """
     A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
     x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
@@ -101,6 +120,8 @@ def _fly(cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: f
         on_time = on_times[number]
         centre = start + 0.5 * on_time
         coast = centre - now
+        if watch is not None:
+            _show(watch, cases, (x, y, spin), turn, growth, coast)
         turn = _turned_on(turn, (x, y, z), coast * per_A)
         if growth == 0.0:
             phase = phase + a * spin * coast
@@ -117,6 +138,8 @@ def _fly(cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: f
             spin = spin + gained / C
             z = C * spin
         now = centre
+    if watch is not None:
+        _show(watch, cases, (x, y, spin), turn, growth)
     after = (x, y, z) if turn is None else carried(turn, (x, y, z))
     return Ends(
         momentum=(x, y, z),
@@ -127,6 +150,33 @@ def _fly(cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: f
         spin_change=spin - cases.omega0[2],
         propellant=cases.propellant,
     )
+
+
+def _show(
+    watch: AxisWatch,
+    cases: DispersedCases,
+    motion: Triple,
+    turn: tuple[Cases, ...] | None,
+    growth: float,
+    coast: Cases | None = None,
+) -> None:
+    """Show a ``coast`` (s) to a ``watch``, by default one turn of the axis about H.
+
+    ``motion``: AΩ1, AΩ2 and ω3 in the frame that turns with the nutation and ``turn`` in space: its third axis is that
+    of the body, and more of the body is not looked at.
+    """
+    count = watch.count
+
+    def rows(*values: Cases) -> Any:
+        return np.array([np.broadcast_to(np.asarray(value, dtype=float), count) for value in values])
+
+    (x, y, spin), A = motion, cases.A
+    bodies = Bodies(rows(A, A, cases.C), np.zeros(3), Forcing(growth=growth))
+    rates, quaternion, now = rows(x / A, y / A, spin), rows(*(turn or (1.0, 0.0, 0.0, 0.0))), np.zeros(count)
+    if coast is None:
+        watch.turn(bodies, rates, quaternion, now)
+    else:
+        watch.motion(bodies, rates, quaternion, now, rows(coast)[0], None)
 
 
 def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
@@ -298,9 +348,9 @@ def _replaced(ends: Ends, rows: NDArray[np.intp], others: Ends) -> Ends:
         return whole
 
     count = max(np.size(part) for part in (*ends.momentum, *ends.after))
-    triples = {
+    triples: dict[str, Any] = {
         name: tuple(mended(v, o, count) for v, o in zip(getattr(ends, name), getattr(others, name), strict=True))
         for name in ("momentum", "before", "after", "pointed")
     }
     spins = {name: mended(getattr(ends, name), getattr(others, name), count) for name in ("spin", "spin_change")}
-    return Ends(**triples, **spins, propellant=ends.propellant)
+    return replace(ends, **triples, **spins)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nutdamp import compliance, flight
 from nutdamp.compliance import Left
 from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.cases import Cases, DispersedCases, Model
+from nutdamp.dispersion.cases import DispersedCases, Model
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
@@ -123,10 +123,27 @@ class Study:
         fly = flight.flown if self.flown else flight.by_impulses
         return fly(self.model.spacecraft, self.model.schedule)
 
-    def severity(self, values: Array, spin: Cases) -> Array:
-        """How bad cases are, (n,), by `compliance.severity`: outputs (5, n), and ω3 at their end in rad/s."""
-        aim = OUTPUTS.index(compliance.aim(self.model.spacecraft).value)
-        return np.asarray(compliance.severity(self.model.spacecraft, Left(values[0], values[aim], spin)))
+    def severity(self, values: Array, ends: Ends) -> Array:
+        """How bad cases are, (n,), by `compliance.severity`, of the outputs (5, n) and ``ends`` of cases.
+
+        Where the axis breaks a cone on the way, no better than the share of its bound that is used up.
+        """
+        body, aim = self.model.spacecraft, OUTPUTS.index(compliance.aim(self.model.spacecraft).value)
+        found = np.asarray(compliance.severity(body, Left(values[0], values[aim], ends.spin)))
+        if ends.aspects is None:
+            return found
+        worst = self.used(ends.aspects).max(axis=0)
+        return np.where(worst > 1.0, np.maximum(worst, found), found)
+
+    def used(self, aspects: Array) -> Array:
+        """By cone and case (m, n): what is used up of a cone, see `Keep.used`, by angles (m, 2, n) on the way."""
+        pairs = zip(self.model.spacecraft.keep, aspects, strict=True)
+        return np.array([keep.used(*angles) for keep, angles in pairs]).reshape(len(aspects), aspects.shape[2])
+
+    def aspects_of(self, draws: Draws) -> Array | None:
+        """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
+        found = self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()})).aspects
+        return None if found is None else found[:, :, 0]
 
     @property
     def fingerprint(self) -> str:
@@ -142,6 +159,8 @@ class Study:
         ]
         parts += [body.requirement, body.goal.spin, body.disturbances, body.dissipation, body.channels, body.steerable]
         parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
+        if body.keep:
+            parts += [(one.direction, one.least, one.most) for one in body.keep]
         if schedule.blocks:  # each case fires them from its own Sun pulses
             parts += [schedule.blocks, body.sun, body.sun_sensor]
         if schedule.through_valves:
@@ -155,7 +174,8 @@ class Results:
     """What has been found of a study so far: the cases from 0 to ``done``.
 
     ``values`` (5, capacity) are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the
-    outcome of the first cases.
+    outcome of the first cases. By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the
+    least and the largest angle in all cases.
     """
 
     study: Study
@@ -168,7 +188,12 @@ class Results:
     sketches: list[Sketch] | None = None
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
 
+    broken: NDArray[np.int64] = field(init=False)
+    aspects: Array = field(init=False)
+
     def __post_init__(self) -> None:
+        cones = len(self.study.model.spacecraft.keep)
+        self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
         if self.values is None and self.sketches is None:
             if self.requested <= EXACT_CASES:
                 self.values = np.empty((len(OUTPUTS), self.requested))
@@ -192,8 +217,8 @@ class Results:
 
     @property
     def met_fraction(self) -> float | None:
-        """Fraction of cases that comply; None where nothing is required."""
-        return self.met / self.done if self.done and compliance.required(self.study.model.spacecraft) else None
+        """Fraction of cases that comply; None where nothing is required, and there are no cones."""
+        return self.met / self.done if self.done and compliance.judged(self.study.model.spacecraft) else None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -224,9 +249,14 @@ class Results:
                 rows[name].append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
         return sampled_shares({name: np.concatenate(parts) for name, parts in rows.items()}, self.early[:, :count])
 
-    def take(self, first: int, values: Array, severity: Array) -> None:
-        """Count the cases from ``first`` on, outputs (5, n) and `Study.severity` (n,)."""
-        self.met += int(np.count_nonzero(severity <= 1.0))
+    def take(self, first: int, values: Array, severity: Array, aspects: Array) -> None:
+        """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones."""
+        broken = self.study.used(aspects) > 1.0
+        missed = (severity > 1.0) & bool(compliance.required(self.study.model.spacecraft))
+        self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed)))
+        self.broken += broken.sum(axis=1)
+        self.aspects[:, 0] = np.minimum(self.aspects[:, 0], aspects[:, 0].min(axis=1))
+        self.aspects[:, 1] = np.maximum(self.aspects[:, 1], aspects[:, 1].max(axis=1))
         self.worst.add(first, severity)
         for sketch, row in zip(self.sketches or (), values, strict=False):
             sketch.add(row)
@@ -246,6 +276,7 @@ class Results:
             sketches=self.sketches,
             early=self.early,
         )
+        more.broken, more.aspects = self.broken, self.aspects
         if self.values is not None and more.values is not None:
             more.values[:, : self.done] = self.values[:, : self.done]
         elif self.values is not None and more.sketches is not None:
@@ -281,7 +312,7 @@ def run(
         if done == 0:
             break
         results.redrawn += redrawn
-        results.take(first, out[:, :done], flights.severity[:done])
+        results.take(first, out[:, :done], flights.severity[:done], flights.aspects[:, :, :done])
         if collect is not None:
             collect(first, out[:, :done])
         watch(results.done)
@@ -298,6 +329,7 @@ class _Round:
     def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
         self.severity = np.empty(last - first)
+        self.aspects = np.empty((len(results.broken), 2, last - first))
         self.chunk = max(chunk // STRIDE, 1) * STRIDE
         self.portion = PORTION if results.study.flown else BLOCK
         self.portions = range(first // self.portion, math.ceil(last / self.portion))
@@ -374,7 +406,9 @@ class _Round:
             measure(study.model, ends, outputs)
             place = slice(columns.start - self.first, columns.stop - self.first)
             self.out[:, place] = outputs[:, inner]
-            self.severity[place] = study.severity(outputs, ends.spin)[inner]
+            self.severity[place] = study.severity(outputs, ends)[inner]
+            if ends.aspects is not None:
+                self.aspects[:, :, place] = ends.aspects[:, :, inner]
             if low < EARLY:
                 outcome = np.empty((ROWS, high - low))
                 vectors(study.model, ends, outcome)

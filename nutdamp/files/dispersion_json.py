@@ -40,6 +40,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
             column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
         },
         "requirement": _requirement(results),
+        **_cones(results),
         "shares": _shares(results),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
@@ -78,6 +79,27 @@ def _requirement(results: Results) -> dict[str, Any] | None:
     }
 
 
+def _cones(results: Results) -> dict[str, Any]:
+    """How many cases break each cone, and the least and largest angle from it to the axis; nothing without cones."""
+    nominal, entries = results.study.aspects_of({}), []
+    for index, keep in enumerate(results.study.model.spacecraft.keep):
+        assert nominal is not None
+        (least, largest), (least_of_all, largest_of_all) = np.degrees([nominal[index], results.aspects[index]]).tolist()
+        entries.append(
+            {
+                "name": keep.name,
+                "min_deg": math.degrees(keep.least),
+                "max_deg": math.degrees(keep.most),
+                "broken_fraction": float(results.broken[index] / results.done),
+                "least_deg": least_of_all,
+                "largest_deg": largest_of_all,
+                "nominal_least_deg": least,
+                "nominal_largest_deg": largest,
+            }
+        )
+    return {"aspects": entries} if entries else {}
+
+
 def _shares(results: Results) -> list[dict[str, Any]]:
     analytic, sampled = results.study.first_order, results.shares
     shares = {name: analytic.shares(name).tolist() for name in OUTPUTS}
@@ -110,4 +132,14 @@ def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any
             column: _shown(name, float(value))
             for name, column, value in zip(OUTPUTS, OUTPUT_COLUMNS, study.outputs_of(draws), strict=True)
         },
+        **_angles_of(study, draws),
     }
+
+
+def _angles_of(study: Study, draws: dict[str, float]) -> dict[str, Any]:
+    """Least and largest angle from the axis to the direction of each cone in one case; nothing without cones."""
+    found = study.aspects_of(draws)
+    if found is None:
+        return {}
+    named = zip(study.model.spacecraft.keep, np.degrees(found).tolist(), strict=True)
+    return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}

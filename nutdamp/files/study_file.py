@@ -34,6 +34,8 @@ def save_results(path: str, results: Results) -> None:
         "worst_cases": results.worst.cases,
         "worst_severities": results.worst.severities,
         "early": results.early[:, : min(done, EARLY)],
+        "broken": results.broken,
+        "aspects": results.aspects,
     }
     if results.sketches is None:
         assert results.values is not None
@@ -60,7 +62,7 @@ def load_results(path: str, study: Study, requested: int) -> Results:
                 arrays = {name: kept[name] for name in kept.files}
         belongs = str(arrays["fingerprint"]) == study.fingerprint and str(arrays["made_by"]) == _made_by()
         if belongs:
-            _check(arrays)
+            _check(arrays, len(study.model.spacecraft.keep))
     except Exception as reason:  # a damaged archive makes zipfile, zlib and numpy fail in many ways
         if isinstance(reason, OSError) and reason.filename is not None:  # it was not even opened
             raise CannotRead(path, str(reason.strerror)) from reason
@@ -86,8 +88,8 @@ def _made_by() -> str:
     return f"nutdamp {__version__}"
 
 
-def _check(arrays: dict[str, Any]) -> None:
-    """Raises ValueError or KeyError for arrays of a study that `save_results` does not write."""
+def _check(arrays: dict[str, Any], cones: int) -> None:
+    """Raises ValueError or KeyError for arrays of a study with so many ``cones`` that `save_results` does not write."""
     done, redrawn, met = arrays["counts"].tolist()
     worst, early, outputs = min(done, KEPT_WORST), min(done, EARLY), len(OUTPUTS)
     forms: dict[str, tuple[type, tuple[int, ...]]] = {
@@ -95,6 +97,8 @@ def _check(arrays: dict[str, Any]) -> None:
         "worst_cases": (np.int64, (worst,)),
         "worst_severities": (np.float64, (worst,)),
         "early": (np.float64, (ROWS, early)),
+        "broken": (np.int64, (cones,)),
+        "aspects": (np.float64, (cones, 2)),
     }
     if "values" in arrays:
         forms["values"] = (np.float64, (outputs, done))
@@ -105,6 +109,7 @@ def _check(arrays: dict[str, Any]) -> None:
             raise ValueError(f"{name} is {arrays[name].dtype} {arrays[name].shape}, expected {kind} {shape}")
     cases, counted = arrays["worst_cases"], arrays.get("sketches", np.full((1, 1), done))
     possible = done > 0 and redrawn >= 0 and 0 <= met <= done and np.all((cases >= 0) & (cases < done))
+    possible = possible and np.all((arrays["broken"] >= 0) & (arrays["broken"] <= done))
     if not (possible and np.all(counted >= 0) and np.all(counted.sum(axis=1) == done)):
         raise ValueError("counts that no study has")
 
@@ -118,5 +123,6 @@ def _results(study: Study, arrays: dict[str, Any]) -> Results:
             sketch.counts, sketch.minimum, sketch.maximum = counts, float(least), float(most)
     results = Results(study, done, done, redrawn, met, values=arrays.get("values"), sketches=sketches)
     results.worst.cases, results.worst.severities = arrays["worst_cases"], arrays["worst_severities"]
+    results.broken, results.aspects = arrays["broken"], arrays["aspects"]
     results.early[:, : arrays["early"].shape[1]] = arrays["early"]
     return results

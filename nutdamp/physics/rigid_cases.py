@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,22 +103,46 @@ def _edgewise(begins: Array, ends: Array) -> Array:
     return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
 
 
-def fly(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> tuple[Array, Array]:
+class Watch(Protocol):
+    """Sees the motion of cases on the way; see `axis_watch`."""
+
+    def some(self, cases: Any) -> Watch:
+        """That of some of the cases (an index of arrays)."""
+        ...
+
+    def motion(
+        self,
+        bodies: Bodies,
+        rates: Array,
+        quaternion: Array,
+        now: Array,
+        duration: Array,
+        torque: Array | None,
+        slope: Array | None = None,
+    ) -> None:
+        """The motion that `advance` is about to make with the same arguments."""
+        ...
+
+
+def fly(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None = None
+) -> tuple[Array, Array]:
     """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
 
-    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0. Exact to some 1e-13 rad for each hundred radians flown. Pulses
-    may overlap and come in any order, in each case its own. Raises Infeasible for motions over more than
-    `rigid.LONGEST` rad.
+    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad
+    for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
+    for motions over more than `rigid.LONGEST` rad.
     """
     count = rates.shape[1]
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
     for begin in range(0, count, BLOCK):
         cases = slice(begin, min(begin + BLOCK, count))
-        _fly_block(bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases))
+        seen = None if watch is None else watch.some(cases)
+        _fly_block(bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases), seen)
     return rates, quaternion
 
 
-def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> None:
+def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
     """Fly one block, in place."""
     edges = pulses.edges
     if not len(edges):
@@ -126,12 +150,12 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) 
     usual = np.argsort(edges.mean(axis=1), kind="stable")
     sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
     if sorted_alike.all():
-        _fly_alike(bodies, rates, quaternion, pulses, usual)
+        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
         return
     for cases, alike in ((np.flatnonzero(sorted_alike), True), (np.flatnonzero(~sorted_alike), False)):
         if len(cases):
             flown, turned = rates[:, cases], quaternion[:, cases]
-            chosen = bodies.some(cases), flown, turned, pulses.some(cases)
+            chosen = bodies.some(cases), flown, turned, pulses.some(cases), watch and watch.some(cases)
             if alike:
                 _fly_alike(*chosen, usual)
             else:
@@ -139,7 +163,9 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) 
             rates[:, cases], quaternion[:, cases] = flown, turned
 
 
-def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, order: NDArray[np.intp]) -> None:
+def _fly_alike(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None, order: NDArray[np.intp]
+) -> None:
     """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
     edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
     now = np.zeros(rates.shape[1])
@@ -151,6 +177,8 @@ def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
             torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
+        if watch is not None:
+            watch.motion(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
         advance(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
         now = edges[edge]
         number, ends = divmod(edge, 2)
@@ -162,7 +190,7 @@ def _fly_alike(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
             on.add(edge)
 
 
-def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -> None:
+def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
     """Fly cases whose edges come in orders of their own, in place."""
     edges = pulses.edges
     order = np.argsort(edges, axis=0, kind="stable")
@@ -173,6 +201,8 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses) -
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
+        if watch is not None:
+            watch.motion(bodies, rates, quaternion, now, edge - now, torque, slope)
         advance(bodies, rates, quaternion, now, edge - now, torque, slope)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge

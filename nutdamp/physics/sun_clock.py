@@ -7,7 +7,7 @@ nutation. Arrays carry the case last, as in `rigid_cases`, by which everything m
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +77,11 @@ class SunClock:
     def here(self) -> Stretch:
         """The motion since the last pulse was over."""
         return self._stretches[-1]
+
+    @property
+    def passed(self) -> Iterator[tuple[Stretch, Array]]:
+        """The motion from the end of the last pulse but one to that of the last, each stretch with its end."""
+        return zip(self._stretches, (one.since for one in self._stretches[1:]), strict=False)
 
     def fire(
         self, found: Stretch, delay: Array, width: float, torque: Array, ramps: Sequence[Ramp] | None = None

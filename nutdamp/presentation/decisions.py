@@ -9,10 +9,11 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.aspect import SLACK, Aspect
+from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, Line
+from nutdamp.demands import SLACK
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import end_table
 from nutdamp.presentation.layout import columns

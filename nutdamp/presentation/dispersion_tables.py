@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.aspect import aspects
 from nutdamp.compliance import Part
+from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
@@ -21,9 +22,10 @@ from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.flight import Flight
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.end_tables import bounds_text, end_table
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, quantity
+from nutdamp.presentation.text import MISSING, degrees, quantity
+from nutdamp.words import listed
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
@@ -47,7 +49,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
-    parts += [Text(), *_requirement(results), Text(), *_budget(results)]
+    parts += [Text(), *_requirement(results), *_cones(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
@@ -95,7 +97,9 @@ def _requirement(results: Results) -> list[RenderableType]:
     if share is None:
         return [Text("The file has no requirement to meet.")]
     low, high = results.interval
-    requested = verdicts.required(results.study.model.spacecraft)
+    body = results.study.model.spacecraft
+    cones = [f"axis {bounds_text(keep)} from {keep.name}" for keep in body.keep]
+    requested = listed([*filter(None, [verdicts.required(body)]), *cones])
     verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
     interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
     text = Text.assemble(("Requirement ", "bold"), f"({requested}) ", verdict, f"; 95 % interval {interval}.")
@@ -105,6 +109,24 @@ def _requirement(results: Results) -> list[RenderableType]:
         level = verdicts.exact_percent(probability)
         text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
     return [text]
+
+
+def _cones(results: Results) -> Iterator[RenderableType]:
+    """How many cases break each cone, and how near the spin axis comes to its direction and how far from it."""
+    study = results.study
+    nominal = study.aspects_of({})
+    for index, keep in enumerate(study.model.spacecraft.keep if nominal is not None and results.done else ()):
+        assert nominal is not None
+        broken = int(results.broken[index])
+        share = verdicts.percent(broken / results.done, 1.0 - results.probability)
+        seen, alone = (
+            " to ".join(map(degrees, angles.tolist())) for angles in (results.aspects[index], nominal[index])
+        )
+        yield Text.assemble(
+            (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
+            (f"broken in {share} of cases", "red" if broken else "green"),
+            f"; {seen} in all cases, {alone} in the nominal one.",
+        )
 
 
 class BudgetRow(NamedTuple):
@@ -270,11 +292,17 @@ def case_screen(
     ways = "impulses", "flown"
     outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
     closed = Study(study.model, study.seed)
+    real = study_of(study.model.spacecraft, study.model.schedule, seed=study.seed)
     ends = (closed.outputs_of({}), closed.outputs_of(draws), *flown)
     for name, scale, *values in zip(NAMES, SCALES, *ends, strict=True):
         largest = scale * float(np.max(np.abs(values)))
         cells = (MISSING if math.isnan(value) else _beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
+    angles = [one.aspects_of(case_) for one in (closed, real) for case_ in ({}, draws)]
+    for index, keep in enumerate(study.model.spacecraft.keep):
+        for row, which in enumerate(("least", "largest")):
+            cells = (f"{math.degrees(found[index, row]):.4g}" for found in angles if found is not None)
+            outcome.add_row(Text(f"{which} from {keep.name}, deg", style="dim"), *cells)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
     return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"))

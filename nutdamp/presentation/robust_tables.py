@@ -50,7 +50,7 @@ def _why(plan: Plan) -> str:
 
 def _candidates(found: RobustComparison) -> RenderableType:
     level = verdicts.exact_percent(found.probability)
-    counted = bool(compliance.required(found.comparison.spacecraft))
+    counted = compliance.judged(found.comparison.spacecraft)
     propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
     cost = "propellant\ng" if propellant else "impulse\nN m s"
     heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg")

@@ -1,0 +1,181 @@
+"""How near the spin axis comes to directions in space, and how far from them, in many cases at once.
+
+On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
+axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Any other motion is followed
+in steps. Arrays carry the case last, as in `rigid_cases`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.physics.rigid_cases import Bodies, advance
+
+Array = NDArray[np.float64]
+
+ROWS = 24
+"""Steps in each turn of the axis, where it is followed in steps; between them it nears at a rate that falls evenly."""
+
+CIRCLE = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisWatch:
+    """The ``least`` and the ``largest`` angles (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
+
+    The directions are inertial unit vectors. ``sense`` is the sign of the spin; ``rows``: which of the n cases those
+    are that are given to it.
+    """
+
+    directions: Array
+    least: Array
+    largest: Array
+    sense: float
+    rows: Any = ...
+
+    @classmethod
+    def of(cls, directions: Array, sense: float) -> AxisWatch:
+        """One that has seen nothing yet."""
+        shape = len(directions), directions.shape[2]
+        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense)
+
+    @property
+    def angles(self) -> Array:
+        """Least and largest, (m, 2, n)."""
+        return np.stack([self.least, self.largest], axis=1)
+
+    def some(self, cases: Any) -> AxisWatch:
+        """That of some of the cases (an index of arrays), to which it adds what it sees of them."""
+        rows = np.arange(self.least.shape[1])[self.rows][cases]
+        return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
+
+    def anew(self, cases: Any) -> AxisWatch:
+        """That of some of the cases, of which nothing has been seen yet."""
+        found = self.some(cases)
+        self.least[:, found.rows], self.largest[:, found.rows] = math.pi, 0.0
+        return found
+
+    @property
+    def count(self) -> int:
+        """How many cases are given to it."""
+        return len(np.arange(self.least.shape[1])[self.rows])
+
+    def motion(
+        self,
+        bodies: Bodies,
+        rates: Array,
+        quaternion: Array,
+        now: Array,
+        duration: Array,
+        torque: Array | None,
+        slope: Array | None = None,
+    ) -> None:
+        """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
+        if torque is None and bodies.free and bodies.forcing.growth == 0.0:
+            self._arc(bodies.moments, rates, quaternion, duration)
+        else:
+            self._steps(bodies, rates, quaternion, now, duration, torque, slope)
+
+    def turn(self, bodies: Bodies, rates: Array, quaternion: Array, now: Array) -> None:
+        """Take one turn of the axis about H, free of pulses, from ``now`` (n,) s."""
+        size = np.sqrt(np.sum((bodies.moments * rates) ** 2, axis=0))
+        duration = CIRCLE * 0.5 * (bodies.moments[0] + bodies.moments[1]) / size
+        self.motion(bodies, rates, quaternion, now, duration, None)
+
+    def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
+        rows = np.arange(self.least.shape[1])[self.rows][cases]
+        self.least[number, rows] = np.minimum(self.least[number, rows], least)
+        self.largest[number, rows] = np.maximum(self.largest[number, rows], largest)
+
+    def _arc(self, moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
+        """Begin and inner extremes of arcs; their ends are where others begin."""
+        momentum, axis = _rotated(quaternion, moments * rates), self._axis(quaternion)
+        size = np.sqrt(np.sum(momentum * momentum, axis=0))
+        momentum, way = momentum / size, size / moments[0] * duration
+        theta = _angles(momentum, axis)
+        for number, direction in enumerate(self.directions[:, :, self.rows]):
+            begins, beta = _angles(axis, direction), _angles(momentum, direction)
+            along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
+            ahead = np.sum(np.cross(momentum, axis, axis=0) * direction, axis=0)
+            nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
+            farthest = (nearest + math.pi) % CIRCLE
+            least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
+            self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
+
+    def _steps(
+        self,
+        bodies: Bodies,
+        rates: Array,
+        quaternion: Array,
+        now: Array,
+        duration: Array,
+        torque: Array | None,
+        slope: Array | None,
+    ) -> None:
+        """Begin and end of each step, and extremes between them."""
+        size = np.sqrt(np.sum((bodies.moments * rates) ** 2, axis=0))
+        pace = size / np.minimum(bodies.moments[0], bodies.moments[1])
+        if not np.array_equal(bodies.moments[0], bodies.moments[1]):
+            pace = pace + np.abs(rates[2])
+        count = max(math.ceil(float(np.max(pace * duration)) * ROWS / CIRCLE), 1)
+        step = duration / count
+
+        def after(start: tuple[Array, Array], since: Array, time: Array, cases: Any = ...) -> tuple[Array, Array]:
+            """The motion ``time`` s after ``start``, which is ``since`` s after ``now``."""
+            push, bend = (None if part is None else part[:, cases] for part in (torque, slope))
+            push = push if push is None or bend is None else push + bend * since
+            found = start[0].copy(), start[1].copy()
+            advance(bodies.some(cases), *found, now[cases] + since, time, push, bend)
+            return found
+
+        here = rates, quaternion
+        nearing = self._look(bodies, here, ...)
+        for index in range(count):
+            then, before, here = here, nearing, after(here, index * step, step)
+            nearing = self._look(bodies, here, ...)
+            for rise, fall in zip(before, nearing, strict=True):
+                cases = np.flatnonzero(rise * fall < 0.0)  # in between the axis comes nearest, or goes farthest
+                if len(cases):
+                    way = step[cases] * rise[cases] / (rise[cases] - fall[cases])
+                    start = then[0][:, cases], then[1][:, cases]
+                    self._look(bodies.some(cases), after(start, index * step[cases], way, cases), cases)
+
+    def _look(self, bodies: Bodies, motion: tuple[Array, Array], cases: Any) -> list[Array]:
+        """Take the angles of one moment; returns at what rate the axis comes nearer, in cosines by s."""
+        rates, quaternion = motion
+        axis, (first, second, _) = self._axis(quaternion), rates
+        moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
+        if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
+            momentum = _rotated(quaternion, bodies.moments * rates)
+            momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
+            cosine = np.sum(momentum * axis, axis=0)
+            moving = moving + bodies.forcing.growth * cosine * (cosine * axis - momentum)
+        nearing = []
+        for number, directions in enumerate(self.directions[:, :, self.rows]):
+            direction = directions[:, cases]
+            angles = _angles(axis, direction)
+            self._take(number, angles, angles, cases)
+            nearing.append(np.asarray(np.sum(moving * direction, axis=0)))
+        return nearing
+
+    def _axis(self, quaternion: Array) -> Array:
+        w, x, y, z = quaternion
+        return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _rotated(quaternion: Array, vector: Array) -> Array:
+    """Vectors (3, n) turned by unit quaternions (4, n)."""
+    w, axis = quaternion[0], quaternion[1:]
+    once = np.cross(axis, vector, axis=0)
+    return np.asarray(vector + 2.0 * (w * once + np.cross(axis, once, axis=0)))
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Angles (n,) between vectors (3, n), exact to rounding from 0 to π."""
+    across = np.cross(first, second, axis=0)
+    return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
