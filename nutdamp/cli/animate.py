@@ -45,7 +45,7 @@ def command(
     from nutdamp.presentation.figures import animation
 
     animation.film_format(output)
-    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, output=output)
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
     body, remark = job.spacecraft, job.remark
     pulses = plan_or_read(job, flown, options).pulses
 

@@ -87,7 +87,7 @@ def command(
     expect_impulses(impulses, force, True, "disperse")
     files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
     _expect_study(case, files)
-    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, figure=figure, **files)
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, **files)
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)
 

@@ -13,7 +13,7 @@ from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, EndTime, Named
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text, lacking
-from nutdamp.schemes import PLANNED, Options
+from nutdamp.schemes import Options
 
 
 @click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
@@ -57,7 +57,7 @@ def command(
     from nutdamp.decision import Decision
 
     form = _format(form, spacecraft, ctx.args)
-    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, output=output)
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
     plan = plan_or_read(job, flown, options)
     notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
@@ -66,7 +66,7 @@ def command(
         job.warn([missing])
     if output != "-":
         job.remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
-    if Decision(plan).met is False and (flown.scheme is None or flown.scheme in PLANNED):
+    if Decision(plan).met is False and flown.fires:
         job.remark(f"{plan.scheme} does not meet the requirement")
         leave(missed=True)
 

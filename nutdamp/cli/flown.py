@@ -11,7 +11,7 @@ import click
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.scheme_options import expect_read
-from nutdamp.schemes import NAMES, Options, SchemeOptions
+from nutdamp.schemes import NAMES, PLANNED, Options, SchemeOptions
 
 if TYPE_CHECKING:
     from nutdamp.cli.job import Job
@@ -25,29 +25,47 @@ JITTER_SEED = 1
 
 
 class Flown(NamedTuple):
-    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, else the recommended plan."""
+    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, those that the command blocks
+    of a file fire, else the recommended plan.
+    """
 
     scheme: str | None
     schedule: str | None
+    blocks: str | None
+
+    @property
+    def file(self) -> str | None:
+        """The file that is read, if any."""
+        return self.schedule if self.blocks is None else self.blocks
+
+    @property
+    def fires(self) -> bool:
+        """Whether it is to end somewhere: not so free motion."""
+        return self.scheme is None or self.scheme in PLANNED
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme`` and ``--schedule``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
+    """``--scheme``, ``--schedule`` and ``--blocks``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
 
     ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
-    A usage error for both.
+    A usage error for two of them.
     """
     default = f"{verb} this scheme with default options; without it the recommended one."
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
-        def gathered(*args: Any, scheme: str | None, schedule: str | None, **parameters: Any) -> Any:
-            if scheme is not None and schedule is not None:
-                raise click.UsageError(f"name what to {verb.lower()}: either --scheme or --schedule")
-            return command(*args, flown=Flown(scheme, schedule), **parameters)
+        def gathered(
+            *args: Any, scheme: str | None, schedule: str | None, blocks: str | None, **parameters: Any
+        ) -> Any:
+            flown = Flown(scheme, schedule, blocks)
+            if flown.count(None) < 2:
+                raise click.UsageError(f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks")
+            return command(*args, flown=flown, **parameters)
 
         read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
-        option = click.option("--schedule", type=FILE, help=read)(gathered)
+        fired = f"{verb} what the command blocks of a CSV file fire, as `plan --blocks` writes it."
+        option = click.option("--blocks", type=FILE, help=fired)(gathered)
+        option = click.option("--schedule", type=FILE, help=read)(option)
         return cast(Command, click.option("--scheme", type=SchemeName(NAMES), help=scheme or default)(option))
 
     return decorate
@@ -64,13 +82,18 @@ def compared_with(job: Job, names: Sequence[str], options: Options) -> Compariso
         return compare(job.spacecraft, names, options)
 
 
-def plan_or_read(job: Job, flown: Flown, options: Options) -> Plan:
-    """What a command flies, as a plan; raises Infeasible where there is none."""
+def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False) -> Plan:
+    """What a command flies, as a plan; raises Infeasible where there is none.
+
+    ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
+    """
     from nutdamp.errors import Infeasible
     from nutdamp.remarks import infeasibility, remarks
 
     if flown.schedule is not None:
         return _read(job, flown.schedule, options)
+    if flown.blocks is not None:
+        return _fired(job, flown.blocks, options, jitter=jitter)
     plan = _recommended(job, options) if flown.scheme is None else _planned(job, flown.scheme, options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
@@ -115,7 +138,7 @@ def _recommended(job: Job, options: Options) -> Plan:
     return plan
 
 
-def fire_blocks(job: Job, path: str, options: Options) -> Plan:
+def _fired(job: Job, path: str, options: Options, *, jitter: bool) -> Plan:
     """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
     from nutdamp.errors import printable
     from nutdamp.files.blocks_csv import read_blocks
@@ -125,8 +148,8 @@ def fire_blocks(job: Job, path: str, options: Options) -> Plan:
 
     body = job.spacecraft
     blocks, warnings = read_blocks(path, body)
-    if body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
+    if jitter and body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
         job.remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
-    made = fired(body, blocks, JITTER_SEED)
+    made = fired(body, blocks, JITTER_SEED if jitter else None)
     job.warn((*warnings, *broken_limits(body, made)))
     return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)

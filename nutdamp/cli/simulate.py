@@ -8,8 +8,9 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from nutdamp.cli.boundary import leave
 from nutdamp.cli.common import FIGURES, Input, plot_options, quiet_option, spacecraft_argument
-from nutdamp.cli.flown import Flown, fire_blocks, flown_options, plan_or_read
+from nutdamp.cli.flown import Flown, flown_options, plan_or_read
 from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, EndTime
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
@@ -33,7 +34,6 @@ PICTURED = 100_000
     "Propagate", "Plan this scheme with default options and propagate it, not the recommended one; none is free motion."
 )
 @goal_options
-@click.option("--blocks", type=FILE, help="Fire the command blocks of a CSV file, as `plan --blocks` writes it.")
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option(
     "--until",
@@ -53,7 +53,6 @@ def command(
     flown: Flown,
     options: Options,
     aim: Aim,
-    blocks: str | None,
     real: bool,
     until: float | None,
     samples: int,
@@ -66,15 +65,14 @@ def command(
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
-    SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this folder, else the built-in
-    example. A FILE of - is standard output, for --schedule standard input.
+    Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
+    breaks a cone of keep. SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this
+    folder, else the built-in example. A FILE of - is standard output, for --schedule standard input.
     """
-    if blocks is not None and flown != (None, None):
-        raise click.UsageError("name what to propagate: one of --scheme, --schedule and --blocks")
     if drawn and "-" in (csv, json, plot):
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
-    job = begin(spacecraft, flown.schedule, blocks, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
-    plan = plan_or_read(job, flown, options) if blocks is None else fire_blocks(job, blocks, options)
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
+    plan = plan_or_read(job, flown, options, jitter=True)
 
     from nutdamp.presentation.geometry import shown_until
     from nutdamp.presentation.verdicts import model_warnings
@@ -90,6 +88,7 @@ def command(
     outputs: list[Output] = [(csv, partial(_rows, made)), (json, partial(_data, made))]
     outputs.append((plot, partial(_picture, made, track, figure)))
     job.deliver(outputs, partial(_screen, made), *[partial(_drawing, made, track)] * drawn)
+    leave(missed=flown.fires and made.decision.met is False and len(made.flown.schedule) == len(pulses))
 
 
 def _rows(made: Simulation) -> Callable[[IO[bytes]], None]:

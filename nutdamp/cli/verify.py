@@ -35,9 +35,9 @@ def command(
     Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
     DOP853 and Basilisk are not confirmed: exit status 3.
     """
-    if looped and flown != (None, None):
-        raise click.UsageError("name what to verify: one of --scheme, --schedule and --loop")
-    job = begin(spacecraft, flown.schedule, aim=aim, quiet=quiet, json=json)
+    if looped and flown != (None, None, None):
+        raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, json=json)
     if looped:
         _verify_loop(job, json)
         return

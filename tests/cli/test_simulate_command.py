@@ -54,7 +54,7 @@ def test_an_edited_schedule_warns_of_columns_that_contradict(run: Run, tmp_path:
         writer.writeheader()
         writer.writerows(rows)
     done = run("simulate", "--schedule", "pulses.csv")
-    assert done.returncode == 0
+    assert done.returncode == 4  # one pulse shifts H by more than the requirement allows
     assert "pulses.csv:2: t_s" in done.stderr
     assert "start_s + on_time_s/2" in done.stderr
     assert done.stderr.count("ignored") == 1
@@ -160,3 +160,34 @@ def test_right_ascension_and_declination_with_an_attitude(run: Run, tmp_path: Pa
     done = run("simulate", "--scheme", "two-pulse")
     assert "right ascension" in done.stdout
     assert "EME2000" in done.stdout
+
+
+def test_the_exit_status_is_that_of_plan(run: Run) -> None:
+    """4 where the flown motion does not meet the requirement or keep a cone; free motion is to end nowhere."""
+    tight = ("--set", "requirement.momentum_shift=1e-4 deg")
+    for scheme in ("one-pulse", "four-pulse"):
+        for settings in ((), tight):
+            planned = run("plan", "--scheme", scheme, *settings).returncode
+            done = run("simulate", "--scheme", scheme, *settings)
+            assert done.returncode == planned
+            assert ("Requirement: NOT met" in done.stdout) == (planned == 4)
+    assert run("simulate", "--scheme", "four-pulse", *tight).returncode == 4
+    assert run("simulate", "--scheme", "none", *tight).returncode == 0
+    early = run("simulate", "--scheme", "four-pulse", *tight, "--until", "1 ms")
+    assert early.returncode == 0
+    assert "0 to 0.001 s" in early.stdout
+
+
+def test_a_cone_that_is_broken_is_as_bad(run: Run, tmp_path: Path) -> None:
+    text = (
+        "name: Keeper\ninertia: {A: 120, C: 80}\nstate: {spin: 30 rpm, nutation: 5 deg}\n"
+        "steerable: {torque: 60 N m}\nrequirement: {nutation: 1 deg}\n"
+        "attitude: {frame: EME2000, quaternion: [1, 0, 0, 0]}\n"
+        "keep: [{name: star, direction: [0, 89 deg], min: 1 deg}]\n"
+    )
+    kept = run("simulate", "-", "--scheme", "two-pulse", "--set", "keep=[]", stdin=text)
+    broken = run(
+        "simulate", "-", "--scheme", "two-pulse", "--json", "end.json", "--set", "keep.star.min=5 deg", stdin=text
+    )
+    assert (kept.returncode, broken.returncode) == (0, 4)
+    assert json.loads((tmp_path / "end.json").read_text())["decision"]["met"] is False

@@ -158,7 +158,7 @@ def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Pa
     """Too short, too long, off the ticks: as given, and reported."""
     (tmp_path / "s.csv").write_text("start_s,on_time_s,channel\n1,0.001,+M1\n5.0123456,3,+M2\n")
     done = run("simulate", "--schedule", "s.csv", "--set", "limits.tick=10 ms", "--json", "-")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 4, done.stderr
     pulses = json.loads(done.stdout)["pulses"]
     assert [pulse["on_time_s"] for pulse in pulses] == [0.001, 3.0]
     assert [pulse["impulse_Nms"][:2] for pulse in pulses] == [[pytest.approx(0.008), 0], [0, pytest.approx(24.0)]]
