@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 from nutdamp import schemes, views, work
 from nutdamp.errors import NutdampError
@@ -18,7 +17,7 @@ BUG = "internal error, please report"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(views.Tabled):
+class Comparison(views.Data, views.Tabled):
     """Several plans for one spacecraft, and which of them is recommended on what ground.
 
     ``comparison["two-pulse"]`` is one of them, iterating gives all.
@@ -48,10 +47,6 @@ class Comparison(views.Tabled):
     def warnings(self) -> tuple[str, ...]:
         """What the recommended plan does not reach, and what hinders it."""
         return views.sentences(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What ``plan --json`` gives."""
-        return views.data(self)
 
     @cached_property
     def recommendation(self) -> Recommendation[Plan]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.commands import Commands
-from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, commanded, touching
+from nutdamp.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, on_command, touching
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 OFF_TICK = 1e-6
@@ -250,7 +250,7 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
     bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
     if channel is not None and pulse.command is not None:
         start, on_time = pulse.loaded
-        return commanded(channel, windows.nearest_tick(start), windows.on_time(on_time, *bounds))
+        return on_command(channel, windows.nearest_tick(start), windows.on_time(on_time, *bounds))
     on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
     t = windows.nearest_tick(pulse.start) + 0.5 * on_time
     if channel is not None:

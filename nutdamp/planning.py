@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 from nutdamp import arguments, aspect, compliance, flight, schemes, views, work
 from nutdamp.aspect import Aspect
@@ -25,7 +24,7 @@ NO_NUTATION = 1e-12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(views.Tabled):
+class Plan(views.Data, views.Tabled):
     """A scheme's schedule for a spacecraft, and how it was judged.
 
     Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
@@ -84,10 +83,6 @@ class Plan(views.Tabled):
 
     def __len__(self) -> int:
         return len(self.pulses)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What ``plan --json`` says of it."""
-        return views.data(self)
 
     def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
         """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.

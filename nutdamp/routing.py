@@ -53,14 +53,14 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOption
     Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
     out.
     """
-    as_it_is = spacecraft.plain or schemes.SCHEMES[scheme].on_true_body
+    as_it_is = not spacecraft.thrust_laws or schemes.SCHEMES[scheme].on_true_body
     body = spacecraft if as_it_is else commanding.plain(spacecraft)
     for route in routes(spacecraft):
         if work.exhausted():
             return
         try:
             made = _over(body, scheme, options, route)
-            yield made if as_it_is else schemes.commanded(scheme, spacecraft, made, options)
+            yield made if as_it_is else schemes.as_commands(scheme, spacecraft, made, options)
         except Infeasible:
             continue
 

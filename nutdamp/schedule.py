@@ -146,7 +146,7 @@ def touching(time: float) -> float:
     return max(TOUCHING, math.ulp(time)) if math.isfinite(time) else 0.0
 
 
-def commanded(channel: Channel, start: float, on_time: float) -> Pulse:
+def on_command(channel: Channel, start: float, on_time: float) -> Pulse:
     """What ``channel`` gives when it is commanded on at ``start`` s for ``on_time`` s."""
     valve = channel.valve
     if valve is None:
@@ -165,7 +165,7 @@ def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
     if valve is None or on_time == 0.0:
         return _rectangle(channel, t, on_time)
     loaded = valve.on_time_for(float(on_time))
-    return commanded(channel, float(t) - valve.thrust(loaded).centroid, loaded)
+    return on_command(channel, float(t) - valve.thrust(loaded).centroid, loaded)
 
 
 def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ from nutdamp.rounding import cleaned
 from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
+
+VALVES, COLD, BLOWDOWN = "valves", "cold pulses", "blowdown"
+"""The `Spacecraft.thrust_laws` that there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +176,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spacecraft(views.Shown):
+class Spacecraft(views.Data, views.Shown):
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
@@ -227,18 +230,16 @@ class Spacecraft(views.Shown):
         return arguments.replaced(self, fields)
 
     @property
-    def plain(self) -> bool:
-        """Whether every command gives a rectangular pulse of full thrust: no valves, no cold nozzles, no blowdown."""
-        return self.cold is None and self.tank is None and not any(channel.valve for channel in self.channels)
+    def thrust_laws(self) -> tuple[str, ...]:
+        """What makes the pulse of a command other than a rectangle of the thrust of the file, in words."""
+        valves = any(channel.valve is not None for channel in self.channels)
+        laws = (VALVES, valves), (COLD, self.cold is not None), (BLOWDOWN, self.tank is not None)
+        return tuple(name for name, holds in laws if holds)
 
     @property
     def rates(self) -> Vector:
         """Body rates at t = 0, (3,) rad/s, in the axes of the file."""
         return self.inertia.in_file(self.omega0)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What the JSON files say of it."""
-        return views.data(self)
 
     @property
     def watched(self) -> tuple[Keep, ...]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.errors import Infeasible
-from nutdamp.schedule import Pulse, Schedule, commanded
-from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.schedule import Pulse, Schedule, on_command
+from nutdamp.spacecraft import BLOWDOWN, COLD, VALVES, Channel, Spacecraft
 
 
 @dataclass(eq=False)
@@ -20,11 +20,11 @@ class Supply:
     spacecraft: Spacecraft
     fired: Counter[str] = field(default_factory=Counter)
     used: Any = 0.0
+    steady: bool = field(init=False)
+    """Whether every pulse is as strong as the file says."""
 
-    @property
-    def steady(self) -> bool:
-        """Whether every pulse is as strong as the file says."""
-        return self.spacecraft.cold is None and self.spacecraft.tank is None
+    def __post_init__(self) -> None:
+        self.steady = not {COLD, BLOWDOWN} & set(self.spacecraft.thrust_laws)
 
     def level(self, channel: str) -> Any:
         """Thrust of the next pulse of ``channel``, over that of the file."""
@@ -59,11 +59,18 @@ class Supply:
         self.used = self.used + (0.0 if propellant is None else propellant)
         return level, propellant
 
-    def expect_to_last(self) -> None:
-        """Raise Infeasible where more has been fired than the tank has."""
+    @property
+    def shortage(self) -> str | None:
+        """That more has been fired than the tank has; None where it has not."""
         tank = self.spacecraft.tank
-        if tank is not None and self.used > tank.propellant:
-            raise Infeasible(f"takes {self.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg")
+        if tank is None or self.used <= tank.propellant:
+            return None
+        return f"takes {self.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg"
+
+    def expect_to_last(self) -> None:
+        """Raise Infeasible where there is a `shortage`."""
+        if self.shortage is not None:
+            raise Infeasible(self.shortage)
 
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:
@@ -75,28 +82,17 @@ def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ..
     return tuple(supply.fire(pulse, channels.get(pulse.channel)) for pulse in ordered)
 
 
-VALVES, COLD, BLOWDOWN = "valves", "cold pulses", "blowdown"
-
-
-def thrust_laws(spacecraft: Spacecraft) -> Iterator[str]:
-    """What lets commands of a spacecraft give something else than rectangles of the thrust of the file, in words."""
-    if any(channel.valve is not None for channel in spacecraft.channels):
-        yield VALVES
-    if spacecraft.cold is not None:
-        yield COLD
-    if spacecraft.tank is not None:
-        yield BLOWDOWN
-
-
 def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
-    """The body without one ``law`` of `thrust_laws`, and what the commands of ``schedule`` give then."""
+    """The body without one ``law`` of `Spacecraft.thrust_laws`, and what the commands of ``schedule`` give then."""
     if law == VALVES:
         body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
     else:
         body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=None)
     known = {channel.name: channel for channel in body.channels}
     fired = [
-        commanded(known[pulse.channel], *pulse.loaded) if pulse.channel in known and pulse.torque is not None else pulse
+        on_command(known[pulse.channel], *pulse.loaded)
+        if pulse.channel in known and pulse.torque is not None
+        else pulse
         for pulse in schedule
     ]
     return body, Schedule(supplied(body, fired))

@@ -15,7 +15,7 @@ from nutdamp.physics import attitude, rates
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
-from nutdamp.supply import lacking, supplied, thrust_laws
+from nutdamp.supply import lacking, supplied
 
 SAMPLES = 201
 """Even times at which two flights are compared, besides the edges of the pulses."""
@@ -250,7 +250,7 @@ def _budget(
         rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
     if spacecraft.growth != 0.0:
         rows.append((f"{WITHOUT}dissipation", replace(ideal, dissipation=None), sharp))
-    rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in thrust_laws(spacecraft)]
+    rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in spacecraft.thrust_laws]
     if spacecraft.disturbances and expected:
         rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
     return tuple(

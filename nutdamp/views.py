@@ -90,6 +90,14 @@ class Shown:
         return html(self)
 
 
+class Data:
+    """A result that JSON files hold."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``plan --json`` gives, or says of it."""
+        return data(self)
+
+
 class Tabled(Shown):
     """A result that has rows."""
 

@@ -241,7 +241,7 @@ class Model:
             return _Actuation(pulse, source, pulse.on_time, _parts(pulse.impulse))
         torque = np.sum([thruster.torque for thruster in thrusters], axis=0)
         duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(torque))
-        if pulse.torque is not None and not self.spacecraft.plain:  # weaker where it is cold or the pressure falls
+        if pulse.torque is not None and self.spacecraft.thrust_laws:  # weaker where it is cold or the pressure falls
             duration *= float(torque @ pulse.torque) / float(torque @ torque)
         remainder = pulse.impulse - duration * torque
         if np.linalg.norm(remainder) <= ROUNDING * np.linalg.norm(pulse.impulse):

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.files.facts import Facts, Finding, Vector
-from nutdamp.files.rules import spin_axis, spin_of, symmetric, tensor_fault, tensor_of
+from nutdamp.files.rules import inertia_of, spin_axis, spin_of
 from nutdamp.files.thruster_rules import instead, norm, on_times_of, torque_of
 from nutdamp.files.yaml_tree import KeyPath, Node
-from nutdamp.physics.inertia import principal_axes
 from nutdamp.spacecraft import Inertia
 from nutdamp.units import shown
 
@@ -74,22 +73,6 @@ def channel_facts(facts: Facts) -> list[ChannelFacts]:
         least, most = max((one for one, _ in times), default=0.0), min((one for _, one in times), default=math.inf)
         found.append(ChannelFacts(name, total, damps, least, most))
     return found
-
-
-def inertia_of(facts: Facts) -> Inertia | None:
-    """The inertia; None where it cannot be read, or no body can have it and spin."""
-    tensor = tensor_of(facts)
-    try:
-        if tensor is not None:
-            return None if tensor_fault(tensor) else _spinning(Inertia(*principal_axes(symmetric(tensor))))
-        A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
-        return None if A is None or C is None or min(A, C) <= 0.0 or C > 2.0 * A else Inertia((A, A, C))
-    except ValueError:
-        return None
-
-
-def _spinning(inertia: Inertia) -> Inertia | None:
-    return inertia if math.isfinite(inertia.body_rate) else None
 
 
 def _thresholds(facts: Facts) -> Iterator[Finding]:

@@ -6,11 +6,10 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.files.facts import Facts, Finding
-from nutdamp.files.rules import spin_of, symmetric, tensor_of
+from nutdamp.files.rules import inertia_of, spin_of
 from nutdamp.files.thrust_rules import VALVE_TIMES
 from nutdamp.files.yaml_tree import KeyPath, Node
-from nutdamp.physics.cones import momentary, nutation_angle
-from nutdamp.physics.inertia import principal_axes
+from nutdamp.physics.cones import momentary
 from nutdamp.units import KINDS
 
 FAR = 50.0
@@ -93,15 +92,11 @@ def _requirements(facts: Facts) -> Iterator[Finding]:
 
 def _nutation(facts: Facts) -> float:
     """Nutation angle at t = 0, rad; infinite where it cannot be read."""
-    stated, tensor = facts.number("angle", "state", "nutation"), tensor_of(facts)
+    stated, inertia = facts.number("angle", "state", "nutation"), inertia_of(facts)
     omega0, spin = facts.vector("rate", 3, "omega0"), spin_of(facts)
-    A, C = (facts.number("inertia", "inertia", key) for key in "AC")
-    if stated is not None or omega0 is None or spin is None:
+    if stated is not None or omega0 is None or spin is None or inertia is None:
         return math.inf if stated is None else stated
-    if tensor is None:
-        return math.inf if A is None or C is None else nutation_angle(A, C, math.hypot(*omega0[:2]), spin)
-    moments, axes = principal_axes(symmetric(tensor))
-    return momentary(moments, axes.T @ omega0, math.copysign(1.0, spin)).nutation
+    return momentary(inertia.moments, inertia.axes.T @ omega0, math.copysign(1.0, spin)).nutation
 
 
 def _lengths(facts: Facts) -> Iterator[KeyPath]:

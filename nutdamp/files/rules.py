@@ -5,6 +5,7 @@ The rules read the raw tree and skip what cannot be read, so that they speak up 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,6 +19,7 @@ from nutdamp.files.yaml_tree import KeyPath, Node, dotted
 from nutdamp.physics import stability
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
+from nutdamp.spacecraft import Inertia
 from nutdamp.units import shown
 
 Vector = NDArray[np.float64]
@@ -125,6 +127,22 @@ def tensor_fault(tensor: Vector) -> Finding | None:
         problem = f"principal moments {values} kg m^2: the largest must not exceed the sum of the other two"
         return Finding(path, f"{problem} (triangle inequality)")
     return None
+
+
+def inertia_of(facts: Facts) -> Inertia | None:
+    """The inertia; None where it cannot be read, or no body can have it and spin."""
+    tensor = tensor_of(facts)
+    try:
+        if tensor is not None:
+            return None if tensor_fault(tensor) else _spinning(Inertia(*principal_axes(symmetric(tensor))))
+        A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
+        return None if A is None or C is None or min(A, C) <= 0.0 or C > 2.0 * A else Inertia((A, A, C))
+    except ValueError:
+        return None
+
+
+def _spinning(inertia: Inertia) -> Inertia | None:
+    return inertia if math.isfinite(inertia.body_rate) else None
 
 
 def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:

@@ -19,7 +19,7 @@ from nutdamp.files.pulses_csv import EFFECTIVE, HEADER, IMPULSE, TORQUE, UTC
 from nutdamp.files.table import Cells, Table
 from nutdamp.planning import Plan
 from nutdamp.remarks import broken_limits
-from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, commanded, overlapping
+from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, on_command, overlapping
 from nutdamp.schemes import SchemeOptions
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 from nutdamp.supply import Supply
@@ -81,10 +81,8 @@ class _Reader:
             if line in self.commanded:
                 self._expect(line, self.commanded[line], fired)
             yield fired
-        tank = self.spacecraft.tank
-        if tank is not None and supply.used > tank.propellant:
-            text = f"takes {supply.used:.4g} kg of propellant in all, and the tank has {tank.propellant:.4g} kg"
-            self.table.warn(pulses[-1][0], "tank", text)
+        if supply.shortage is not None:
+            self.table.warn(pulses[-1][0], "tank", supply.shortage)
 
     def _instead(self, name: str) -> str:
         """The channel that a name not in the file may stand for, or all there are."""
@@ -117,7 +115,7 @@ class _Reader:
         t, on_time, start = timing
         if channel is not None and on_time > 0.0:
             self.commanded[line] = cells
-            return channel_pulse(channel, t, on_time) if start is None else commanded(channel, start, on_time)
+            return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
         return self._as_given(line, cells, name, t, on_time)
 
     def _timing(self, line: int, cells: Cells, channel: Channel | None) -> tuple[float, float, float | None] | None:

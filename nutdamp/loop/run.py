@@ -12,18 +12,18 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dynamics import make_dynamics
+from nutdamp.dynamics import Dynamics, make_dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight, Leg
 from nutdamp.limits import commandable
 from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
 from nutdamp.loop.law import ComplexArray, Firing, Law
 from nutdamp.loop.sensor import Estimator, Signal
-from nutdamp.loop.watch import GRID, MOST, Coast, Found, Mover, Seen, Watch
+from nutdamp.loop.watch import GRID, MOST, Coast, Found, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER, Loop
 from nutdamp.motion import Path
 from nutdamp.physics import rigid
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, commanded
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, on_command
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.supply import Supply
 
@@ -96,7 +96,7 @@ def fly(
     seed: int | tuple[int, ...] = SEED,
     law: Law | None = None,
     scatter: Scatter | None = None,
-    dynamics: Mover | None = None,
+    dynamics: Dynamics | None = None,
 ) -> Run:
     """The loop of a ``spacecraft`` flown to ``until`` s; ``dynamics`` flies it by another integrator.
 
@@ -120,7 +120,7 @@ class Scatter(Protocol):
 class _Flown:
     """One flight in the making, each stretch by itself."""
 
-    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Mover, seed: int | tuple[int, ...]) -> None:
+    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, seed: int | tuple[int, ...]) -> None:
         self.pilot, self.signal, self.dynamics, self.seed = pilot, signal, dynamics, seed
         self.legs: list[Leg] = []
 
@@ -241,7 +241,7 @@ class Pilot:
         factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
         if channel is not known or late != 0.0:
             begins, lasts = made.loaded
-            made = commanded(channel, max(begins + late, found.now), lasts)
+            made = on_command(channel, max(begins + late, found.now), lasts)
         if made.over > self.until:
             return None
         if len(self.fired) == self.most:

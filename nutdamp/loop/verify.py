@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from nutdamp.dop853 import Equations
+from nutdamp.dynamics import Dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.loop.run import SEED, Run, fly
 from nutdamp.motion import Path
+from nutdamp.physics.rigid import NOTHING
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 AGREE = 1e-6
@@ -31,29 +33,26 @@ class _Solved:
         return self.equations.motion(np.atleast_2d(self.solution(np.asarray(times, dtype=float)).T))
 
 
-@dataclass(frozen=True, eq=False)
-class Independent:
-    """Moves a body by DOP853 on Euler's equations with the full tensor."""
+@dataclass(frozen=True, slots=True)
+class _Independent(Dynamics):
+    """Moves a body by DOP853 on Euler's equations with the full tensor; evaluations of these are counted, not steps."""
 
-    equations: Equations
-    free: bool = False
+    equations: Equations = field(kw_only=True)
 
     @property
-    def moments(self) -> tuple[float, float, float]:
-        """Principal moments, kg m²."""
-        return self.equations.spacecraft.inertia.moments
+    def free(self) -> bool:
+        """Whether coasts are known in closed form: none is."""
+        return False
 
-    def path(
+    def _path(
         self,
         state: SpinState,
         start: float,
         end: float,
-        torques: Sequence[Vector] = (),
-        slope: Vector | None = None,
-        *,
-        most: int,  # noqa: ARG002 - evaluations are counted instead
+        torques: Sequence[Vector],
+        slope: Vector | None,
+        most: int,  # noqa: ARG002 - of steps
     ) -> tuple[Path, SpinState]:
-        """The motion from ``state``, and how it ends; raises Infeasible where all takes too many evaluations."""
         first = self.equations.state(state)
         if end <= start:
             return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
@@ -97,9 +96,10 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     loop = spacecraft.loop
     assert loop is not None
     run = fly(spacecraft, loop, until, seed=seed)
-    equations = Equations(spacecraft)
+    equations, inertia = Equations(spacecraft), spacecraft.inertia
+    mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
     try:
-        other = fly(spacecraft, loop, run.until, seed=seed, dynamics=Independent(equations))
+        other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
     except Infeasible as reason:
         return LoopVerification(run, None, str(reason), equations.evaluations)
     pairs = tuple(

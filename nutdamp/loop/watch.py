@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dynamics import Dynamics
 from nutdamp.loop.law import Actuator, ComplexArray, Firing, Law
 from nutdamp.loop.sensor import Estimator, Signal
 from nutdamp.motion import Path
@@ -30,33 +30,6 @@ SAMPLED = 1e-6
 
 REFINED = 60
 """Steps, at most, in which the moment of a firing is found between two of the `GRID`."""
-
-
-class Mover(Protocol):
-    """What flies a loop: `dynamics.Dynamics`, or another integrator in its place."""
-
-    @property
-    def moments(self) -> tuple[float, float, float]:
-        """Principal moments, kg m²."""
-        ...
-
-    @property
-    def free(self) -> bool:
-        """Whether coasts are known in closed form, so that one may look at any of their moments."""
-        ...
-
-    def path(
-        self,
-        state: SpinState,
-        start: float,
-        end: float,
-        torques: Sequence[Vector] = (),
-        slope: Vector | None = None,
-        *,
-        most: int,
-    ) -> tuple[Path, SpinState]:
-        """See `dynamics.Dynamics.path`."""
-        ...
 
 
 class Seen(NamedTuple):
@@ -175,7 +148,7 @@ class Watch:
 class Coast(Watch):
     """The motion of one body from ``state`` at ``since`` s on without firing, and what is seen of it."""
 
-    def __init__(self, law: Law, signal: Signal, dynamics: Mover, state: SpinState, since: float) -> None:
+    def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
         super().__init__(law, since)
         self.signal, self.dynamics = signal, dynamics
         self.path: Path | None = None

@@ -12,7 +12,7 @@ from rich.text import Text
 from nutdamp import survey
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
-from nutdamp.presentation.text import degrees, duration, moment, quantity, vector
+from nutdamp.presentation.text import degrees, duration, in_degrees, moment, quantity, vector
 from nutdamp.spacecraft import Channel, Cold, Spacecraft, SunSensor, Tank
 from nutdamp.words import listed
 
@@ -84,7 +84,7 @@ def turns_table(found: Iterable[survey.Turns]) -> Table:
     )
     for one in found:
         ends = ((one.smallest, one.smallest_width), (one.largest, one.largest_width))
-        cells = [text for turn, width in ends for text in (degrees(turn).removesuffix(" deg"), duration(width))]
+        cells = [text for turn, width in ends for text in (in_degrees(turn), duration(width))]
         table.add_row(one.channel.name, *cells)
     return table
 
@@ -124,8 +124,8 @@ def channel_table(spacecraft: Spacecraft) -> Table:
             channel.name,
             vector(spacecraft.inertia.in_file(channel.torque)),
             _on_times(channel),
-            "any" if steps.smallest == 0.0 else degrees(steps.smallest).removesuffix(" deg"),
-            degrees(steps.largest).removesuffix(" deg"),
+            "any" if steps.smallest == 0.0 else in_degrees(steps.smallest),
+            in_degrees(steps.largest),
         )
     return table
 

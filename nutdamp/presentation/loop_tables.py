@@ -20,7 +20,7 @@ from nutdamp.presentation.decisions import cost, decision_table, requirement
 from nutdamp.presentation.end_tables import end_table
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import header
-from nutdamp.presentation.text import degrees, duration, moment, most
+from nutdamp.presentation.text import degrees, duration, in_degrees, moment, most
 from nutdamp.spacecraft import Spacecraft
 
 SHOWN = 40
@@ -122,7 +122,7 @@ def _firings(run: Run) -> Table:
     before, after = run.flight.around_pulses()
     for index, one in enumerate(run.fired[:SHOWN]):
         angles = (one.seen, float(before.nutation[index]), float(after.nutation[index]))
-        shown = (degrees(angle).removesuffix(" deg") for angle in angles)
+        shown = (in_degrees(angle) for angle in angles)
         pulse = one.pulse
         table.add_row(str(index + 1), f"{pulse.start:.4f}", f"{pulse.on_time:.4f}", pulse.channel, *shown)
     return table
@@ -140,7 +140,7 @@ def verification_screen(found: LoopVerification) -> RenderableType:
     for index, (one, apart) in enumerate(zip(run.fired[:SHOWN], found.pairs, strict=False), start=1):
         start, on_time = one.pulse.loaded
         what = (f"{start:.4f}", _apart(apart[0]), f"{on_time:.4f}", _apart(apart[1]))
-        nutation = degrees(one.true_nutation).removesuffix(" deg")
+        nutation = in_degrees(one.true_nutation)
         table.add_row(str(index), one.pulse.channel, *what, nutation, _apart(math.degrees(apart[2])))
     said = f"DOP853 on the full tensor, {found.evaluations:,} evaluations, fires "
     if found.agree:

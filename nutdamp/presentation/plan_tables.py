@@ -22,7 +22,7 @@ from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.decisions import decision_screen
 from nutdamp.presentation.end_tables import add_aspects, angle_names, angle_texts, direction_text, spin_text
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, steering
+from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, mass, moment, most, quantity, steering
 from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
@@ -274,8 +274,8 @@ def pulse_table(plan: Plan) -> Table:
         *([("effective\ns", [f"{pulse.on_time:.4f}" for pulse in pulses])] if pulses.through_valves else []),
         ("channel\n", [channel_text(pulse, body) for pulse in pulses]),
         ("impulse\nN m s", [f"{pulse.magnitude:.4g}" for pulse in pulses]),
-        ("nutation\ndeg", [degrees(angle).removesuffix(" deg") for angle in before.nutation.tolist()]),
-        ("after\ndeg", [degrees(angle).removesuffix(" deg") for angle in after.nutation.tolist()]),
+        ("nutation\ndeg", [in_degrees(angle) for angle in before.nutation.tolist()]),
+        ("after\ndeg", [in_degrees(angle) for angle in after.nutation.tolist()]),
     ]
     table = columns(*(name for name, _ in cells), text=("channel\n",))
     for row in zip(*(column for _, column in cells), strict=True):

@@ -11,7 +11,7 @@ from nutdamp.presentation import verdicts
 from nutdamp.presentation.decisions import figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
-from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison
 
@@ -65,7 +65,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
             one.variant + " *" * (one is found.usual),
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
-            *(degrees(angle).removesuffix(" deg") for angle in (one.nominal, one.left)),
+            *(in_degrees(angle) for angle in (one.nominal, one.left)),
             *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * counted,
         )
     what = verdicts.left_name(found.comparison.spacecraft)

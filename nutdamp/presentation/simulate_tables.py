@@ -15,7 +15,7 @@ from nutdamp.presentation.decisions import decision_table, requirement
 from nutdamp.presentation.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.plan_tables import channel_text, header
-from nutdamp.presentation.text import degrees, longitude, moment, pointing, quantity
+from nutdamp.presentation.text import degrees, in_degrees, longitude, moment, pointing, quantity
 from nutdamp.presentation.verdicts import model_warnings
 from nutdamp.simulation import Simulation
 from nutdamp.track import Extremes
@@ -57,7 +57,7 @@ def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
         what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
         for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
             cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
-            table.add_row(*cells, when, *(degrees(cone).removesuffix(" deg") for cone in cones))
+            table.add_row(*cells, when, *(in_degrees(cone) for cone in cones))
     return table
 
 

@@ -36,6 +36,11 @@ def degrees(angle: float | None) -> str:
     return f"{shown:.4g} deg"
 
 
+def in_degrees(angle: float | None) -> str:
+    """`degrees` without the unit, for columns that name it."""
+    return degrees(angle).removesuffix(" deg")
+
+
 def most(angle: float) -> str:
     """The most that an angle may be, given in rad, in degrees: as it was given, however small."""
     return f"{math.degrees(angle):.4g} deg"

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
-from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import AGREE, WITHOUT, Verification
 
@@ -64,8 +64,8 @@ def methods_table(found: Verification) -> Table:
             differences = (method.axis, method.momentum, method.rate)
             table.add_row(
                 method.name,
-                degrees(method.nutation).removesuffix(" deg"),
-                degrees(method.momentum_shift).removesuffix(" deg"),
+                in_degrees(method.nutation),
+                in_degrees(method.momentum_shift),
                 *map(_difference, differences),
             )
     return table
@@ -83,7 +83,7 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
     table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
     for row in found.budget:
         angles = (row.nutation, row.axis_error)
-        table.add_row(row.name, *(degrees(angle).removesuffix(" deg") for angle in angles))
+        table.add_row(row.name, *(in_degrees(angle) for angle in angles))
     return table
 
 

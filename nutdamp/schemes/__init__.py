@@ -83,7 +83,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     chosen = options_of(scheme, options)
     if scheme.on_true_body:
         return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
-    if not spacecraft.plain:
+    if spacecraft.thrust_laws:
         from nutdamp.schemes.tools import commanding
 
         on_plain = commanding.options(spacecraft, chosen)
@@ -105,7 +105,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
 
 MOVED = 8
-"""Of equal pulses, of which each has one number less to be corrected by, so many are moved."""
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
 
 LONGER = 4.0
 """Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
@@ -148,16 +148,16 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     from nutdamp.schemes.tools.symmetric_model import model_of
 
     chosen = options_of(scheme, options)
-    if not spacecraft.plain:
+    if spacecraft.thrust_laws:
         from nutdamp.schemes.tools import commanding
 
         found = alternatives(name, commanding.plain(spacecraft), commanding.options(spacecraft, chosen))
-        return [commanded(name, spacecraft, made, chosen) for made in found]
+        return [as_commands(name, spacecraft, made, chosen) for made in found]
     model = model_of(spacecraft)
     return [_corrected(scheme, model, made, chosen) for made in _loaded(scheme).alternatives(model.body, chosen)]
 
 
-def commanded(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
+def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
     """A schedule ``made`` for the `commanding.plain` body of a ``spacecraft`` as its commands, corrected on its motion.
 
     Raises KeyError for a name not in `NAMES`.
@@ -166,7 +166,7 @@ def commanded(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice
 
     scheme = SCHEMES[name]
     chosen = commanding.options(spacecraft, options_of(scheme, options))
-    return commanding.commanded(spacecraft, made, _Correction(scheme, chosen))
+    return commanding.as_commands(spacecraft, made, _Correction(scheme, chosen))
 
 
 def _loaded(scheme: Scheme) -> ModuleType:

@@ -20,7 +20,7 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics.feed import Cold
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
-from nutdamp.schedule import Schedule, commanded
+from nutdamp.schedule import Schedule, on_command
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.supply import supplied
 
@@ -50,7 +50,7 @@ def through(valve: Valve, of: str = "", other: Valve | None = None) -> Spacecraf
 def refired(body: Spacecraft, made: Schedule) -> Schedule:
     """The same commands to a body that is not as it was planned for."""
     channels = {one.name: one for one in body.channels}
-    return Schedule(supplied(body, (commanded(channels[pulse.channel], *pulse.loaded) for pulse in made)))
+    return Schedule(supplied(body, (on_command(channels[pulse.channel], *pulse.loaded) for pulse in made)))
 
 
 def nutation(model: Model, draws: dict[str, float]) -> float:
@@ -124,7 +124,7 @@ dispersions:
 
 def test_what_is_drawn_and_what_touches_nothing() -> None:
     body = read_spacecraft(FILE + "cold: {first: 90 %, pulses: 4}\n" + TOLERANCES, "sat.yaml")
-    fires = Schedule(tuple(commanded(one, 1.0 + number, 0.05) for number, one in enumerate(body.channels)))
+    fires = Schedule(tuple(on_command(one, 1.0 + number, 0.05) for number, one in enumerate(body.channels)))
     drawn, unused = list_inputs(body, fires)
     assert [one.name for one in drawn] == [
         "open_delay a",
@@ -146,7 +146,7 @@ def test_what_is_drawn_and_what_touches_nothing() -> None:
 def test_a_study_spreads_as_its_valves_do() -> None:
     """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the draws."""
     body = read_spacecraft(FILE + "dispersions: {close_delay: {a: {normal: 1 ms}}}\n", "sat.yaml")
-    fires = Schedule((commanded(body.channels[0], 1.0, 0.05),))
+    fires = Schedule((on_command(body.channels[0], 1.0, 0.05),))
     found = run(Results(study_of(body, fires, seed=3), 4000)).distribution("nutation")
     slope = [nutation(Model(body, fires), {"close_delay a": late}) for late in (-0.001, 0.001)]
     assert found is not None

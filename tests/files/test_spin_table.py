@@ -19,7 +19,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.exchange import export_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.files.spin_table import HEADER, spin_table
-from nutdamp.schedule import Schedule, channel_pulse, commanded
+from nutdamp.schedule import Schedule, channel_pulse, on_command
 from nutdamp.spacecraft import Limits, Spacecraft
 
 SUNLIT = spinners.FILE.replace("C: 180", "C: 150")
@@ -132,7 +132,7 @@ def test_through_valves_on_times_and_phases_are_those_commanded() -> None:
     valve = "valve: {open_delay: 15 ms, close_delay: 5 ms, rise_time: 10 ms, fall_time: 2 ms}\n"
     body = read_spacecraft(SUNLIT + valve, "sunlit.yaml")
     (one,) = body.channels
-    fired = commanded(one, 6.0, 0.2)
+    fired = on_command(one, 6.0, 0.2)
     assert fired.on_time == pytest.approx(0.186, rel=1e-12)
     (row,) = [row for row in table(spin_table(body, Schedule((fired,)), 10.0)) if row["pulses"] == "1"]
     assert float(row["on_time_s"]) == 0.2

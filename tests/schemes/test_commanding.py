@@ -20,7 +20,7 @@ from nutdamp.limits import breaches, effective_on_times
 from nutdamp.physics.feed import Cold
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
 from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, commanded
+from nutdamp.schedule import Schedule, on_command
 from nutdamp.schemes.options import FourPulseOptions, RhumbLineOptions
 from nutdamp.spacecraft import Channel, Limits, Spacecraft
 from nutdamp.verification import verify
@@ -111,7 +111,7 @@ def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, 
     assert left(made, late) < MICRODEGREE
     channels = {one.name: one for one in late.channels}
     unaware = made_by(scheme, body)
-    fired = Schedule(tuple(commanded(channels[one.channel], *one.loaded) for one in unaware))
+    fired = Schedule(tuple(on_command(channels[one.channel], *one.loaded) for one in unaware))
     assert left(fired, late) > 1000.0 * MICRODEGREE
 
 

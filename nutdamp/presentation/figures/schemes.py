@@ -15,7 +15,7 @@ from nutdamp.decision import Decision
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
-from nutdamp.presentation.text import degrees
+from nutdamp.presentation.text import in_degrees
 from nutdamp.presentation.verdicts import percent
 from nutdamp.recommendation import Standing, by_propellant
 
@@ -128,7 +128,7 @@ def _columns(compared: Comparison) -> list[Quantity]:
 
 
 def _angle(value: float) -> str:
-    return degrees(math.radians(value)).removesuffix(" deg")
+    return in_degrees(math.radians(value))
 
 
 def _complying(shares: Mapping[str, float], probability: float) -> Quantity:

@@ -16,7 +16,7 @@ from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_table
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
-from nutdamp.presentation.text import MISSING, degrees, longitude, moment
+from nutdamp.presentation.text import MISSING, in_degrees, longitude, moment
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -170,7 +170,7 @@ def _angles(phases: Vector) -> list[str]:
 
 
 def _plain(angles: Vector) -> list[str]:
-    return [degrees(angle).removesuffix(" deg") for angle in angles.tolist()]
+    return [in_degrees(angle) for angle in angles.tolist()]
 
 
 def _small(value: float) -> str:

@@ -18,7 +18,7 @@ from nutdamp.presentation.decisions import COUNT, KEPT
 from nutdamp.presentation.end_tables import angle_names, angle_texts, bounds_text
 from nutdamp.presentation.page.document import Column, Sheet
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, ratios
-from nutdamp.presentation.text import MISSING, degrees, longitude
+from nutdamp.presentation.text import MISSING, in_degrees, longitude
 
 Cell = Callable[[Plan], str]
 
@@ -89,7 +89,7 @@ def _pointing(plan: Plan, which: int) -> str:
 
 
 def _angle(left: Residual | None, name: str) -> str:
-    return MISSING if left is None else degrees(getattr(left, name)).removesuffix(" deg")
+    return MISSING if left is None else in_degrees(getattr(left, name))
 
 
 def pulse_sheet(plan: Plan) -> Sheet:
@@ -110,7 +110,7 @@ def pulse_sheet(plan: Plan) -> Sheet:
     ]
     for cone in ("nutation", "body_cone", "space_cone"):
         for track, when in zip(tracks, ("before", "after"), strict=True):
-            angles = [degrees(angle).removesuffix(" deg") for angle in getattr(track, cone).tolist()]
+            angles = [in_degrees(angle) for angle in getattr(track, cone).tolist()]
             columns.append((Column(f"{cone.replace('_', ' ')} {when}", "deg"), angles))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet(f"Pulses of {plan.scheme}", tuple(column for column, _ in columns), rows)
@@ -121,11 +121,7 @@ def aspects_sheet(decided: Decision) -> Sheet:
     rows = tuple(
         (
             one.keep.name,
-            *(
-                cell
-                for angle, at in (one[1:3], one[3:5])
-                for cell in (degrees(angle).removesuffix(" deg"), f"{at:.3f}")
-            ),
+            *(cell for angle, at in (one[1:3], one[3:5]) for cell in (in_degrees(angle), f"{at:.3f}")),
             bounds_text(one.keep) or "none",
             KEPT[one.kept] if one.keep in decided.plan.spacecraft.keep else MISSING,
         )

@@ -108,7 +108,7 @@ class Correct(Protocol):
 
 
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
-    """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `commanded`."""
+    """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
     weakest, strongest, room = 1.0, 1.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     made: Schedule | None = None
@@ -128,7 +128,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         if too_weak or too_strong:
             weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
             continue
-        found = commanded(spacecraft, made, correct)
+        found = as_commands(spacecraft, made, correct)
         kept, left = keeps_limits(spacecraft, found.pulses), _left(spacecraft, found, correct)
         tried.append((not kept, left, found))
         rounded = spacecraft.limits.tick is not None
@@ -139,7 +139,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
         room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in made))
     assert made is not None
-    return min(tried, key=lambda one: one[:2])[2] if tried else commanded(spacecraft, made, correct)
+    return min(tried, key=lambda one: one[:2])[2] if tried else as_commands(spacecraft, made, correct)
 
 
 def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
@@ -148,7 +148,7 @@ def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
     return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
 
-def commanded(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
+def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
     """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
 
     Commands that give no thrust are left out. Raises Infeasible where the propellant does not last.

@@ -15,7 +15,7 @@ from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.physics.rigid_cases import Bodies
 from nutdamp.physics.sun_clock import Stretch, SunClock
-from nutdamp.schedule import Pulse, Schedule, commanded
+from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.supply import Supply
 
@@ -135,7 +135,7 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
             due = float(found.since[0] + delay[0])
             if due < over - 1e-9:
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
-            given = supply.fire(commanded(channel, 0.0, block.width), channel)
+            given = supply.fire(on_command(channel, 0.0, block.width), channel)
             torque = channel.torque if given.torque is None else given.torque
             ramps = None if given.command is None else given.command.ramps
             start = float(clock.fire(found, delay, block.width, torque[:, None], ramps)[0])
