@@ -37,7 +37,8 @@ class Dispersions:
     `nutdamp.schedule.STEERABLE`. ``timing`` s shifts each pulse, ``timing_offset`` s the whole schedule; ``attitude``
     rad tilts the spin axis at t = 0 about two axes across it. ``open_delay`` and ``close_delay`` s and ``impulse_bit``,
     a relative one, are by thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is
-    off.
+    off. ``sensor_bias`` (rad/s or m/s²) and the relative ``sensor_scale`` are of each gyro, or of the accelerometer, of
+    a loop, the relative ``sensor_noise`` and ``sensor_delay`` s of all its samples.
     """
 
     A: Tolerance | None = None
@@ -54,3 +55,7 @@ class Dispersions:
     close_delay: Mapping[str, Tolerance] = field(default_factory=dict)
     impulse_bit: Mapping[str, Tolerance] = field(default_factory=dict)
     cold: Tolerance | None = None
+    sensor_bias: Tolerance | None = None
+    sensor_scale: Tolerance | None = None
+    sensor_noise: Tolerance | None = None
+    sensor_delay: Tolerance | None = None

@@ -85,6 +85,9 @@ verify smoke.yaml --scheme two-pulse --json verify.json
 loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png --map map.png
 loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
+disperse smoke.yaml --loop --set disturbances=[] --until 30s --samples 40 --csv loops.csv --json l.json --plot l.png
+disperse smoke.yaml --loop --until 20s --samples 2
+loop smoke.yaml --case 2 --json dispersed.json
 verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
 report smoke.yaml -o report.html
 report -o report.md --disperse 2000; 0 4

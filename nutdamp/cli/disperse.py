@@ -16,7 +16,7 @@ from nutdamp.cli.common import Input, plot_options, quiet_option, require_disper
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
 from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.job import Job, Output, begin
-from nutdamp.cli.parameters import FILE, Count
+from nutdamp.cli.parameters import FILE, Count, EndTime
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes import Options
@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 SAMPLES = 20_000
 """Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
 
+FIGURES = ("overview", "cases", "momentum", "budget")
+"""What --plot draws."""
+
 SAVED_EVERY = 30.0
 """Seconds after which a run with --resume saves what is done."""
 
@@ -48,13 +51,15 @@ SAVED_EVERY = 30.0
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
 @impulse_options
 @click.option("--flown", "real", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
+@click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
+@click.option("--until", type=EndTime(), help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @click.option(
     "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
 )
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
-@plot_options(("overview", "cases", "momentum", "budget"))
+@plot_options(FIGURES)
 @click.option("--resume", type=FILE, help="Keep what is done in this file, and go on from it if it is there.")
 @quiet_option
 def command(
@@ -68,6 +73,8 @@ def command(
     real: bool,
     impulses: bool,
     force: bool,
+    looped: bool,
+    until: float | None,
     case: int | None,
     worst: int,
     csv: str | None,
@@ -77,7 +84,7 @@ def command(
     resume: str | None,
     quiet: bool,
 ) -> None:
-    """Fly one schedule in many cases, dispersed as the spacecraft file says.
+    """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
 
     Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
@@ -87,7 +94,18 @@ def command(
     expect_impulses(impulses, force, True, "disperse")
     files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
     _expect_study(case, files)
+    if until is not None and not looped:
+        raise click.UsageError("--until is for --loop")
+    if looped:
+        _expect_loop(
+            flown, {"impulses": impulses, "resume": resume, "threads": threads, "figure": figure != FIGURES[0]}
+        )
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, **files)
+    if looped:
+        from nutdamp.cli.disperse_loop import Asked, disperse_loop
+
+        disperse_loop(job, Asked(samples, seed, until, case, worst, csv, json, plot))
+        return
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)
 
@@ -136,6 +154,13 @@ def study_of_cases(plan: Plan, seed: int, *, impulses: bool, force: bool) -> tup
 
     study = study_of(plan.spacecraft, plan.pulses, seed=seed, flown=not impulses)
     return study, check_impulses(study, force=force) if impulses else ""
+
+
+def _expect_loop(flown: Flown, others: Mapping[str, object]) -> None:
+    """A usage error for options that do not go with ``--loop``."""
+    for name, value in {**flown._asdict(), **others}.items():
+        if value:
+            raise click.UsageError(f"--loop flies the loop of the file, all in one way: leave --{name} out")
 
 
 class Run(NamedTuple):

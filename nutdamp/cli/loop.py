@@ -10,9 +10,9 @@ from typing import IO, TYPE_CHECKING
 import click
 
 from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import Input, quiet_option, require_loop, spacecraft_argument
+from nutdamp.cli.common import Input, quiet_option, require_dispersions, require_loop, spacecraft_argument
 from nutdamp.cli.job import Output, begin, expect_picture
-from nutdamp.cli.parameters import FILE, EndTime
+from nutdamp.cli.parameters import FILE, Count, EndTime
 from nutdamp.cli.screen import say
 
 if TYPE_CHECKING:
@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 @click.command("loop")
 @spacecraft_argument
 @click.option("--until", type=EndTime(), help="End; default: the horizon after the nutation is at start.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the noise of the sensor.")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**64 - 1), default=1, show_default=True, help="Of the noise of the sensor."
+)
+@click.option("--case", type=Count(), help="Fly this dispersed case, as `disperse --loop` does with that seed.")
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
 )
@@ -40,6 +43,7 @@ def command(
     spacecraft: Input,
     until: float | None,
     seed: int,
+    case: int | None,
     samples: int,
     csv: str | None,
     track: str | None,
@@ -59,6 +63,8 @@ def command(
     job = begin(spacecraft, quiet=quiet, csv=csv, track=track, json=json, plot=plot, map=mapped)
     body = job.spacecraft
     require_loop(body)
+    if case is not None:
+        require_dispersions(body)
 
     from nutdamp.cli.progress import working
     from nutdamp.files.loop_json import loop_json
@@ -67,7 +73,7 @@ def command(
     from nutdamp.presentation.loop_tables import loop_screen, stopped, warnings
 
     with working("flying", quiet=quiet):
-        plan = loop_of(body, until, seed=seed)
+        plan = loop_of(body, until, seed=seed, case=None if case is None else case - 1)
     run = plan.flown_run
     if job.silent:
         job.warn(warnings(body))

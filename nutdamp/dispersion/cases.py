@@ -292,13 +292,13 @@ class Model:
             lasts = [opened.longer.get(thruster.name, 1.0) for thruster in thrusters]
             factors = [factor * longer for factor, longer in zip(factors, lasts, strict=True)]
         for thruster, factor in zip(thrusters, factors, strict=True):
-            turned = self._thruster_torque(thruster, draws)
+            turned = self.thruster_torque(thruster, draws)
             torque = _sum(torque, turned if isinstance(factor, float) and factor == 1.0 else _scaled(turned, factor))
         flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
         flow = sum(weight * factor for weight, factor in zip(flows, factors, strict=True)) / math.fsum(flows)
         return torque, sum(factors) / len(factors), flow
 
-    def _thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
+    def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
         """Torque at nominal thrust, with the force tilted and its point of attack moved, N m."""
         tilts = [draws.get(f"direction {thruster.name} {axis}", 0.0) for axis in "ab"]
         moves = [draws.get(f"position {thruster.name} {axis}", 0.0) for axis in "xyz"]

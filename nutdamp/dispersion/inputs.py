@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from nutdamp.loop_settings import ACCELEROMETER
 from nutdamp.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Spacecraft, Thruster
 from nutdamp.tolerances import Tolerance
@@ -81,10 +82,42 @@ def reachable(spacecraft: Spacecraft) -> Inputs:
         pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
     drawn, unused = list_inputs(spacecraft, Schedule(tuple(pulses)))
     once = (entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1"))
+    sensor = of_sensor(spacecraft)
+    rest = (entry for entry in unused if not entry.name.startswith("sensor "))
     return Inputs(
-        tuple(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once),
-        tuple(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in unused),
+        (*(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once), *sensor.drawn),
+        (
+            *(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in rest),
+            *sensor.unused,
+        ),
     )
+
+
+def of_sensor(spacecraft: Spacecraft) -> Inputs:
+    """What a loop draws of its sensor: bias and scale of each gyro on its own; nothing for a spacecraft without one."""
+    requested, loop = spacecraft.dispersions, spacecraft.loop
+    if requested is None or loop is None:
+        return Inputs((), ())
+    sensor = loop.sensor
+    single = sensor.kind == ACCELEROMETER
+    axes, unit = ([""], "m/s²") if single else ([" 1", " 2"], "rad/s")
+    known = {
+        **{f"sensor bias{axis}": ("sensor_bias", sensor.bias, unit) for axis in axes},
+        **{f"sensor scale{axis}": ("sensor_scale", 1.0, "") for axis in axes},
+        "sensor noise": ("sensor_noise", 1.0, ""),
+        "sensor delay": ("sensor_delay", sensor.delay, "s"),
+    }
+    drawn, unused = [], []
+    for name, (key, nominal, of) in known.items():
+        tolerance: Tolerance | None = getattr(requested, key)
+        if tolerance is None:
+            continue
+        idle = "the sensor has no noise" if key == "sensor_noise" and sensor.noise == 0.0 else ""
+        if idle or tolerance.size == 0.0:
+            unused.append(Unused(name, idle or "its size is zero"))
+        else:
+            drawn.append(_input(name, key, tolerance, nominal, of))
+    return Inputs(tuple(drawn), tuple(unused))
 
 
 def _no_size(entry: Input) -> str:
@@ -135,6 +168,9 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
     if requested.attitude is not None:
         for axis in "xy":
             yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
+    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
+        if getattr(requested, key) is not None:
+            yield Unused(key.replace("_", " "), "a schedule is fired whatever a sensor shows: --loop flies the loop")
 
 
 def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:

@@ -35,8 +35,8 @@ def measure(model: Model, ends: Ends, out: Array) -> None:
     x, y, z = ends.momentum
     sense = math.copysign(1.0, model.spacecraft.spin)
     out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
-    out[1] = _angle(ends.before, ends.after)
-    out[2] = _angle(_constant(model.target), ends.pointed)
+    out[1] = angle(ends.before, ends.after)
+    out[2] = angle(_constant(model.target), ends.pointed)
     out[3] = ends.spin_change
     out[4] = np.nan if ends.propellant is None else ends.propellant
 
@@ -70,7 +70,7 @@ def _constant(vector: Array) -> Triple:
     return x, y, z
 
 
-def _angle(first: Triple, second: Triple) -> Cases:
+def angle(first: Triple, second: Triple) -> Cases:
     """Angle between vectors, exact to rounding from 0 to π."""
     (a, b, c), (x, y, z) = first, second
     i, j, k = b * z - c * y, c * x - a * z, a * y - b * x

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
+
+if TYPE_CHECKING:
+    from nutdamp.loop.study import LoopResults
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 
@@ -39,7 +42,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "percentiles": {
             column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
         },
-        "requirement": _requirement(results),
+        "requirement": requirement_of(results),
         **_cones(results),
         "shares": _shares(results),
         "unused": [entry.name for entry in study.model.inputs.unused],
@@ -65,7 +68,8 @@ def _shown(output: str, value: float) -> float:
     return math.degrees(value) if output in OUTPUTS[:3] else value
 
 
-def _requirement(results: Results) -> dict[str, Any] | None:
+def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
+    """The share of cases that comply beside the one required; None where nothing is."""
     if results.met_fraction is None:
         return None
     low, high = results.interval

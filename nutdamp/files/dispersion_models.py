@@ -6,6 +6,7 @@ The sizes of tolerances stay as they are written here: `dispersion_rules` finds 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 from nutdamp.files.sections import Field, Length, Rule, Section
@@ -14,6 +15,9 @@ from nutdamp.units import parse, pattern
 
 if TYPE_CHECKING:  # so that the keys can be known without numpy
     from nutdamp.spacecraft import Steerable, Thruster
+
+READING = "reading"
+"""The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
 
 QUANTITIES = {
     "A": "inertia",
@@ -30,6 +34,10 @@ QUANTITIES = {
     "close_delay": "time",
     "impulse_bit": "ratio",
     "cold": "ratio",
+    "sensor_bias": READING,
+    "sensor_scale": "ratio",
+    "sensor_noise": "ratio",
+    "sensor_delay": "time",
 }
 """The keys of dispersions with the kind of quantity that they hold."""
 
@@ -50,11 +58,22 @@ def size_of(value: object, kind: str) -> tuple[float, bool]:
     """
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
+    if kind == READING:
+        with suppress(ValueError):
+            return parse(value, "acceleration"), False
+        return parse(value, "rate"), False
     try:
         return parse(value, kind), kind == "ratio"
     except ValueError as wrong:
         hint = ", or in % of the nominal value" if kind in RELATIVE and kind != "ratio" else ""
         raise ValueError(f"{wrong}{hint}") from None
+
+
+def unit_kinds(kind: str) -> list[str]:
+    """The kinds of quantity (keys of `units.KINDS`) by which a tolerance of ``kind`` may be given."""
+    if kind == READING:
+        return ["rate", "acceleration"]
+    return [kind, "ratio"] if kind in RELATIVE and kind != "ratio" else [kind]
 
 
 def by_name(value: Mapping[str, object]) -> bool:
@@ -114,8 +133,7 @@ class _Alike(Rule):
 
 def _json_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of a tolerance of ``kind``."""
-    kinds = dict.fromkeys([kind, *["ratio"] * (kind in RELATIVE)])
-    texts = [{"type": "string", "pattern": pattern(one)} for one in kinds]
+    texts = [{"type": "string", "pattern": pattern(one)} for one in unit_kinds(kind)]
     spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
     return {
         "type": "object",
@@ -195,6 +213,24 @@ class DispersionsSection(Section):
         description="Of the thrust of a first cold pulse, in % of a warm one.",
         examples=[{"normal": "2 %"}],
     )
+    sensor_bias: Annotated[ToleranceSection, _Alike("sensor_bias")] | None = Field(
+        default=None,
+        description="Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².",
+        examples=[{"normal": "0.01 deg/s"}],
+    )
+    sensor_scale: Annotated[ToleranceSection, _Alike("sensor_scale")] | None = Field(
+        default=None,
+        description="Of the scale of each gyro of a loop, or of its accelerometer, %.",
+        examples=[{"normal": "1 %"}],
+    )
+    sensor_noise: Annotated[ToleranceSection, _Alike("sensor_noise")] | None = Field(
+        default=None, description="Of the noise of the sensor of a loop, %.", examples=[{"uniform": "20 %"}]
+    )
+    sensor_delay: Annotated[ToleranceSection, _Alike("sensor_delay")] | None = Field(
+        default=None,
+        description="Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.",
+        examples=[{"uniform": "2 ms"}],
+    )
 
 
 def dispersions(
@@ -243,6 +279,10 @@ def dispersions(
         close_delay=each("close_delay"),
         impulse_bit=each("impulse_bit"),
         cold=one("cold"),
+        sensor_bias=one("sensor_bias"),
+        sensor_scale=one("sensor_scale"),
+        sensor_noise=one("sensor_noise"),
+        sensor_delay=one("sensor_delay"),
     )
 
 

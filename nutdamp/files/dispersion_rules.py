@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.files.dispersion_models import BY_THRUSTER, QUANTITIES, by_name, size_of, thrust_behind
+from nutdamp.files.dispersion_models import BY_THRUSTER, QUANTITIES, READING, by_name, size_of, thrust_behind
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.fields import RIGHT_ANGLE
 from nutdamp.files.rules import symmetric, tensor_fault, tensor_of
@@ -49,6 +49,7 @@ def dispersion_findings(root: Node) -> Iterator[Finding]:
     for entry in _entries(facts):
         yield from _kinds(facts, entry)
     yield from _shifted_moments(facts)
+    yield from _of_sensor(facts)
 
 
 def _probability(facts: Facts) -> Iterator[Finding]:
@@ -162,7 +163,14 @@ def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
 
 
 def _example(kind: str) -> str:
-    sizes = {"inertia": "2 %", "rate": "0.1 deg/s", "force": "3 %", "ratio": "1 %", "angle": "0.5 deg"}
+    sizes = {
+        "inertia": "2 %",
+        "rate": "0.1 deg/s",
+        "force": "3 %",
+        "ratio": "1 %",
+        "angle": "0.5 deg",
+        READING: "0.01 deg/s",
+    }
     return f"{{normal: {sizes.get(kind, '5 mm' if kind == 'length' else '5 ms')}}}, or uniform, triangular, bias"
 
 
@@ -216,6 +224,28 @@ def _shifted_moments(facts: Facts) -> Iterator[Finding]:
         key = "C" if longer != 0.0 else "A"
         problem = f"with this offset C = {third:g} and A = {0.5 * (first + second):g} kg m^2: not physically possible"
         yield Finding(("dispersions", key, "bias"), f"{problem}; C must be at most 2 A")
+
+
+def _of_sensor(facts: Facts) -> Iterator[Finding]:
+    """Tolerances of a sensor that the file does not have, or of the other kind, and a delay below zero."""
+    kind = facts.text("loop", "sensor", "kind")
+    wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
+    for key in QUANTITIES:
+        path: KeyPath = ("dispersions", key)
+        if not key.startswith("sensor_") or not facts.has(*path):
+            continue
+        if not facts.has("loop"):
+            yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
+        for one in KINDS if key == "sensor_bias" and kind is not None else ():
+            text = facts.text(*path, one)
+            if text is not None and facts.number(wrong, *path, one) is not None:
+                yield Finding((*path, one), f"{shown(text)} is not in the unit of the sensor: {right}")
+    delay, offset = (
+        facts.number("time", *path) for path in (("loop", "sensor", "delay"), ("dispersions", "sensor_delay", "bias"))
+    )
+    if offset is not None and (delay or 0.0) + offset < 0.0 and facts.has("loop"):
+        problem = f"with this offset the delay is {(delay or 0.0) + offset:g} s; expected a delay of at least 0"
+        yield Finding(("dispersions", "sensor_delay", "bias"), problem)
 
 
 def _offset(facts: Facts, key: str, nominal: float) -> float | None:

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from nutdamp.errors import BadRequest
 from nutdamp.files import sections
-from nutdamp.files.dispersion_models import QUANTITIES, RELATIVE, ToleranceSection
+from nutdamp.files.dispersion_models import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.files.fields import Quantity
 from nutdamp.files.models import SpacecraftFile
 from nutdamp.files.sections import Section, section_of
@@ -45,8 +45,7 @@ class Key(NamedTuple):
 
     def _unit(self) -> str:
         if self.section is ToleranceSection:
-            kind = QUANTITIES[self.name]
-            names = [*KINDS[kind].factors, *(["%"] if kind in RELATIVE else [])]
+            names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
             return f"unit {_either(dict.fromkeys(names))}"
         return "" if self.section is not None else _what(self.field)
 

@@ -31,6 +31,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "spacecraft": spacecraft_json(body),
         "law": run.loop.law,
         "seed": run.seed,
+        "case": run.case,
         "until_s": run.until,
         "stopped": run.stop.name.lower(),
         "channel": run.channel,

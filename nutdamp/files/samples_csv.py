@@ -17,7 +17,7 @@ from nutdamp.dispersion.study import Study
 from nutdamp.errors import CannotWrite
 from nutdamp.files.output import STDOUT, csv_text
 
-SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "rad": "deg", "m": "m", "s": "s", "": "factor"}
+SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "m": "m", "s": "s", "": "factor"}
 OUTPUT_COLUMNS = ("nutation_deg", "momentum_shift_deg", "axis_error_deg", "spin_change_rad_s", "propellant_kg")
 """Columns of `OUTPUTS`, in their order."""
 

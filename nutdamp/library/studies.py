@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nutdamp import arguments, dispersion, fronts, planning, verification
 from nutdamp.dispersion.study import Results, run, threads_here
@@ -16,6 +16,9 @@ from nutdamp.library.views import feasible
 from nutdamp.planning import Plan
 from nutdamp.schemes.options import LEAST, OptimalOptions
 from nutdamp.spacecraft import Spacecraft
+
+if TYPE_CHECKING:
+    from nutdamp.loop.study import LoopResults
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,30 @@ class Dispersion:
         from nutdamp.files.output import finite
 
         return finite(dispersion_json(self.core, scheme=self.scheme, worst=worst))
+
+
+@dataclass(frozen=True, eq=False)
+class LoopDispersion:
+    """The loop of a file flown in many dispersed cases; ``core`` holds what each does."""
+
+    core: LoopResults
+
+    @property
+    def settled_fraction(self) -> float:
+        """Share of the cases that fall quiet, and are not stopped."""
+        return self.core.settled / self.core.done
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of the cases that meet the requirement; None where nothing is required."""
+        return self.core.met_fraction
+
+    def to_dict(self, worst: int = 5) -> dict[str, Any]:
+        """What ``disperse --loop --json`` gives, with as many ``worst`` cases."""
+        from nutdamp.files.loop_cases import loop_cases_json
+        from nutdamp.files.output import finite
+
+        return finite(loop_cases_json(self.core, worst=worst))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +137,36 @@ def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispe
     Raises Infeasible where there is no schedule, BadRequest for a spacecraft without dispersions.
     """
     feasible(plan)
-    if not 0 <= arguments.instance("seed", seed, int, "a whole number") < 2**64:
-        raise BadRequest(f"seed = {seed}: expected a whole number from 0 to 2**64 - 1")
+    _expect_seed(seed)
     study = dispersion.study_of(plan.spacecraft, plan.pulses, seed=seed)
     results = Results(study, arguments.count("samples", samples))
     return Dispersion(run(results, threads=threads_here()), plan.scheme)
+
+
+def disperse_loop(
+    spacecraft: Spacecraft,
+    samples: int = dispersion.SAMPLES,
+    *,
+    until: float | None = None,
+    seed: int = dispersion.SEED,
+) -> LoopDispersion:
+    """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
+
+    Raises BadRequest for a spacecraft without loop or dispersions, Infeasible where its firings come too late to damp.
+    """
+    from nutdamp.loop import study
+
+    body, count = expected(spacecraft), arguments.count("samples", samples)
+    _expect_seed(seed)
+    end = None if until is None else arguments.end_of_flight(until)
+    found = study.loop_study(body, end, seed=seed)
+    found.expect_affordable(count)
+    return LoopDispersion(study.run(study.LoopResults(found, count)))
+
+
+def _expect_seed(seed: int) -> None:
+    if not 0 <= arguments.instance("seed", seed, int, "a whole number") < 2**64:
+        raise BadRequest(f"seed = {seed}: expected a whole number from 0 to 2**64 - 1")
 
 
 def verify(plan: Plan) -> Verified:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from nutdamp.errors import Infeasible
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
-from nutdamp.loop.run import Course, Pilot, Scatter
+from nutdamp.loop.run import Alone, Course, Pilot, Scatter, largest_since
 from nutdamp.loop.sensor import Noise, felt, stepped
 from nutdamp.loop.watch import SAMPLED, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER
-from nutdamp.physics import energy_sink, rigid_cases
+from nutdamp.physics import attitude, energy_sink, rigid_cases
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.rigid import Forcing
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -34,21 +35,26 @@ Rows = NDArray[np.int_]
 
 
 class Case(NamedTuple):
-    """A loop of its own: the spacecraft in truth, with its loop; the ``key`` of its noise, and what firings are off."""
+    """A loop of its own: the spacecraft in truth, with its loop; the ``key`` of its noise, and what firings are off.
+
+    ``tilt`` rad is by how much the attitude at t = 0 is off, about the body axes 1 and 2.
+    """
 
     truth: Spacecraft
     key: tuple[int, ...]
     scatter: Scatter | None = None
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Flown:
-    """How loops end, case by case: what each ``pilots`` has fired and judged, and the motion at the end.
+    """How the loops of ``cases`` end: what each ``pilots`` has fired and judged, and the motion at the end.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) from the body axes of t = 0. ``quiet`` (n,) rad is the nutation as a
     loop first fell quiet, ``largest`` (n,) the largest of its coasts since; that of the end where it never did.
     """
 
+    cases: Sequence[Case]
     pilots: list[Pilot]
     rates: Vector
     quaternion: Vector
@@ -99,11 +105,32 @@ def fly_together(law: Law, cases: Sequence[Case], until: float, watch: Callable[
     return _Fleet(law, cases, until).fly(watch)
 
 
+def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None) -> Flown:
+    """The same, each loop by itself, whatever acts on its body and whatever its sensor shows."""
+    count = len(cases)
+    rates, quaternion = np.empty((3, count)), np.empty((4, count))
+    quiet, largest, pilots = np.full(count, math.nan), np.empty(count), []
+    for row, case in enumerate(cases):
+        alone = Alone.of(case.truth, case.truth.loop or law.loop, until, case.key, law, case.scatter)
+        run = alone.fly()
+        pilots.append(alone.pilot)
+        end = run.flight.motion(np.array([run.flight.legs[-1].end]))
+        rates[:, row] = end[0][0]
+        quaternion[:, row] = attitude.multiply(attitude.conjugate(case.truth.initial.quaternion), end[1][0])
+        if run.settled is not None:
+            at = run.flight.motion(np.array([run.settled]))[0][0]
+            sense = math.copysign(1.0, case.truth.spin)
+            quiet[row] = arc_cones(case.truth.inertia.moments, at, sense).nutation
+        largest[row] = largest_since(run)[0]
+        watch(row + 1)
+    return Flown(cases, pilots, rates, quaternion, quiet, largest)
+
+
 class _Fleet:
     """Flights in the making."""
 
     def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
-        self.law, self.until = law, until
+        self.law, self.cases, self.until = law, cases, until
         loops = [one.truth.loop for one in cases]
         self.pilots = [
             Pilot(one.truth, loop or law.loop, until, law, free=True, scatter=one.scatter)
@@ -145,7 +172,7 @@ class _Fleet:
         self._go(rows, np.maximum(self.until, self.now))
         unsettled = np.isinf(self.settled)
         self.largest[unsettled] = self._nutation(rows)[unsettled]
-        return Flown(self.pilots, self.rates, self.quaternion, self.quiet, self.largest)
+        return Flown(self.cases, self.pilots, self.rates, self.quaternion, self.quiet, self.largest)
 
     def _begun(self, rows: Rows) -> _Group:
         """Coasts of cases that begin now."""

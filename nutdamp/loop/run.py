@@ -23,9 +23,11 @@ from nutdamp.loop.watch import GRID, MOST, Coast, Found, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER, Loop
 from nutdamp.motion import Path
 from nutdamp.physics import rigid
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule, channel_pulse, on_command
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 from nutdamp.supply import Supply
+from nutdamp.track import widest
 
 SEED = 1
 """Of the noise, where none is named."""
@@ -38,6 +40,10 @@ NO_NOISE = 8.0
 
 WAVES = 40.0
 """Time constants of the low-pass filter after which it has forgotten how it began."""
+
+
+ROWS = 2000
+"""Even moments at which the largest nutation of a run is looked for."""
 
 
 class Fired(NamedTuple):
@@ -54,15 +60,16 @@ class Fired(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A loop flown to ``until`` s with the noise of ``seed``: its firings, why it ended, and the channel to blame.
+    """A loop flown to ``until`` s: its firings, why it ended, and the channel to blame.
 
+    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
     ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start.
     """
 
     spacecraft: Spacecraft
     loop: Loop
     until: float
-    seed: int | tuple[int, ...]
+    key: tuple[int, ...]
     fired: tuple[Fired, ...]
     stop: Stop
     channel: str | None
@@ -74,6 +81,16 @@ class Run:
     def schedule(self) -> Schedule:
         """The pulses that were fired."""
         return self.flight.schedule
+
+    @property
+    def seed(self) -> int:
+        """Seed of the noise."""
+        return self.key[0]
+
+    @property
+    def case(self) -> int | None:
+        """Number of the dispersed case, from 1; None for the file itself."""
+        return self.key[1] if len(self.key) > 1 else None
 
     @property
     def settled(self) -> float | None:
@@ -104,9 +121,21 @@ def fly(
     its firings are off by. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
     """
     end = until_default(spacecraft, loop) if until is None else until
-    moves = dynamics or make_dynamics(spacecraft)
-    pilot = Pilot(spacecraft, loop, end, law or Law(spacecraft, loop), free=moves.free, scatter=scatter)
-    return _Flown(pilot, Signal(spacecraft, loop.sensor, seed), moves, seed).fly()
+    key = seed if isinstance(seed, tuple) else (seed,)
+    return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
+
+
+def largest_since(run: Run) -> tuple[float, float]:
+    """The largest nutation from when a loop was first quiet, rad, and when, s; of the end where it never was."""
+    made = run.flight
+    if run.settled is None:
+        rates = made.motion(np.array([run.until]))[0][0]
+        return arc_cones(made.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
+    track = widest(made.sampled(ROWS, run.until), made.moments, run.spacecraft.spin)
+    later = track.t >= run.settled
+    most = float(track.nutation[later].max())
+    row = int(np.argmax(later & (track.nutation >= most * (1.0 - 1e-9))))  # not where rounding has its largest
+    return float(track.nutation[row]), float(track.t[row])
 
 
 class Scatter(Protocol):
@@ -117,12 +146,28 @@ class Scatter(Protocol):
         ...
 
 
-class _Flown:
+class Alone:
     """One flight in the making, each stretch by itself."""
 
-    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, seed: int | tuple[int, ...]) -> None:
-        self.pilot, self.signal, self.dynamics, self.seed = pilot, signal, dynamics, seed
+    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, key: tuple[int, ...]) -> None:
+        self.pilot, self.signal, self.dynamics, self.key = pilot, signal, dynamics, key
         self.legs: list[Leg] = []
+
+    @classmethod
+    def of(
+        cls,
+        spacecraft: Spacecraft,
+        loop: Loop,
+        until: float,
+        key: tuple[int, ...],
+        law: Law,
+        scatter: Scatter | None = None,
+        dynamics: Dynamics | None = None,
+    ) -> Alone:
+        """That of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
+        moves = dynamics or make_dynamics(spacecraft)
+        pilot = Pilot(spacecraft, loop, until, law, free=moves.free, scatter=scatter)
+        return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
 
     def fly(self) -> Run:
         """Coast and fire until the end, or until something is wrong."""
@@ -171,7 +216,7 @@ class _Flown:
             pilot.truth,
             pilot.loop,
             pilot.until,
-            self.seed,
+            self.key,
             tuple(pilot.fired),
             pilot.ending[0],
             pilot.ending[1] or None,

@@ -78,6 +78,19 @@ def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
     return next((one for one in found if not one.damps), None)
 
 
+def too_late(margin: Margin) -> str:
+    """Why a loop does not damp, before it is flown: what to say of one of its channels."""
+    degrees = np.degrees(margin.late)
+    theta = np.degrees(margin.nutation)
+    what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of {theta:.4g} deg"
+    if margin.growth > 1.0:
+        what += f", which grows by {100.0 * (margin.growth - 1.0):.3g} % in a period"
+    if margin.delay == -np.inf:
+        return f"the loop does not damp: {what}; raise start, or allow other on-times"
+    late = f"it comes up to {degrees:.4g} deg late, and damps up to {np.degrees(margin.latest):.4g} deg"
+    return f"the loop does not damp: {what}: {late}; shorten the delays by {-margin.delay:.4g} s, or set predict: true"
+
+
 def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     loop, rate = law.loop, abs(float(law.rate(spin)))
     size = law.size(theta, spin)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -26,6 +26,9 @@ from nutdamp.presentation.end_tables import bounds_text, end_table
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, quantity
 from nutdamp.words import listed
+
+if TYPE_CHECKING:
+    from nutdamp.loop.study import LoopResults
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
@@ -49,7 +52,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
-    parts += [Text(), *_requirement(results), *_cones(results), Text(), *_budget(results)]
+    parts += [Text(), *requirement_lines(results), *_cones(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
@@ -77,13 +80,13 @@ def _percentiles(results: Results) -> Table:
             continue
         values = [float(plan), *found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
         largest = scale * max(abs(found.minimum), abs(found.maximum))
-        table.add_row(Text(name, style="dim"), *(_beside(scale * value, largest) for value in values))
+        table.add_row(Text(name, style="dim"), *(beside(scale * value, largest) for value in values))
     for column in table.columns[1:]:
         column.no_wrap = True
     return table
 
 
-def _beside(value: float, largest: float) -> str:
+def beside(value: float, largest: float) -> str:
     """A number with the decimals that show four digits of the ``largest`` beside it."""
     if largest < 1e-9:
         return "0"  # but for rounding
@@ -92,7 +95,8 @@ def _beside(value: float, largest: float) -> str:
     return f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
 
 
-def _requirement(results: Results) -> list[RenderableType]:
+def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
+    """What is required, and whether as many cases comply as must."""
     share, probability = results.met_fraction, results.probability
     if share is None:
         return [Text("The file has no requirement to meet.")]
@@ -274,6 +278,19 @@ def unused_table(unused: Iterable[Unused]) -> Table:
     return table
 
 
+def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
+    """Every input of one case: nominal, drawn, and by how much it is off."""
+    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
+    for entry in drawn:
+        unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
+        draw = draws[entry.name]
+        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
+        off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
+        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
+        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
+    return inputs
+
+
 def case_screen(
     study: Study, case: int, draws: dict[str, float], flown: tuple[Array, Array], *, scheme: str
 ) -> RenderableType:
@@ -281,14 +298,7 @@ def case_screen(
 
     ``flown``: the outputs (5,) through real widths, of the nominal case and of this one.
     """
-    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
-    for entry in study.model.inputs.drawn:
-        unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
-        draw = draws[entry.name]
-        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
-        off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
-        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
-        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
+    inputs = inputs_table(study.model.inputs.drawn, draws)
     ways = "impulses", "flown"
     outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
     closed = Study(study.model, study.seed)
@@ -296,7 +306,7 @@ def case_screen(
     ends = (closed.outputs_of({}), closed.outputs_of(draws), *flown)
     for name, scale, *values in zip(NAMES, SCALES, *ends, strict=True):
         largest = scale * float(np.max(np.abs(values)))
-        cells = (MISSING if math.isnan(value) else _beside(scale * value, largest) for value in values)
+        cells = (MISSING if math.isnan(value) else beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
     angles = [one.aspects_of(case_) for one in (closed, real) for case_ in ({}, draws)]
     for index, keep in enumerate(study.model.spacecraft.keep):

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from nutdamp.decision import Decision
 from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.plan import LoopPlan, too_late
+from nutdamp.loop.plan import LoopPlan
 from nutdamp.loop.run import Run
-from nutdamp.loop.stability import SURELY, Margin, dead_band, feeding, margins
+from nutdamp.loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
 from nutdamp.loop.verify import AGREE, LoopVerification
 from nutdamp.loop_settings import GYRO, Loop
 from nutdamp.presentation.decisions import cost, decision_table, requirement
@@ -34,6 +34,9 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
     why = stopped(run)
     if why:
         parts.append(Text.assemble(("Stopped: ", "bold red"), f"{why}."))
+    elif run.case is not None:
+        met = "" if plan.meets_requirement is None else " meets" if plan.meets_requirement else " does NOT meet"
+        parts.append(Text(f"Dispersed case {run.case} of seed {run.seed}{met and met + ' the requirement'}."))
     else:
         parts += list(requirement(decision))
     parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
@@ -111,7 +114,8 @@ def _outcome(plan: LoopPlan) -> Table:
     table.add_row("dead band", f"at most {degrees(band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet")
     for name, value in cost(Decision(plan)):
         table.add_row(name, value)
-    table.add_row("flown", f"0 to {moment(run.until)}, noise of seed {run.seed}")
+    case = "" if run.case is None else f", dispersed case {run.case}"
+    table.add_row("flown", f"0 to {moment(run.until)}, noise of seed {run.seed}{case}")
     return table
 
 

@@ -55,7 +55,7 @@ def _signal(axes: Axes, plan: LoopPlan) -> None:
     sensor = run.loop.sensor
     if sensor.rate is None:
         times = np.linspace(0.0, run.until, SAMPLES)
-        values = Signal(plan.spacecraft, sensor, run.seed).shown(run.flight.motion(times)[0])
+        values = Signal(plan.spacecraft, sensor, run.key).shown(run.flight.motion(times)[0])
     else:
         times, values = _samples(plan, sensor.rate)
     scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
@@ -71,7 +71,7 @@ def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
     run = plan.flown_run
     count = math.floor(run.until * rate) + 1
     wanted = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
-    signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.seed), [], []
+    signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.key), [], []
     for block in range(0, count, BLOCK):
         numbers = wanted[(wanted >= block) & (wanted < block + BLOCK)]
         if len(numbers):

@@ -1,0 +1,128 @@
+"""What ``disperse --loop`` writes: JSON of all cases together or of one, and CSV case by case."""
+
+from __future__ import annotations
+
+import math
+from typing import IO, Any
+
+import numpy as np
+
+from nutdamp import __version__
+from nutdamp.dispersion.statistics import Array
+from nutdamp.dispersion.study import CONFIDENCE
+from nutdamp.files.dispersion_json import PERCENTS, requirement_of
+from nutdamp.files.output import csv_text, number
+from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.samples_csv import column
+from nutdamp.loop.diagnosis import Stop
+from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
+
+COLUMNS = (
+    "settled_s",
+    "quiet_nutation_deg",
+    "largest_nutation_deg",
+    "momentum_shift_deg",
+    "axis_error_deg",
+    "spin_change_rad_s",
+    "propellant_kg",
+    "firings",
+)
+"""Of `OUTPUTS`, in their order."""
+
+
+def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
+    """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases; degrees, else SI."""
+    study = results.study
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(study.spacecraft),
+        "law": study.law.loop.law,
+        "until_s": study.until,
+        "samples": results.done,
+        "requested": results.requested,
+        "interrupted": results.done < results.requested,
+        "seed": study.seed,
+        "redrawn": results.redrawn,
+        "alone_because": study.alone or None,
+        "percentiles": {name: _percentiles(results, output) for name, output in zip(COLUMNS, OUTPUTS, strict=True)},
+        "settled": _share(results, results.settled, results.done),
+        "never_started": results.idle,
+        "dead_band": {
+            "expected_deg": math.degrees(study.band.most),
+            **_share(results, results.within, len(results.of("quiet"))),
+        },
+        "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Stop.END},
+        "requirement": requirement_of(results),
+        "shares": {
+            name: results.shares(output)
+            for name, output in zip(COLUMNS, OUTPUTS, strict=True)
+            if output in ("settled", "nutation", "propellant")
+        },
+        "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
+        "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
+        "worst": [
+            {**_inputs(study, case), **outputs_json(results.values[:, case])}
+            for case in results.worst.cases[:worst].tolist()
+        ],
+    }
+
+
+def loop_case_json(study: LoopStudy, case: int, values: Array, stop: Stop) -> dict[str, Any]:
+    """One case (from 0): the true value of each input, in SI, and the outputs."""
+    outputs = {"stopped": stop.name.lower(), **outputs_json(values)}
+    return {"nutdamp": __version__, "seed": study.seed, "until_s": study.until, **_inputs(study, case), **outputs}
+
+
+def _inputs(study: LoopStudy, case: int) -> dict[str, Any]:
+    draws = study.draws_of(case)
+    entries = study.model.inputs.drawn
+    return {"case": case + 1, "inputs": {entry.name: entry.nominal + draws[entry.name] for entry in entries}}
+
+
+def outputs_json(values: Array) -> dict[str, float]:
+    """The outputs (8,) of a case by their columns; what is not known is not a number."""
+    return {name: _shown(name, value) for name, value in zip(COLUMNS, values.tolist(), strict=True)}
+
+
+def _shown(name: str, value: float) -> float:
+    return math.degrees(value) if name.endswith("_deg") else value
+
+
+def _percentiles(results: LoopResults, output: str) -> dict[str, float | None]:
+    names, found = [*(f"{percent:g}" for percent in PERCENTS), "max"], results.distribution(output)
+    nominal, column_ = float(results.study.nominal[OUTPUTS.index(output)]), COLUMNS[OUTPUTS.index(output)]
+    if found is None:
+        return {"nominal": _shown(column_, nominal), **dict.fromkeys(["min", *names])}
+    values = [nominal, found.minimum, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
+    return {name: _shown(column_, value) for name, value in zip(["nominal", "min", *names], values, strict=True)}
+
+
+def _share(results: LoopResults, count: int, of: int) -> dict[str, float | None]:
+    low, high = results.interval_about(count, of) if of else (None, None)
+    return {"fraction": count / of if of else None, "low": low, "high": high, "confidence": CONFIDENCE}
+
+
+class LoopCasesWriter:
+    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees."""
+
+    def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
+        self._stream, self._study = stream, study
+        header = ["case", *(column(entry) for entry in study.model.inputs.drawn), *COLUMNS, "stopped"]
+        stream.write(csv_text(header, []).encode())
+        stream.flush()
+
+    def write(self, first: int, values: Array, stops: list[Stop]) -> None:
+        """The cases from ``first`` (from 0) on, with their outputs (8, n)."""
+        entries = self._study.model.inputs.drawn
+        drawn = self._study.draws_from(first, len(stops))
+        rows = []
+        for row, stop in enumerate(stops):
+            truths = [entry.nominal + float(drawn[entry.name][row]) for entry in entries]
+            inputs = [
+                number(math.degrees(value) if entry.unit == "rad" else value)
+                for entry, value in zip(entries, truths, strict=True)
+            ]
+            outputs = outputs_json(values[:, row]).values()
+            shown = ["" if math.isnan(value) else number(value) for value in outputs]
+            rows.append([str(first + row + 1), *inputs, *shown[:-1], str(int(values[-1, row])), stop.name.lower()])
+        self._stream.write(csv_text(rows[0], rows[1:]).encode())

@@ -1,0 +1,341 @@
+"""Loops of many dispersed cases: how many settle, when, where they end, what they use, and which are the worst."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import compliance
+from nutdamp.compliance import Left
+from nutdamp.dispersion.binomial import binomial_interval
+from nutdamp.dispersion.cases import rotated
+from nutdamp.dispersion.draws import BLOCK, Draws, Source
+from nutdamp.dispersion.kernel import carried
+from nutdamp.dispersion.outputs import angle
+from nutdamp.dispersion.statistics import Exact, Worst
+from nutdamp.dispersion.study import CONFIDENCE, KEPT_WORST, PROBABILITY
+from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.loop.cases import LoopModel
+from nutdamp.loop.diagnosis import Stop
+from nutdamp.loop.fleet import Case, Flown, expects_alone, fly_alone, fly_together
+from nutdamp.loop.law import Law
+from nutdamp.loop.run import until_default
+from nutdamp.loop.stability import Band, dead_band, feeding, too_late
+from nutdamp.spacecraft import Spacecraft
+
+Array = NDArray[np.float64]
+
+OUTPUTS = (
+    "settled",
+    "quiet",
+    "nutation",
+    "momentum_shift",
+    "axis_error",
+    "spin_change",
+    "propellant",
+    "firings",
+)
+"""Of each case: when it first falls quiet (s), the nutation then and the largest since (rad), how far H has turned and
+is off its target at the end (rad), by how much the spin has changed (rad/s), propellant (kg), firings.
+
+What is not known is not a number: the first two of a loop that never falls quiet, or that never sees its start."""
+
+PORTION = 512
+"""Cases that are flown together."""
+
+MOST_SAMPLES = 20_000_000_000
+"""Samples that a study may look at, by what its nominal case looks at."""
+
+ALONE = 20
+"""Times as much that a sample costs where cases fly one by one."""
+
+FEW = 100
+"""Cases that fall quiet, at least, of which it is said what they depend on."""
+
+
+Collect = Callable[[int, Array, list[Stop]], None]
+"""Takes the number (from 0) of the first of some cases, their outputs (8, n), and why they were flown no further."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopStudy:
+    """The loop of a ``spacecraft`` flown to ``until`` s in cases drawn from ``seed``; they count from 0 here."""
+
+    spacecraft: Spacecraft
+    until: float
+    seed: int
+
+    @cached_property
+    def law(self) -> Law:
+        """The law on board, which knows the file."""
+        assert self.spacecraft.loop is not None
+        return Law(self.spacecraft, self.spacecraft.loop)
+
+    @cached_property
+    def model(self) -> LoopModel:
+        """What is dispersed."""
+        return LoopModel(self.law)
+
+    @cached_property
+    def alone(self) -> str:
+        """Why the cases fly one by one, which takes longer; empty where they fly together."""
+        return expects_alone(self.law, self.spacecraft)
+
+    @cached_property
+    def band(self) -> Band:
+        """The nutation that the loop is to leave, as it was built."""
+        return dead_band(self.spacecraft, self.law.loop)
+
+    def source(self) -> Source:
+        """The draws."""
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical)
+
+    def draws_of(self, case: int) -> dict[str, float]:
+        """Deviations of one case, by input."""
+        return {name: float(draw[0]) for name, draw in self.draws_from(case, 1).items()}
+
+    def draws_from(self, first: int, count: int) -> dict[str, Array]:
+        """Deviations (count,) of cases from ``first`` on, by input."""
+        found: dict[str, list[Array]] = {entry.name: [] for entry in self.model.inputs.drawn}
+        source = self.source()
+        for block in range(first // BLOCK, math.ceil((first + count) / BLOCK)):
+            draws, _ = source.block(block)
+            rows = slice(max(first - block * BLOCK, 0), min(first + count - block * BLOCK, BLOCK))
+            for name, parts in found.items():
+                parts.append(np.array(np.broadcast_to(draws[name], BLOCK)[rows]))
+        return {name: np.concatenate(parts) for name, parts in found.items()}
+
+    def case(self, number: int) -> Case:
+        """One case."""
+        return self.model.cases(self.draws_of(number), np.array([number]), self.seed)[0]
+
+    @cached_property
+    def nominal(self) -> Array:
+        """The outputs (8,) of the file itself, with the noise of the seed."""
+        return self.measured(self.fly(self.nominal_case))[0][:, 0]
+
+    @property
+    def nominal_case(self) -> list[Case]:
+        """The file itself, with the noise of the seed, as a case."""
+        return [Case(self.spacecraft, (self.seed,))]
+
+    def expect_affordable(self, samples: int) -> int:
+        """Samples that so many cases look at, by the nominal one; raises BadRequest where they are too many."""
+        looked = self.fly(self.nominal_case).pilots[0].looked_at
+        price = looked * samples * (ALONE if self.alone else 1)
+        if price > MOST_SAMPLES:
+            most = max(MOST_SAMPLES // (looked * (ALONE if self.alone else 1)), 1)
+            raise BadRequest(
+                f"{samples} cases look at about {looked * samples:.2g} samples: too many; "
+                f"at most {most} --samples, or an earlier --until"
+            )
+        return looked * samples
+
+    def price_alone(self, samples: int) -> str:
+        """How long so many cases take one by one, in words, by the time that the nominal one takes here."""
+        begin = time.perf_counter()
+        self.fly(self.nominal_case)
+        seconds = samples * (time.perf_counter() - begin)
+        return f"about {seconds:.0f} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
+
+    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> Flown:
+        """The loops of ``cases``."""
+        return (fly_alone if self.alone else fly_together)(self.law, cases, self.until, watch)
+
+    def measured(self, flown: Flown) -> tuple[Array, Array]:
+        """Outputs (8, n) of loops, and how bad each is (n,): infinitely where it does not end quiet, or was stopped."""
+        cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
+        moments, before = (np.array(one).T for one in zip(*(_start(case.truth) for case in cases), strict=True))
+        momentum = tuple(carried(tuple(flown.quaternion), _triple(moments * flown.rates)))
+        tilts = np.array([case.tilt for case in cases]).T
+        out = np.empty((len(OUTPUTS), len(cases)))
+        out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
+        out[1], out[2] = flown.quiet, flown.largest
+        out[3] = angle(_triple(moments * before), _triple(np.array(momentum)))
+        out[4] = angle(_triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
+        out[5] = flown.rates[2] - before[2]
+        used = [[math.nan if one.pulse.propellant is None else one.pulse.propellant for one in p.fired] for p in pilots]
+        out[6] = [math.fsum(one) for one in used]
+        out[7] = [len(pilot.fired) for pilot in pilots]
+        aim = out[3] if body.goal.axis is None else out[4]
+        severity = np.asarray(compliance.severity(body, Left(out[2], aim, flown.rates[2])), dtype=float)
+        lost = np.array([p.ending[0] is not Stop.END or (p.active and not p.quiet) for p in pilots])
+        return out, np.where(lost, math.inf, severity)
+
+
+def _start(truth: Spacecraft) -> tuple[tuple[float, ...], Array]:
+    return truth.inertia.moments, truth.omega0
+
+
+def _triple(rows: Any) -> tuple[Any, Any, Any]:
+    first, second, third = rows
+    return first, second, third
+
+
+def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
+    """The study of the loop of a spacecraft with dispersions; raises BadRequest for one without either of them.
+
+    Raises Infeasible as `plan.loop_of` does.
+    """
+    if spacecraft.loop is None:
+        raise BadRequest("the spacecraft has no loop")
+    if spacecraft.dispersions is None:
+        raise BadRequest("the spacecraft has no dispersions")
+    late = feeding(spacecraft, spacecraft.loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
+    return LoopStudy(spacecraft, until_default(spacecraft, spacecraft.loop) if until is None else until, seed)
+
+
+@dataclass(eq=False)
+class LoopResults:
+    """What has been found of a study so far: the cases from 0 to ``done``.
+
+    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were stopped;
+    ``stops`` is why loops were flown no further.
+    """
+
+    study: LoopStudy
+    requested: int
+    done: int = 0
+    redrawn: int = 0
+    met: int = 0
+    stops: Counter[Stop] = field(default_factory=Counter)
+    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    values: Array = field(init=False)
+    lost: NDArray[np.bool_] = field(init=False, default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        self.values = np.empty((len(OUTPUTS), self.requested))
+
+    def of(self, output: str) -> Array:
+        """The known values of an output, (m,)."""
+        values = self.values[OUTPUTS.index(output), : self.done]
+        return values[~np.isnan(values)]
+
+    def distribution(self, output: str) -> Exact | None:
+        """Of those values; None where there are none."""
+        found = self.of(output)
+        return Exact(found) if len(found) else None
+
+    @property
+    def settled(self) -> int:
+        """Cases that fall quiet, or never have to fire, and are not stopped."""
+        return self.done - int(np.count_nonzero(self.lost))
+
+    @property
+    def idle(self) -> int:
+        """Cases of them that never see the start threshold."""
+        return int(np.count_nonzero(~self.lost & np.isnan(self.values[0, : self.done])))
+
+    @property
+    def within(self) -> int:
+        """Cases that fall quiet with no more nutation than the dead band of the file."""
+        return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
+
+    def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
+        """Exact interval about the share of so many of the cases, or of so many ``of`` them."""
+        return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """That about `met_fraction`."""
+        return self.interval_about(self.met)
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of cases that settle and comply; None where nothing is required."""
+        return self.met / self.done if self.done and compliance.required(self.study.spacecraft) else None
+
+    @property
+    def probability(self) -> float:
+        """Share of cases that must comply."""
+        required = self.study.spacecraft.requirement
+        return PROBABILITY if required is None or required.probability is None else required.probability
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether as many cases comply as must; None where nothing is required."""
+        fraction = self.met_fraction
+        return None if fraction is None else fraction >= self.probability
+
+    def take(self, values: Array, severity: Array, stops: list[Stop]) -> None:
+        """Counts further cases: their outputs (8, n), `LoopStudy.measured`, and why they were flown no further."""
+        first, last = self.done, self.done + values.shape[1]
+        self.values[:, first:last] = values
+        self.met += int(np.count_nonzero(severity <= 1.0))
+        self.stops.update(stops)
+        self.lost = np.concatenate([self.lost, np.isinf(severity)])
+        self.worst.add(first, severity)
+        self.done = last
+
+    def shares(self, output: str) -> dict[str, float]:
+        """Share of each input in the variance of an output over the cases that settle: its squared correlation.
+
+        What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies.
+        """
+        rows = np.flatnonzero(~self.lost & ~np.isnan(self.values[OUTPUTS.index(output), : self.done]))
+        inputs = [entry for entry in self.study.model.inputs.drawn if entry.sigma > 0.0]
+        values = self.values[OUTPUTS.index(output)][rows]
+        if len(rows) < FEW or np.ptp(values) <= 1e-12 * np.abs(values).max():
+            return {}
+        drawn = self.study.draws_from(0, self.done)
+        chance = 1.0 / (len(rows) - 1)
+        squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
+        return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}
+
+
+def run(
+    results: LoopResults,
+    *,
+    watch: Callable[[int], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+    collect: Collect | None = None,
+) -> LoopResults:
+    """Fly the cases that ``results`` asks for, a portion after the other; returns ``results``.
+
+    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order. When ``stopped``
+    says so, the portions done so far are kept.
+    """
+    study = results.study
+    source, block = study.source(), -1
+    draws: Draws = {}
+    while results.done < results.requested and not stopped():
+        first = results.done
+        if first // BLOCK != block:
+            block = first // BLOCK
+            draws, again = source.block(block)
+            results.redrawn += int(np.count_nonzero(again < results.requested - block * BLOCK))
+        last = min(results.requested, first + PORTION, (block + 1) * BLOCK)
+        rows = slice(first - block * BLOCK, last - block * BLOCK)
+        part = {name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()}
+        cases = study.model.cases(part, np.arange(first, last), study.seed)
+        try:
+            flown = study.fly(cases, lambda over, first=first: _seen(watch, stopped, first + over))  # type: ignore[misc]
+        except _Interrupted:
+            break
+        values, severity = study.measured(flown)
+        stops = [pilot.ending[0] for pilot in flown.pilots]
+        results.take(values, severity, stops)
+        if collect is not None:
+            collect(first, values, stops)
+        watch(results.done)
+    return results
+
+
+class _Interrupted(Exception):
+    """A portion is left unfinished."""
+
+
+def _seen(watch: Callable[[int], None], stopped: Callable[[], bool], done: int) -> None:
+    watch(done)
+    if stopped():
+        raise _Interrupted

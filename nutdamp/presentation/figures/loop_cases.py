@@ -1,0 +1,50 @@
+"""The picture of ``disperse --loop``: when dispersed loops fall quiet, what they leave, and what they take."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.loop.study import LoopResults
+from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.style import GREY, MOTION, PULSE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BINS = 60
+
+
+@style.styled
+def loop_cases_figure(results: LoopResults) -> Figure:
+    """Histograms of four outputs, with dead band and requirement."""
+    study = results.study
+    figure = style.sheet(7.4, 6.2)
+    quiet, settled, largest, propellant = figure.subplots(2, 2).ravel()
+    degrees = 180.0 / math.pi
+    _histogram(settled, results, "settled", 1.0, "first quiet, s")
+    _histogram(quiet, results, "quiet", degrees, "nutation then, deg")
+    quiet.axvline(degrees * study.band.most, color=GREY, linewidth=1.2, linestyle="--", label="dead band")
+    _histogram(largest, results, "nutation", degrees, "largest since, deg")
+    required = study.spacecraft.requirement
+    if required is not None and required.nutation is not None:
+        largest.axvline(degrees * required.nutation, color=PULSE, linewidth=1.4, label="required")
+    _histogram(propellant, results, "propellant", 1e3, "propellant, g")
+    style.legend(figure, [quiet, largest])
+    return figure
+
+
+def _histogram(axes: Axes, results: LoopResults, output: str, scale: float, name: str) -> None:
+    values = scale * results.of(output)
+    axes.set_xlabel(name)
+    axes.set_ylabel("cases")
+    axes.grid(axis="y")
+    if not len(values):
+        axes.set_yticks([])
+        return
+    low, high = float(values.min()), float(values.max())
+    edges = np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, low + 0.5])
+    axes.hist(values, edges.tolist(), color=MOTION)
