@@ -41,6 +41,26 @@ class Commands:
     every: tuple[int, ...]
     width_step: float | None = None
 
+    def delay_counts(self, delay: float) -> int:
+        """Steps of a ``delay`` s."""
+        return round(delay / self.delay_step)
+
+    def width_counts(self, width: float) -> int:
+        """Steps of a ``width`` s; of widths that are a list the number of the entry next to it, 1 the shortest."""
+        if self.width_step is not None:
+            return round(width / self.width_step)
+        return 1 + int(np.abs(self.widths - width).argmin())
+
+    def delay_of(self, counts: float) -> float:
+        """The delay, s, of so many steps."""
+        return counts * self.delay_step
+
+    def width_of(self, counts: float) -> float | None:
+        """The width, s, of so many steps, or of that number in the list; None where the list has no such number."""
+        if self.width_step is not None:
+            return counts * self.width_step
+        return float(self.widths[int(counts) - 1]) if 1 <= counts <= len(self.widths) else None
+
 
 @dataclass(frozen=True, slots=True)
 class Block:

@@ -24,6 +24,7 @@ from nutdamp.schemes.tools import commanding
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
 from nutdamp.schemes.tools.sun_pulses import fired, sun_pulses
 from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.supply import Supply
 from nutdamp.words import listed
 
 MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
@@ -137,7 +138,7 @@ def _over(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOptions, r
 
     Each leg has the share of the horizon that it has of the way.
     """
-    builder, goal, blocks = FlownBuilder(spacecraft), spacecraft.goal, list[Block]()
+    builder, goal, blocks, supply = FlownBuilder(spacecraft), spacecraft.goal, list[Block](), Supply(spacecraft)
     for number, point in enumerate(route, start=1):
         here = builder.here
         to_go = _length((here.momentum, point, *route[number:]))
@@ -148,10 +149,11 @@ def _over(spacecraft: Spacecraft, scheme: str, options: schemes.SchemeOptions, r
             goal=replace(goal, axis=point, spin=spin),
             limits=replace(here.limits, horizon=share * here.horizon),
         )
-        made = schemes.schedule(scheme, leg, options)
+        made = schemes.schedule(scheme, supply.behind(leg), options)
         passed = _sun_pulses(spacecraft, builder) if made.blocks else 0
         blocks += [replace(block, first=block.first + passed) for block in made.blocks]
         builder.fire(made)
+        supply.count(made)
     names, count = listed([keep.name for keep in spacecraft.keep]), len(route) - 1
     points = f"{count} way point{'s' * (count > 1)}"
     note = f"goes by {points}, so that the spin axis keeps its distance from {names}"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from nutdamp.actuators import STANDARD_GRAVITY
@@ -13,18 +13,29 @@ from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import BLOWDOWN, COLD, VALVES, Channel, Spacecraft
 
 
-@dataclass(eq=False)
 class Supply:
-    """What has been fired so far: pulses by channel, and propellant, kg: one number, or an array of cases."""
+    """What has been fired so far: pulses by channel, and propellant, kg: one number, or an array of cases.
 
-    spacecraft: Spacecraft
-    fired: Counter[str] = field(default_factory=Counter)
-    used: Any = 0.0
-    steady: bool = field(init=False)
-    """Whether every pulse is as strong as the file says."""
+    By default what was fired before t = 0.
+    """
 
-    def __post_init__(self) -> None:
-        self.steady = not {COLD, BLOWDOWN} & set(self.spacecraft.thrust_laws)
+    def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
+        cold, tank = spacecraft.cold, spacecraft.tank
+        before: Mapping[str, int] = {} if cold is None else cold.fired
+        self.spacecraft = spacecraft
+        self.fired = Counter(before) if fired is None else fired
+        self.used = (0.0 if tank is None else tank.used) if used is None else used
+        self.steady = not {COLD, BLOWDOWN} & set(spacecraft.thrust_laws)
+        """Whether every pulse is as strong as the file says."""
+
+    def behind(self, later: Spacecraft) -> Spacecraft:
+        """The spacecraft ``later``, with what has been fired so far before its t = 0."""
+        cold, tank = later.cold, later.tank
+        return replace(
+            later,
+            cold=None if cold is None else replace(cold, fired=dict(self.fired)),
+            tank=None if tank is None else replace(tank, used=self.used),
+        )
 
     def level(self, channel: str) -> Any:
         """Thrust of the next pulse of ``channel``, over that of the file."""
@@ -58,6 +69,12 @@ class Supply:
         self.fired[channel.name] += 1
         self.used = self.used + (0.0 if propellant is None else propellant)
         return level, propellant
+
+    def count(self, made: Iterable[Pulse]) -> None:
+        """Take pulses into account that are as strong as they really are."""
+        for pulse in made:
+            self.fired[pulse.channel] += 1
+            self.used += pulse.propellant or 0.0
 
     @property
     def shortage(self) -> str | None:

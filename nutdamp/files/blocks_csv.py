@@ -56,12 +56,10 @@ def blocks_csv(flown: Flight) -> str:
                 str(block.first),
                 body.utc(pulses[last - block.count].loaded[0]) or "",
                 number(block.delay),
-                _counts(block.delay, None if commands is None else commands.delay_step),
+                "" if commands is None else str(commands.delay_counts(block.delay)),
                 _shown(math.degrees(block.delay * abs(body.spin))),
                 number(block.width),
-                ""
-                if commands is None or commands.width_step is None
-                else str(round(block.width / commands.width_step)),
+                "" if commands is None else str(commands.width_counts(block.width)),
                 str(block.count),
                 str(block.every),
                 _shown(math.fsum(pulse.magnitude for pulse in pulses[last - block.count : last])),
@@ -74,10 +72,6 @@ def blocks_csv(flown: Flight) -> str:
 def _shown(value: float) -> str:
     """A number for people, without the noise of its last digits."""
     return number(float(f"{value:.9g}"))
-
-
-def _counts(time: float, step: float | None) -> str:
-    return "" if step is None else str(round(time / step))
 
 
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
@@ -113,17 +107,11 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
 TIMES = ("delay", "width")
 
 
-def _step(spacecraft: Spacecraft, name: str) -> float | None:
-    """The step (s) in which delay or width is commanded; None where there is none."""
-    commands = spacecraft.commands
-    return None if commands is None else commands.delay_step if name == "delay" else commands.width_step
-
-
 def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
-    """Whether delay or width of the blocks is given by counts alone, of steps that the spacecraft file has."""
+    """Whether delay or width of the blocks is given by counts alone, of the commands that the spacecraft file has."""
     alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
-    if alone and _step(spacecraft, name) is None:
-        problem = f"the spacecraft file has no step of the {name} to count; expected the column {name}_s"
+    if alone and spacecraft.commands is None:
+        problem = f"the spacecraft file has no commands to count the {name} in; expected the column {name}_s"
         table.fault(1, f"{name}_counts", problem)
     return alone
 
@@ -164,7 +152,17 @@ def _time(table: Table, line: int, cells: Cells, spacecraft: Spacecraft, name: s
     if not value.is_integer():
         table.fault(line, column, f"expected a whole number of steps, got {cells[column]}")
         return None
-    return value * (_step(spacecraft, name) or 0.0)
+    commands = spacecraft.commands
+    if commands is None:
+        return 0.0
+    time = commands.delay_of(value) if name == "delay" else commands.width_of(value)
+    if time is None:
+        table.fault(
+            line,
+            column,
+            f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, got {cells[column]}",
+        )
+    return time
 
 
 def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int | None:
@@ -197,8 +195,9 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
         table.warn(line, "count", text)
     if block.every not in commands.every:
         table.warn(line, "every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
-    for name, time in (("delay", block.delay), ("width", block.width)):
-        counts, step = cells.get(f"{name}_counts", ""), _step(spacecraft, name)
-        if counts and step is not None and f"{name}_s" in cells and counts != _counts(time, step):
-            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {_counts(time, step)}: ignored"
+    counted = (commands.delay_counts(block.delay), commands.width_counts(block.width))
+    for name, time, right in zip(TIMES, (block.delay, block.width), counted, strict=True):
+        counts = cells.get(f"{name}_counts", "")
+        if counts and f"{name}_s" in cells and counts != str(right):
+            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
             table.warn(line, f"{name}_counts", text)

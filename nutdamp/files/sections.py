@@ -67,7 +67,8 @@ class Length(Rule):
         if len(found) < self.least == 1:
             raise ValueError("empty; expected an entry")
         if long or len(found) < self.least:
-            count = f"{self.least}" if self.most in (None, self.least) else f"{self.least} to {self.most}"
+            count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
+            count = f"at least {self.least}" if self.most is None else count
             raise ValueError(f"expected {count} entries, got {len(found)}")
         return found
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,14 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Cold:
-    """The first pulse of each channel has ``first`` times the thrust; over ``pulses`` of them this decays to one."""
+    """The first pulse of each channel has ``first`` times the thrust; over ``pulses`` of them this decays to one.
+
+    ``fired``: pulses by channel before t = 0.
+    """
 
     first: float
     pulses: float
+    fired: Mapping[str, int] = field(default_factory=dict)
 
     def factor(self, before: int) -> float:
         """Of the pulse that comes after so many ``before`` it: 1 - (1 - first) exp(-k/pulses)."""
@@ -27,10 +32,10 @@ class Cold:
 
 @dataclass(frozen=True, slots=True)
 class Tank:
-    """A tank in blowdown: ``propellant`` kg, ``pressure`` at t = 0 and ``final_pressure`` Pa with nothing left.
+    """A tank in blowdown: ``propellant`` kg, ``pressure`` when full and ``final_pressure`` Pa with nothing left.
 
     Thrust goes with the pressure to the power ``exponent``. ``isp`` are rows of pressure, Pa, rising, and specific
-    impulse, s, between which it runs evenly; None leaves it to the thrusters.
+    impulse, s, between which it runs evenly; None leaves it to the thrusters. ``used`` kg were used before t = 0.
     """
 
     propellant: float
@@ -38,6 +43,7 @@ class Tank:
     final_pressure: float
     exponent: float
     isp: tuple[tuple[float, float], ...] | None = None
+    used: float = 0.0
 
     def pressure_after(self, used: Any) -> Any:
         """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it: one number or an array.
@@ -49,7 +55,7 @@ class Tank:
         return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
 
     def thrust_factor(self, used: Any) -> Any:
-        """Thrust over that at t = 0."""
+        """Thrust over that of a full tank."""
         return (self.pressure_after(used) / self.pressure) ** self.exponent
 
     def isp_after(self, used: Any) -> Any:

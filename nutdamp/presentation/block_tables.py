@@ -40,10 +40,10 @@ def blocks_table(flown: Flight, *, named: bool = False) -> Table:
             block.channel,
             str(block.first),
             f"{block.delay:.6g}",
-            "" if commands is None else str(round(block.delay / commands.delay_step)),
+            "" if commands is None else str(commands.delay_counts(block.delay)),
             f"{math.degrees(block.delay * abs(body.spin)):.2f}",
             f"{block.width:.6g}",
-            "" if commands is None or commands.width_step is None else str(round(block.width / commands.width_step)),
+            "" if commands is None else str(commands.width_counts(block.width)),
             str(block.count),
             str(block.every),
         )

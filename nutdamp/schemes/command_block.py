@@ -21,10 +21,11 @@ from nutdamp import compliance, flight, work
 from nutdamp.commands import Block, Commands
 from nutdamp.compliance import Part
 from nutdamp.errors import Infeasible
-from nutdamp.limits import OFF_TICK, Windows, commandable_widths, keeps_limits, usable
+from nutdamp.limits import Windows, commandable_widths, keeps_limits, usable
 from nutdamp.outcome import left_by
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import CommandBlockOptions
+from nutdamp.schemes.tools import block_notes
 from nutdamp.schemes.tools.block_model import BlockModel, State, Trial, acts
 from nutdamp.schemes.tools.reasons import no_channels
 from nutdamp.schemes.tools.sun_pulses import fired
@@ -101,8 +102,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     commands = spacecraft.commands
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file says nothing of commands: it needs the keys sun, sun_sensor and commands")
-    steps = _steps(spacecraft, commands)
-    spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
+    tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     channels = usable(spacecraft)
     if not channels:
         raise Infeasible(no_channels(spacecraft))
@@ -123,20 +123,11 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not flights:
         raise Infeasible(why)
     chosen = min(flights, key=lambda one: one.rank)
-    return replace(chosen.made, notes=(search.note(chosen, first=chosen.found.rank[:2] <= best[0].rank[:2]), *steps))
-
-
-def _steps(spacecraft: Spacecraft, commands: Commands) -> tuple[str, ...]:
-    """That blocks are on no ticks, where their steps are others than those."""
-    tick = spacecraft.limits.tick
-    if tick is None:
-        return ()
-    steps = np.array([commands.delay_step, *commands.widths]) / tick
-    if np.abs(steps - np.rint(steps)).max() <= OFF_TICK:
-        return ()
-    return (
-        f"limits.tick = {tick:g} s is not kept: blocks have the steps of commands, delays of {commands.delay_step:g} s",
-    )
+    first = chosen.found.rank[:2] <= best[0].rank[:2]
+    notes = [search.note(chosen, first=first), *block_notes.off_ticks(tick, commands)]
+    if chosen.rank[1] > 1.0:
+        notes.insert(1, search.cures(chosen, options.max_blocks or BLOCKS))
+    return replace(chosen.made, notes=tuple(notes))
 
 
 class Search:
@@ -189,17 +180,20 @@ class Search:
         rank = not keeps_limits(self.body, made), share if share > 1.0 else 0.0, made.cost, made.end
         return Flown(rank, made, found)
 
+    def cures(self, chosen: Flown, most: int) -> str:
+        """What keeps ``chosen`` from leaving less, of up to ``most`` blocks."""
+        left = left_by(flight.flown(self.body, chosen.made))
+        missed = {bound.part: bound.most for bound in self.bounds if float(self._share(bound, left)) > 1.0}
+        more = [f"--max-blocks {BLOCKS}"] * (len(chosen.made.blocks) == most < BLOCKS)
+        return block_notes.cures(self.model, self.channels, missed, chosen.made, more)
+
     def note(self, chosen: Flown, *, first: bool) -> str:
         """What was looked at, and how far flight and closed form are apart; ``first``: it is the best in that form."""
-        blocks, form = chosen.found.blocks, self.model.left(chosen.found.state)
-        flown = left_by(flight.flown(self.body, chosen.made))
-        nutation, end = (math.degrees(abs(float(one) - other)) for one, other in zip(form[:2], flown[:2], strict=True))
-        others = "no other single block" if len(blocks) == 1 else f"none of the {self.looked:,} sequences compared"
-        scope = f"{others} does better in closed form" if first else "of those flown none does better"
-        return (
-            f"{scope}; flown from the Sun pulses of the nutating body, nutation differs by {nutation:.2g}° and the end "
-            f"of H by {end:.2g}°"
+        made, form = chosen.made, self.model.left(chosen.found.state)
+        compared = (
+            f"none of the {self.looked:,} sequences compared" if len(made.blocks) > 1 else "no other single block"
         )
+        return block_notes.searched(compared, form, left_by(flight.flown(self.body, made)), first=first)
 
     def _behind(self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN) -> Iterator[Found]:
         """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``."""

@@ -89,9 +89,9 @@ def test_faults_of_counts(tmp_path: Path) -> None:
         "3: delay_counts: expected a whole number of steps, got 2.5",
     ]
     path = tmp_path / "blocks.csv"
-    listed = read_spacecraft(FILE.replace("{step: 10 ms, min: 100 ms, max: 500 ms}", "[0.2 s]"), "f.yaml")
-    with pytest.raises(FaultyFile, match="no step of the width to count; expected the column width_s"):
-        read_blocks(path, listed)
+    bare = read_spacecraft("\n".join(row for row in FILE.splitlines() if not row.startswith("commands")), "f.yaml")
+    with pytest.raises(FaultyFile, match="no commands to count the width in; expected the column width_s"):
+        read_blocks(path, bare)
 
 
 def test_very_many_pulses_are_refused_at_once(tmp_path: Path) -> None:
@@ -183,3 +183,21 @@ def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
     assert "blocks.csv" in verified.stdout
     both = run("verify", "-", *GOAL, "--blocks", "blocks.csv", "--schedule", "blocks.csv", stdin=text)
     assert both.returncode == 2
+
+
+def test_widths_of_a_list_are_counted_by_their_number(run: Run, tmp_path: Path) -> None:
+    """What the file of blocks says in counts alone, the blocks are: entry 2 of 100, 300 and 500 ms is 300 ms."""
+    text = FILE.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: [500 ms, 100 ms, 300 ms]")
+    assert run("plan", "-", *GOAL, "--blocks", "blocks.csv", stdin=text).returncode in (0, 4)
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "blocks.csv").read_text())))
+    widths = {"0.1": "1", "0.3": "2", "0.5": "3"}
+    assert rows
+    assert all(row["width_counts"] == widths[row["width_s"]] for row in rows)
+    craft = read_spacecraft(text, "f.yaml")
+    path = tmp_path / "counts.csv"
+    path.write_text("channel,first_sun_pulse,delay_counts,width_counts,count\nT1,1,500,2,4\n")
+    (block,), _ = read_blocks(path, craft)
+    assert (block.delay, block.width) == (1.0, 0.3)
+    path.write_text("channel,first_sun_pulse,delay_counts,width_counts,count\nT1,1,500,4,4\n")
+    with pytest.raises(FaultyFile, match=r"the number of an entry of commands\.width, 1 to 3, got 4"):
+        read_blocks(path, craft)

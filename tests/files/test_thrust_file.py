@@ -127,7 +127,7 @@ def test_a_valve_that_opens_for_some_thrusters_and_not_for_others_is_a_fault() -
 @pytest.mark.parametrize(
     ("table", "expected"),
     [
-        ("impulse_bit: [[20 ms, 0.15 N s, 16 ms]]", "expected 2 entries, got 1"),
+        ("impulse_bit: [[20 ms, 0.15 N s, 16 ms]]", "expected at least 2 entries, got 1"),
         ("impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]", "expected 3 entries, got 2"),
         ("impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]", "is a mass; expected an impulse"),
         ("impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]", "on-time 0.02 s is not above"),

@@ -113,7 +113,7 @@ class BlockModel:
             raise Infeasible("the spin axis points to the Sun or away from it: it has no Sun pulse")
         self._frame = np.array([np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun])
         self.goal = self._frame @ spacecraft.target_axis
-        self.rate = self.inertia.body_rate
+        self.rate, supply = self.inertia.body_rate, Supply(spacecraft)
         first = first_sun_pulse(spacecraft)
         rate = self.rate * spacecraft.spin
         self.start = State(
@@ -122,9 +122,11 @@ class BlockModel:
             phasor=self.inertia.A * complex(*spacecraft.omega0[:2].tolist()) * cmath.exp(-1j * rate * first),
             sun_pulse=first,
             spin=spacecraft.spin,
+            used=supply.used,
+            fired=supply.fired,
         )
         self.turn = spin_turn(spacecraft)
-        self.steady = Supply(spacecraft).steady
+        self.steady = supply.steady
         self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
