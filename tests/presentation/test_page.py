@@ -227,6 +227,22 @@ def test_valves_and_tank_are_among_what_the_spacecraft_is() -> None:
         assert said in text
 
 
+def test_with_valves_commanded_and_effective_on_times_are_told_apart() -> None:
+    """In the columns of both tables, and above the picture, whose bars are the effective ones."""
+    valve = "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"
+    for text, through in ((example_text(), False), (example_text() + valve, True)):
+        made = report_page(compared(text, ("four-pulse",)), Repeat("", "", ""), pictured=True)
+        tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
+        for section in ("schedule", "manoeuvre"):
+            heads = [head.split(" s")[0] for head in sheet(tree, section)[0]]
+            assert ("on-time, commanded" in heads) == through
+            assert ("on-time" in heads) != through
+        words = " ".join(one.text for one in tree.all("text"))
+        assert ("Firings: effective on-times, not the commands" in words) == through
+        assert ("The on-times are effective ones" in tree.text) == through
+        assert "Firings" in words
+
+
 def test_without_a_feasible_plan_the_page_says_why() -> None:
     text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n").replace("two-pulse", "")
     assert "No recommendation" not in text

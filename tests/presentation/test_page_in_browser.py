@@ -317,6 +317,61 @@ def test_on_a_phone_nothing_to_decide_on_has_to_be_scrolled(tab: Browse) -> None
         assert len(page.evaluate(VISIBLE, ".whole svg")) >= 2
 
 
+LETTERED = """() => [...document.querySelectorAll("figure svg")]
+  .filter((svg) => svg.checkVisibility() && svg.getBoundingClientRect().width > 2)
+  .map((svg) => {
+    const used = svg.querySelector(":scope > use");
+    const drawing = used ? document.querySelector(used.getAttribute("href")) : svg;
+    const own = drawing.closest("svg"), view = svg.viewBox.baseVal, size = svg.getBoundingClientRect();
+    const scale = Math.min(size.width / view.width, size.height / view.height);
+    const back = own.getScreenCTM().inverse();
+    const texts = [...drawing.querySelectorAll("text")].map((text) => {
+      const box = text.getBBox(), turn = back.multiply(text.getScreenCTM());
+      const corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(([right, down]) =>
+        new DOMPoint(box.x + right * box.width, box.y + down * box.height).matrixTransform(turn));
+      const [across, along] = [corners.map((one) => one.x), corners.map((one) => one.y)];
+      const beside = [view.x - Math.max(...across), Math.min(...across) - view.x - view.width,
+        view.y - Math.max(...along), Math.min(...along) - view.y - view.height];
+      const beyond = [view.x - Math.min(...across), Math.max(...across) - view.x - view.width,
+        view.y - Math.min(...along), Math.max(...along) - view.y - view.height];
+      return [text.textContent, scale * parseFloat(getComputedStyle(text).fontSize),
+        Math.max(...beside), Math.max(...beyond)];
+    });
+    return [drawing.id, texts];
+  })"""
+"""Each picture that is seen, or part of one: the drawing it shows, and of each text there the height of its letters in
+px, and how far it lies beside what is shown and how far it stands out of it, in units of the drawing."""
+
+
+@pytest.mark.parametrize("name", [*everywhere(), DISPERSED])
+def test_on_a_phone_text_in_pictures_is_read_and_none_of_it_is_cut(tab: Browse, name: str) -> None:
+    with tab(name, 400) as page:
+        parts = page.evaluate(LETTERED)
+        headings = page.evaluate(VISIBLE, ".heading")
+        assert page.evaluate(VISIBLE, ".broad svg") == []
+    drawn = [texts for _, texts in parts]
+    assert len(drawn) >= 6
+    assert len(headings) >= 3
+    whole: dict[tuple[str, int], bool] = {}
+    for part, (drawing, texts) in enumerate(parts):
+        for row, (text, height, beside, beyond) in enumerate(texts):
+            if beside > -1.0:
+                whole.setdefault((drawing or str(part), row), False)  # somewhere else, or nowhere
+                continue
+            assert height >= 9.0, text
+            assert beyond <= 1.0, text
+            whole[drawing or str(part), row] = True
+    assert all(whole.values())
+
+
+def test_wide_screens_and_paper_have_the_wide_pictures(tab: Browse) -> None:
+    with tab(DISPERSED, 1000) as page:
+        for media in ("screen", "print"):
+            page.emulate_media(media=media)
+            assert page.evaluate(VISIBLE, ".narrow svg, .apart svg") == []
+            assert len(page.evaluate(VISIBLE, ".whole svg, .broad svg, .small svg")) >= 8
+
+
 def test_paper_has_numbers_and_the_same_bytes(chromium: Any, pages: Callable[[str], Path]) -> None:
     text = pages(QUICK[0]).read_text(encoding="utf-8")
     first, second = (pdf.printed(text, "report.pdf") for _ in range(2))

@@ -19,6 +19,7 @@ from nutdamp.errors import BadRequest, CannotWrite
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import history, sphere, style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.motion import short_name
 from nutdamp.presentation.figures.style import INK, MOTION
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -233,7 +234,7 @@ class Scene:
         history.cone_history(self.strip, flight, self.path)
         self.strip.set(xlabel="time, s", ylabel="deg")
         sphere.name_directions(self.sky)
-        style.legend(figure, [self.sky, self.strip], 5)
+        legend(figure, [self.sky, self.strip], 5)
         self.title = figure.suptitle(self.caption(0.0))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # from now on nothing may move but the motion

@@ -16,6 +16,7 @@ from nutdamp.physics import attitude
 from nutdamp.presentation import geometry
 from nutdamp.presentation.dispersion_tables import budget_rows
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.verdicts import cases_verdict, exact_percent
 from nutdamp.spacecraft import Vector
@@ -88,14 +89,14 @@ def cases(results: Results) -> Figure:
 
 def momentum(results: Results) -> Figure:
     """Where H ends in each case, seen from outside, with the ellipse that holds as many as must comply."""
-    figure = style.sheet(5.8, 5.6)
+    figure = style.sheet(4.1, 4.5)
     _momentum(figure, results)
     return figure
 
 
 def budget(results: Results) -> Figure:
     """What each tolerance does to nutation and shift of H, side by side."""
-    figure = style.sheet(8.8, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
+    figure = style.sheet(8.2, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
     _budget(figure, results)
     return figure
 
@@ -132,7 +133,7 @@ def _cases(figure: Figure | SubFigure, results: Results) -> None:
         for axes in row:
             _mark(axes, reached, limit, results.probability)
         row[1].set_title(f"{exact_percent(results.probability)} within {reached:.4g}°{required}")
-    style.legend(figure, list(grid.flat))
+    legend(figure, list(grid.flat))
 
 
 def _alike(found: Distribution) -> str | None:
@@ -257,7 +258,7 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
     style.square(axes, np.vstack(shown), margin=0.08)
     axes.set(xlabel=sky.x, ylabel=sky.y, title=title)
-    style.legend(figure, [axes], 2)
+    legend(figure, [axes], 2)
 
 
 def _budget(figure: Figure | SubFigure, results: Results) -> None:
@@ -292,4 +293,4 @@ def _budget(figure: Figure | SubFigure, results: Results) -> None:
         axes.set_xlabel(f"{name}, deg")
         axes.locator_params(axis="x", nbins=5)
         axes.grid(axis="x")
-    style.legend(figure, list(pair))
+    legend(figure, list(pair))

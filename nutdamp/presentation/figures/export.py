@@ -86,6 +86,7 @@ def svg(figure: Figure) -> str:
     text = text[text.index("<svg") :]
     # What matplotlib says of all elements would hold for the whole page, and its metadata are no part of the picture.
     text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
+    text = re.sub(r">\s+<", "><", text)
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
     text = re.sub(r'(?<=\sd=")[^"]*', lambda path: _brief(path[0]), text)
     text = re.sub(rf"font-family: {FONT}; |(?<=\" ) ?transform=\"rotate\(-0 [^)]*\)\"", "", text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.text import degrees, steering
 from nutdamp.schedule import STEERABLE, Pulse
@@ -26,6 +28,9 @@ TIME = "time, s"
 DECADES = 4.0
 """Of the nutation shown on a log axis at most, unless the requirement lies lower."""
 
+HEADING = 9.0
+"""Letters of a heading of a panel that have room in an inch of a figure."""
+
 EDGE = 0.012
 """Room before t = 0, as a part of the time shown: what happens at once must be seen."""
 
@@ -36,13 +41,17 @@ BAR = 0.46
 """Height of a bar; the distance between two rows is 1."""
 
 
-def history(flight: Flight, track: Track) -> Figure:
-    """Rates in the body and cone angles over time, firings as bars behind them; the nutation on a log axis too."""
-    figure = style.sheet(7.4, 5.6)
-    grid = figure.add_gridspec(3, 2, height_ratios=[3, 1.3, 3.4])
+def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
+    """Rates in the body and cone angles over time, firings as bars behind them; the nutation on a log axis too.
+
+    ``narrow``: all below each other, for a phone.
+    """
+    figure = style.sheet(style.PHONE, 8.6) if narrow else style.sheet(7.4, 5.6)
+    grid = figure.add_gridspec(4, 1, height_ratios=[3, 1.6, 3, 3]) if narrow else None
+    grid = grid or figure.add_gridspec(3, 2, height_ratios=[3, 1.3, 3.4])
     rates = figure.add_subplot(grid[0, :])
     spin = figure.add_subplot(grid[1, :], sharex=rates)
-    cones, decay = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
+    cones, decay = (figure.add_subplot(cell) for cell in ((grid[2], grid[3]) if narrow else (grid[2, 0], grid[2, 1])))
     rates.tick_params(labelbottom=False)
     rate_history(rates, flight, track)
     spin_history(spin, flight, track)
@@ -50,17 +59,18 @@ def history(flight: Flight, track: Track) -> Figure:
     decay_history(decay, flight, track)
     for axes in (spin, cones, decay):
         axes.set_xlabel(TIME)
-    style.legend(figure, [rates, cones])
+    legend(figure, [rates, cones])
     return figure
 
 
-def timeline(flight: Flight, track: Track) -> Figure:
-    """Which channel fires when and for how long."""
-    figure = style.sheet(7.4, 1.7 + 0.36 * max(len(geometry.channels_fired(flight)), 1))
+def timeline(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
+    """Which channel fires when and for how long; ``narrow``: for a phone."""
+    rows = max(len(geometry.channels_fired(flight)), 1)
+    figure = style.sheet(style.PHONE if narrow else 7.4, 1.7 + 0.36 * rows)
     axes = figure.subplots()
     firings(axes, flight, float(track.t[-1]))
     axes.set_xlabel(TIME)
-    style.legend(figure, [axes])
+    legend(figure, [axes])
     return figure
 
 
@@ -142,8 +152,12 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
         _bar(axes, flight, block, row, brief=brief)
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
-    steered = any(pulse.channel == STEERABLE for pulse in flight.schedule)
-    axes.set_title("Firings" + (", direction of the torque from body axis +1" if steered and not brief else ""))
+    title = "Firings"
+    if flight.schedule.through_valves:
+        title += ": effective on-times, not the commands"
+    if any(pulse.channel == STEERABLE for pulse in flight.schedule) and not brief:
+        title += ", direction of the torque from body axis +1"
+    axes.set_title(fill(title, int(HEADING * axes.figure.bbox.width / axes.figure.dpi)))
     if not names:
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")
 

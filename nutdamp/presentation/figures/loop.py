@@ -13,6 +13,7 @@ from nutdamp.loop.stability import Map
 from nutdamp.loop_settings import GYRO
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.history import TIME, firings
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.spacecraft import Vector
 
@@ -46,7 +47,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     _nutation(nutation, plan)
     firings(fired, run.flight, run.until, brief=True)
     fired.set_xlabel(TIME)
-    style.legend(figure, [signal, nutation])
+    legend(figure, [signal, nutation])
     return figure
 
 
@@ -121,5 +122,5 @@ def map_figure(found: Map, ratio: float) -> Figure:
     axes.set_xlabel("delay that the law does not reckon with, s")
     axes.set_ylabel("C/A")
     figure.colorbar(mesh, ax=axes, label="nutation left by a firing and a period: below 1 it damps")
-    style.legend(figure, [axes])
+    legend(figure, [axes])
     return figure

@@ -12,6 +12,7 @@ from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.end_tables import direction_text
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, Meant
 from nutdamp.presentation.text import degrees, moment
 from nutdamp.spacecraft import Channel, Vector
@@ -46,7 +47,7 @@ def motion(flight: Flight, track: Track) -> Figure:
     axis_track(space, flight, track)
     if small is not None:
         momentum_inset(inset[0], space, flight, track, small)
-    style.legend(figure, [body, space])
+    legend(figure, [body, space])
     return figure
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import history, motion, sphere, style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.track import Track
 
 if TYPE_CHECKING:
@@ -14,10 +16,13 @@ if TYPE_CHECKING:
 
 
 @style.styled
-def flight_figure(name: str, flight: Flight, track: Track) -> Figure:
-    """The figure ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``; raises KeyError for others."""
+def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
+    """The figure ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``; raises KeyError for others.
+
+    ``narrow``: for a phone, which has ``history`` and ``timeline`` alone.
+    """
     seen = geometry.drawn(flight, track)
-    figure = DRAWN[name](flight, seen)
+    figure = (NARROW if narrow else DRAWN)[name](flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     cut = until < 0.99 * end
     for axes in figure.axes:
@@ -40,13 +45,13 @@ def overview(flight: Flight, track: Track) -> Figure:
     motion.pole_curve(body, flight, track)
     motion.axis_track(space, flight, track)
     sphere.cones_in_space(cones, flight, track)
-    style.legend(upper, [body, space, cones])
+    legend(upper, [body, space, cones])
     rates, angles, firings = lower.subplots(3, 1, sharex=True, height_ratios=heights)
     history.rate_history(rates, flight, track)
     history.cone_history(angles, flight, track)
     history.firings(firings, flight, float(track.t[-1]), brief=channels > 2 or len(flight.schedule) > 8)
     firings.set_xlabel(history.TIME)
-    style.legend(lower, [rates, angles, firings])
+    legend(lower, [rates, angles, firings])
     return figure
 
 
@@ -57,3 +62,4 @@ DRAWN = {
     "history": history.history,
     "timeline": history.timeline,
 }
+NARROW = {"history": partial(history.history, narrow=True), "timeline": partial(history.timeline, narrow=True)}

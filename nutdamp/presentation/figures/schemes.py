@@ -14,6 +14,7 @@ from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import in_degrees
 from nutdamp.presentation.verdicts import percent
@@ -73,7 +74,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
         _column(axes, column, plans, chosen)
     for axes in cells[len(columns) :]:
         axes.remove()
-    style.legend(figure, cells[: len(columns)], 3)
+    legend(figure, cells[: len(columns)], 3)
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
     if chosen is not None and chosen.standing is Standing.MISSES:
         verdict += f" ({_short(chosen)})"

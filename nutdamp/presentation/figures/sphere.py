@@ -12,6 +12,7 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED, Meant
 from nutdamp.presentation.geometry import Cones
 from nutdamp.spacecraft import Vector
@@ -85,7 +86,7 @@ def sphere(flight: Flight, track: Track) -> Figure:
     space, plan = figure.subplots(1, 2)
     cones_in_space(space, flight, track)
     along_momentum(plan, flight, track)
-    style.legend(figure, [space, plan])
+    legend(figure, [space, plan])
     return figure
 
 

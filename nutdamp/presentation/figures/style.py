@@ -19,7 +19,7 @@ from nutdamp.spacecraft import Vector
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
@@ -72,6 +72,7 @@ _SETTINGS: dict[str, Any] = {
     "grid.linewidth": 0.5,
     "legend.frameon": False,
     "legend.fontsize": 8,
+    "legend.labelspacing": 0.9,  # marks reach into no other line
     "lines.linewidth": LINE,
     "lines.solid_capstyle": "round",
     "text.color": INK,
@@ -108,6 +109,10 @@ def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
             return draw(*args, **kwargs)
 
     return drawn
+
+
+PHONE = 3.7
+"""Width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it."""
 
 
 def sheet(width: float, height: float) -> Figure:
@@ -235,11 +240,12 @@ def settle(figure: Figure) -> None:
         )
         curves = _inked(axes) if notes else np.empty((0, 2))
         taken: list[Bbox] = []
+        leads = np.empty((0, 2))
         window, points = axes.get_window_extent(), figure.dpi / 72.0
         for note in notes:
-            box = _settle(note, taken, curves, window, points)
+            box = _settle(note, taken, (curves, leads), window, points)
             if box is not None:
-                curves = np.vstack([curves, _lead(note, box, points)])
+                leads = np.vstack([leads, _lead(note, box, points)])
             _MEANT.pop(note, None)
         bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
         if bars:
@@ -273,8 +279,13 @@ def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annota
     return fitting
 
 
-def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, points: float) -> Bbox | None:
-    """Where one label is put; ``window`` is that of its panel, ``points`` how many pixels a point is."""
+def _settle(
+    note: Annotation, taken: list[Bbox], inked: tuple[Vector, Vector], window: Bbox, points: float
+) -> Bbox | None:
+    """Where one label is put, which covers few of the curves and, if it can, none of the lines from other labels.
+
+    ``inked``: points of both; ``window`` is that of the panel, ``points`` how many pixels a point is.
+    """
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
     best, least = None, np.inf
@@ -283,8 +294,8 @@ def _settle(note: Annotation, taken: list[Bbox], curves: Vector, window: Bbox, p
         # Sideways offsets are counted from the edge of the text, so that long names stand as near as short ones.
         offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
         box = here.translated(offset[0] * points, offset[1] * points)
-        inside = (curves[:, 0] > box.x0) & (curves[:, 0] < box.x1) & (curves[:, 1] > box.y0) & (curves[:, 1] < box.y1)
-        covered = float(np.count_nonzero(inside)) + 0.04 * float(np.hypot(x, y))
+        curves, leads = (box.count_contains(part) for part in inked)
+        covered = float(curves) + 1e3 * float(leads > 0) + 0.04 * float(np.hypot(x, y))
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
         out = 0.0 if role == "_number" else out
         if led and not _nearest(note, box, points):
@@ -378,19 +389,6 @@ def _inked(axes: Axes) -> Vector:
             even = np.linspace(0.0, steps[-1], min(int(steps[-1] / 4.0) + 2, 20_000))
             points.append(np.column_stack([np.interp(even, steps, column) for column in path.T]))
     return np.concatenate(points)
-
-
-def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -> None:
-    """One legend under all panels, each name once, where no curve can run into it."""
-    found: dict[str, Artist] = {}
-    for one in axes:
-        for handle, name in zip(*one.get_legend_handles_labels(), strict=True):
-            found.setdefault(name, handle)
-    if found:
-        figure.legend(
-            list(found.values()), list(found), loc="outside lower center", ncols=columns, handlelength=2.2,
-            borderpad=0.2, columnspacing=1.4,
-        )  # fmt: skip
 
 
 def thinned(count: int, most: int = 24) -> list[int]:

@@ -12,6 +12,7 @@ import numpy as np
 from nutdamp.fronts import Front, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
 from nutdamp.spacecraft import Spacecraft
@@ -26,8 +27,8 @@ LOOKS = ((MOTION, "o", "-"), (PULSE, "s", (0, (5, 1.5))), (MOMENTUM, "^", (0, (5
 ALIKE = (0.02, 0.002)
 """Relative differences in end and in cost of points that are drawn as one."""
 
-WIDTH = 110
-"""Characters of a line above the picture."""
+WIDTH = 14.0
+"""Characters of a line above the picture in an inch of it."""
 
 FEWEST = 3
 """Ticks of a decade's 1, 2 and 5 below which the axis of time has others."""
@@ -38,15 +39,19 @@ REACH = 1.03
 
 
 @style.styled
-def trade_figure(spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | None = None) -> Figure:
+def trade_figure(
+    spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
+) -> Figure:
     """End of the last pulse against propellant (impulse where that is unknown), numbered as in the table.
 
-    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason.
+    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason. ``narrow``: for a
+    phone.
     """
-    figure = style.sheet(7.4, 4.8)
+    width = style.PHONE if narrow else 7.4
+    figure = style.sheet(width, 4.8)
     names = ", ".join(schemes_of(found))
     figure.suptitle(f"{spacecraft.name}: what time costs, by {names}, flown by real pulse widths")
-    reasons = "\n".join(fill(reason, WIDTH) for reason in missing(spacecraft, found))
+    reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, found))
     points = [point for _, _, point in numbered(found)]
     if not points:
         figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
@@ -69,7 +74,7 @@ def trade_figure(spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | 
     axes.set_xlabel("end of the last pulse, s")
     axes.set_ylabel("propellant, g" if scale > 1.0 else "impulse, N m s")
     _graduate(axes)
-    style.legend(figure, [axes], 3)
+    legend(figure, [axes], 3)
     style.settle(figure)
     return figure
 

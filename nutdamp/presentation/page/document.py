@@ -68,16 +68,19 @@ class Points:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An ``<svg>`` element, a caption, and what it shows in words for those who do not see it.
+    """An ``<svg>`` element, its title, a caption, and what it shows in words for those who do not see it.
 
-    ``views``: its panels as view boxes on the group called ``name`` in it, for narrow screens.
+    For narrow screens there is another drawing, ``narrow``, or ``views``: panels and entries of the legend as view
+    boxes on the group called ``name`` in it, which are shown as wide as they are at most, in px.
     """
 
     svg: str
+    title: str
     caption: str
     described: str
+    narrow: str = ""
     name: str = ""
-    views: tuple[str, ...] = ()
+    views: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

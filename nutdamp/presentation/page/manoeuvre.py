@@ -15,6 +15,7 @@ from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_table
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
+from nutdamp.presentation.page.sheets import on_times
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
 from nutdamp.presentation.text import MISSING, in_degrees, longitude, moment
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
@@ -79,7 +80,7 @@ def _firing(flown: Flight) -> Sheet:
     if _senses(body):
         columns.append((Column("Sun phase", "deg"), _angles(-to_sun_pulse(flown, starts))))
     columns += [
-        (Column("on-time", "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]),
+        on_times(flown.schedule),
         (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
     ]
     return _sheet("Pulses to fire", columns)

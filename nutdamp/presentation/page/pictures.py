@@ -10,8 +10,9 @@ from nutdamp.decision import Decision
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
+from nutdamp.presentation.figures.overview import NARROW
 from nutdamp.presentation.page.document import Picture
-from nutdamp.presentation.page.panels import apart
+from nutdamp.presentation.page.panels import picture
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
@@ -40,15 +41,23 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         ),
     ]
     if len(plan.pulses):
-        drawn.append(("timeline", "Which channel fires, when and for how long.", "Timeline of the firings"))
+        through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
+        said = "Which channel fires, when and for how long." + through * plan.pulses.through_valves
+        drawn.append(("timeline", said, "Timeline of the firings"))
     return tuple(
-        apart(figures.flight_figure(name, flown, track), caption, described) for name, caption, described in drawn
+        picture(
+            figures.flight_figure(name, flown, track),
+            caption,
+            described,
+            figures.flight_figure(name, flown, track, narrow=True) if name in NARROW else None,
+        )
+        for name, caption, described in drawn
     )
 
 
 def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
     """The schemes beside each other; raises MissingExtra."""
-    return apart(
+    return picture(
         figures.schemes_figure(compared, decided),
         "A row for each scheme: what it costs, when it ends, what it leaves. A cross marks a scheme that falls short, "
         "whatever it costs. What is less than an axis shows stands at its left edge.",
@@ -58,10 +67,15 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
 
 def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
     """What time costs, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
-    return Picture(
-        figures.svg(figures.trade_figure(compared.spacecraft, found, compared.recommended)),
+    wide, narrow = (
+        figures.trade_figure(compared.spacecraft, found, compared.recommended, narrow=narrow)
+        for narrow in (False, True)
+    )
+    return picture(
+        wide,
         "What an earlier end costs: each mark is a schedule, numbered along each front.",
         "Cost of schedules over the end of the last pulse",
+        narrow,
     )
 
 
@@ -87,6 +101,6 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         ),
     )
     return tuple(
-        apart(figures.dispersion_figure(name, dispersed, scheme=scheme), caption, described)
+        picture(figures.dispersion_figure(name, dispersed, scheme=scheme), caption, described)
         for name, caption, described in drawn
     )

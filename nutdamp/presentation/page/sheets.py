@@ -19,6 +19,7 @@ from nutdamp.presentation.end_tables import angle_names, angle_texts, bounds_tex
 from nutdamp.presentation.page.document import Column, Sheet
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, ratios
 from nutdamp.presentation.text import MISSING, in_degrees, longitude
+from nutdamp.schedule import Schedule
 
 Cell = Callable[[Plan], str]
 
@@ -98,13 +99,14 @@ def pulse_sheet(plan: Plan) -> Sheet:
     tracks = flown.around_pulses()
     phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses]))
     dates = [body.utc(pulse.loaded[0], MILLISECONDS) for pulse in pulses]
+    effective = [f"{pulse.on_time:.4f}" for pulse in pulses]
     columns: list[tuple[Column, list[str]]] = [
         (Column("pulse"), [str(index + 1) for index in range(len(pulses))]),
         (Column("start", "s"), [f"{pulse.loaded[0]:.4f}" for pulse in pulses]),
         *([(Column("start", "UTC", number=False), [date or MISSING for date in dates])] if any(dates) else []),
         (Column("spin phase", "deg"), [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]),
-        (Column("on-time", "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]),
-        *([(Column("effective", "s"), [f"{one.on_time:.4f}" for one in pulses])] if plan.pulses.through_valves else []),
+        on_times(plan.pulses),
+        *([(Column("on-time, effective", "s"), effective)] if plan.pulses.through_valves else []),
         (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
         (Column("impulse", "N m s"), [f"{pulse.magnitude:.4g}" for pulse in pulses]),
     ]
@@ -114,6 +116,12 @@ def pulse_sheet(plan: Plan) -> Sheet:
             columns.append((Column(f"{cone.replace('_', ' ')} {when}", "deg"), angles))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet(f"Pulses of {plan.scheme}", tuple(column for column, _ in columns), rows)
+
+
+def on_times(pulses: Schedule) -> tuple[Column, list[str]]:
+    """The column of on-times as they are loaded, which says so where valves make others of them."""
+    name = "on-time, commanded" if pulses.through_valves else "on-time"
+    return Column(name, "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]
 
 
 def aspects_sheet(decided: Decision) -> Sheet:

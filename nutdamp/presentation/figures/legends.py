@@ -1,0 +1,43 @@
+"""The legend of a figure, in as many columns as fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+
+def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -> None:
+    """One legend under all panels, each name once, where no curve can run into it, in as many columns as fit."""
+    found: dict[str, Artist] = {}
+    for one in axes:
+        for handle, name in zip(*one.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    if found:
+        room = 72.0 * figure.bbox.width / figure.dpi
+        fitting = (many for many in range(min(columns, len(found)), 1, -1) if _across(list(found), many) <= room)
+        figure.legend(
+            list(found.values()), list(found), loc="outside lower center", ncols=next(fitting, 1), handlelength=2.2,
+            borderpad=0.2, columnspacing=1.4,
+        )  # fmt: skip
+
+
+LETTER = 4.6
+"""Points that a letter of a legend takes, about."""
+
+HANDLE = 25.0
+"""Points to the left of the text in a legend: its line or mark."""
+
+
+def _across(names: Sequence[str], columns: int) -> float:
+    """About how wide a legend is, points, which is filled column by column."""
+    deep, more = divmod(len(names), columns)
+    ends = np.cumsum([deep + (index < more) for index in range(columns)]).tolist()
+    parts = [names[begin:end] for begin, end in zip([0, *ends[:-1]], ends, strict=True)]
+    return sum(HANDLE + LETTER * max(map(len, part)) for part in parts) + 11.0 * (columns - 1)
