@@ -120,7 +120,7 @@ def cost(decision: Decision) -> Iterator[tuple[str, str]]:
         yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')} in {count}"
     else:
         yield "propellant", f"{mass(pulses.propellant)} in {count}"
-    yield "end", f"{moment(pulses.end)}, of the last pulse" if len(pulses) else "no pulse is needed"
+    yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
 
 
 def end_facts(decision: Decision) -> Table:

@@ -202,7 +202,7 @@ def test_pictures_are_inside_and_described(example: str) -> None:
     views = [svg for svg in drawn if "role" not in svg.attributes]  # panels of these, for narrow screens
     assert len(views) >= 6
     pictures = [svg for svg in drawn if svg not in views]
-    assert len(pictures) == 5  # schemes, motion, cones, history, timeline
+    assert len(pictures) == 7  # schemes, motion, cones, history, timeline, and the last two for narrow screens
     for picture in pictures:
         assert picture.attributes["aria-label"]
         assert picture.attributes["role"] == "img"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,9 @@ from nutdamp.spacecraft import Vector
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
+
+LETTERS = 11.0
+"""Of the title that have room in an inch."""
 
 BINS = 80
 
@@ -64,7 +68,8 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     heading = f"{study.model.spacecraft.name}: {scheme} by {how}, {results.done:,} dispersed cases"
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
-    figure.suptitle(heading + verdict)
+    letters = int(LETTERS * figure.get_figwidth())
+    figure.suptitle("\n".join(fill(line, letters) for line in (heading + verdict).split("\n")))
     style.settle(figure)
     return figure
 

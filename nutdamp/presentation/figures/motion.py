@@ -28,6 +28,9 @@ ALIKE = math.radians(2.0)
 NUMBERED = 17
 """Pulses of a path that are numbered, and have arrowheads, at most."""
 
+MANY = 12
+"""Pulses from which on lines and arrowheads are small."""
+
 SPARSE = 40
 """Pulses of which each has a dot."""
 
@@ -144,24 +147,25 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     firings: list[Vector] = []
     width = float(np.ptp(points, axis=0).max())
     numbered = style.thinned(len(flight.schedule), NUMBERED)
+    thin = min(style.thickness(points), THIN if len(flight.schedule) > MANY else style.LINE) / style.LINE
+    size = 9.0 if thin == 1.0 else 5.5
     for stretch in geometry.stretches(flight, track):
         rows = points[stretch.first : stretch.last + 1]
         if stretch.pulse is None:
             coasts.append(rows)
             if len(firings) in numbered or len(firings) == len(flight.schedule):
-                style.heads(axes, rows, _halfway(rows), MOTION)
+                style.heads(axes, rows, _halfway(rows), MOTION, size)
             continue
         firings.append(rows)
         if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
             fine = _refined(rows)
-            style.heads(axes, fine, [len(fine) - 1], PULSE)
+            style.heads(axes, fine, [len(fine) - 1], PULSE, size)
     _number(axes, [_refined(rows) for rows in firings])
-    thin = style.thickness(points) / style.LINE
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
         axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
         begins = [rows[0] for number, rows in enumerate(firings) if len(firings) <= SPARSE or number in numbered]
-        axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5)
+        axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
     style.label(axes, "t = 0", points[0], INK, role="vital")

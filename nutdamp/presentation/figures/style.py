@@ -124,9 +124,9 @@ def sheet(width: float, height: float) -> Figure:
     return figure
 
 
-def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str) -> None:
+def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str, size: float = 9.0) -> None:
     """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
-    look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0}
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
     for row in places:
         if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
             (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
@@ -295,7 +295,7 @@ def _settle(
         offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
         box = here.translated(offset[0] * points, offset[1] * points)
         curves, leads = (box.count_contains(part) for part in inked)
-        covered = float(curves) + 1e3 * float(leads > 0) + 0.04 * float(np.hypot(x, y))
+        covered = float(curves) + 30.0 * float(leads > 0) + 0.04 * float(np.hypot(x, y))
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
         out = 0.0 if role == "_number" else out
         if led and not _nearest(note, box, points):
