@@ -9,6 +9,7 @@ import numpy as np
 
 from nutdamp.loop.study import LoopResults
 from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import GREY, MOTION, PULSE
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def loop_cases_figure(results: LoopResults) -> Figure:
     if required is not None and required.nutation is not None:
         largest.axvline(degrees * required.nutation, color=PULSE, linewidth=1.4, label="required")
     _histogram(propellant, results, "propellant", 1e3, "propellant, g")
-    style.legend(figure, [quiet, largest])
+    legend(figure, [quiet, largest])
     return figure
 
 
