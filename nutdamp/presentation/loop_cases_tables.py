@@ -30,15 +30,15 @@ from nutdamp.presentation.text import MISSING, degrees, duration
 
 NAMES = {
     "settled": ("first quiet, s", 1.0),
-    "quiet": ("nutation then, deg", 180.0 / math.pi),
-    "nutation": ("largest since, deg", 180.0 / math.pi),
+    "quiet": ("left then, deg", 180.0 / math.pi),
+    "nutation": ("largest, deg", 180.0 / math.pi),
     "momentum_shift": ("shift of H, deg", 180.0 / math.pi),
     "axis_error": ("axis error, deg", 180.0 / math.pi),
-    "spin_change": ("spin change, mrad/s", 1e3),
+    "spin_change": ("spin, mrad/s", 1e3),
     "propellant": ("propellant, g", 1e3),
     "firings": ("firings", 1.0),
 }
-"""What people call the outputs, and the factors to their units."""
+"""What people call the outputs, in few letters, and the factors to their units."""
 
 SHARED = ("settled", "nutation", "propellant")
 """Outputs of which it is shown what they depend on."""
@@ -136,7 +136,7 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
     heads = (
         "case\n",
         "first quiet\ns",
-        "largest since\ndeg",
+        "largest\ndeg",
         "propellant\ng",
         "firings\n",
         "largest inputs, in sigmas\n",

@@ -11,24 +11,11 @@ from process import Run
 
 import nutdamp
 
-DISPERSED = """
-dispersions:
-  omega0: {normal: 0.2 deg/s}
-  thrust: {normal: 3 %}
-  thrust_per_pulse: {normal: 1 %}
-  sensor_bias: {normal: 0.01 m/s^2}
-  sensor_scale: {normal: 2 %}
-  sensor_noise: {uniform: 20 %}
-  sensor_delay: {uniform: 5 ms}
-"""
-
 
 @pytest.fixture
 def stage(run: Run, tmp_path: Path) -> Path:
     run("init", "--from", "upper-stage", "stage.yaml")
-    file = tmp_path / "stage.yaml"
-    file.write_text(file.read_text() + DISPERSED)
-    return file
+    return tmp_path / "stage.yaml"
 
 
 def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) -> None:
@@ -123,10 +110,10 @@ def test_what_does_not_go_together_is_refused(run: Run, stage: Path, options: tu
     assert message in " ".join(done.stderr.split())
 
 
-def test_what_a_file_lacks_is_said(run: Run, stage: Path) -> None:
+def test_what_a_file_lacks_is_said(run: Run, stage: Path, tmp_path: Path) -> None:
     run("init", "plain.yaml")
     assert "the spacecraft file has no loop" in run("disperse", "plain.yaml", "--loop").stderr
-    run("init", "--from", "upper-stage", "exact.yaml")
+    (tmp_path / "exact.yaml").write_text(stage.read_text().partition("dispersions:\n")[0])
     assert "dispersions" in run("disperse", "exact.yaml", "--loop").stderr
     assert run("loop", "exact.yaml", "--case", "3").returncode == 2
 
