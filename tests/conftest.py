@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+# Matrices are small here: several threads to multiply them wait for each other, the more the busier the machine is.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import HealthCheck, settings
 from planned_once import Planner
@@ -38,6 +41,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if "orekit" in item.keywords:
             item.add_marker(pytest.mark.skip(reason="NOT CHECKED against Orekit here: pytest -m orekit"))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _nothing_kept(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What functions of a module of tests have cached (hundreds of figures) goes with the last test of the module."""
+    yield
+    for found in vars(request.module).values():
+        if hasattr(found, "cache_clear") and found.__module__ == request.module.__name__:
+            found.cache_clear()
 
 
 @pytest.fixture

@@ -12,9 +12,19 @@ from matplotlib.text import Text
 
 from nutdamp.spacecraft import Vector
 
+KEPT = "texts of the tests"
+"""Where a figure keeps what it was drawn for."""
+
 
 def texts(figure: Figure) -> list[tuple[Text, Vector]]:
-    """Every text that is drawn, with its box in pixels."""
+    """Every text that is drawn, with its box in pixels; a figure is drawn for it once."""
+    if KEPT not in vars(figure):
+        vars(figure)[KEPT] = list(_drawn(figure).items())
+    kept: list[tuple[Text, Vector]] = vars(figure)[KEPT]
+    return kept
+
+
+def _drawn(figure: Figure) -> dict[Text, Vector]:
     found: dict[Text, Vector] = {}
     draw = Text.draw
 
@@ -25,7 +35,7 @@ def texts(figure: Figure) -> list[tuple[Text, Vector]]:
 
     with mock.patch.object(Text, "draw", noted):
         figure.draw_without_rendering()
-    return list(found.items())
+    return found
 
 
 def check_layout(figure: Figure, *, crowded: bool = False) -> None:

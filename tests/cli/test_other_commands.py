@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from process import Run
+from samples import some
 
 from nutdamp import __version__
 from nutdamp.cli.root import COMMANDS
@@ -171,9 +172,6 @@ def test_every_help_page_fits_80_columns(run: Run, arguments: tuple[str, ...], f
 
 
 def test_help_loads_click_only(run: Run) -> None:
-    import subprocess
-    import sys
-
     code = (
         "import sys\nfrom nutdamp.cli.root import group\ngroup.main(['--help'], standalone_mode=False)\n"
         "print(sorted({'numpy', 'scipy', 'yaml', 'pydantic', 'rich', 'matplotlib'} & set(sys.modules)))"
@@ -185,32 +183,35 @@ def test_help_loads_click_only(run: Run) -> None:
 LEAN = (
     "plan",
     "plan --scheme optimal --free-axis",
-    "plan --scheme optimal --least time",
-    "plan --target 10deg,20deg",
-    "plan --robust --scheme one-pulse",
-    "trade --points 2",
     "disperse --samples 100",
-    "disperse --samples 100 --scheme optimal --impulses --force",
     "simulate --scheme optimal",
 )
 """Commands that run without heavy packages; the first two also without masked arrays."""
 
+LEAN_TOO = (
+    "plan --scheme optimal --least time",
+    "plan --target 10deg,20deg",
+    "plan --robust --scheme one-pulse",
+    "trade --points 2",
+    "disperse --samples 100 --scheme optimal --impulses --force",
+)
 
-def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib() -> None:
+
+@pytest.mark.parametrize("lean", some([LEAN, LEAN_TOO]))
+def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib(lean: tuple[str, ...]) -> None:
     """One process runs them all. numpy.ma, as `numpy.unique` loads it, is a tenth of the start-up of a command."""
-    import subprocess
-    import sys
-
+    unmasked = 2 * (lean is LEAN)
     code = (
         "import contextlib, sys\nfrom nutdamp.cli.root import group\n"
-        f"for number, words in enumerate({LEAN!r}):\n"
+        f"for number, words in enumerate({lean!r}):\n"
         "    with contextlib.suppress(SystemExit): group.main([*words.split(), '-q'], standalone_mode=False)\n"
-        "    heavy = {'scipy', 'matplotlib', 'pydantic', 'jinja2', *(['numpy.ma'] if number < 2 else [])}\n"
+        f"    masked = ['numpy.ma'] if number < {unmasked} else []\n"
+        "    heavy = {'scipy', 'matplotlib', 'pydantic', 'jinja2', *masked}\n"
         "    print('LOADED by', words, *sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = [line for line in done.stdout.splitlines() if line.startswith("LOADED by")]
-    assert loaded == [f"LOADED by {words}" for words in LEAN]
+    assert loaded == [f"LOADED by {words}" for words in lean]
 
 
 @pytest.mark.parametrize(

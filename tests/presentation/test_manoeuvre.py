@@ -13,12 +13,16 @@ from process import Run
 from spinners import FILE
 
 from nutdamp import planning
+from nutdamp.comparison import compare
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.milestones import CASES, even, first_pulses, milestones
 from nutdamp.dispersion.study import Results, run
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics import attitude
+from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.html import page_html
+from nutdamp.spacecraft import Goal
 
 DISPERSED = (
     FILE
@@ -29,14 +33,16 @@ dispersions:
   thrust: {normal: 3 %}
 """
 )
-GOAL = ("--target", "20deg,82deg")
 
 
-def sheet(run: Run, folder: Path, text: str, *options: str) -> Node:
-    """The section of the page that ``report`` writes."""
-    done = run("report", "-", *GOAL, *options, "-o", "page.html", stdin=text)
-    assert done.returncode in (0, 4), done.stderr
-    tree = parsed((folder / "page.html").read_text("utf-8").removeprefix("<!DOCTYPE html>"))
+def sheet(text: str, scheme: str, cases: int = 0) -> Node:
+    """The section of the page of a turn, without pictures."""
+    body = read_spacecraft(text, "f.yaml", ())
+    body = body.replace(goal=Goal(body.direction_in_n(math.radians(20.0), math.radians(82.0))))
+    compared = compare(body, [scheme])
+    studied = {scheme: run(Results(study_of(body, compared[scheme].pulses), cases))} if cases else {}
+    made = report_page(compared, Repeat("", "", ""), pictured=False, dispersed=studied)
+    tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     (found,) = (one for one in tree.all("section") if one.attributes["id"] == "manoeuvre")
     return found
 
@@ -47,8 +53,8 @@ def rows(found: Node, title: str) -> list[dict[str, str]]:
     return [dict(zip(heads, row, strict=True)) for row in cells]
 
 
-def test_blocks_phases_signature_and_criteria(run: Run, tmp_path: Path) -> None:
-    found = sheet(run, tmp_path, DISPERSED, "--scheme", "command-block", "--disperse", "500")
+def test_blocks_phases_signature_and_criteria() -> None:
+    found = sheet(DISPERSED, "command-block", 500)
     body = read_spacecraft(FILE, "f.yaml", ())
     (block,) = rows(found, "Command blocks to load")
     fired = rows(found, "Pulses to fire")
@@ -78,20 +84,20 @@ def test_blocks_phases_signature_and_criteria(run: Run, tmp_path: Path) -> None:
         assert float(row["spin: abort below rpm"]) < 12.0 < float(row["spin: abort above rpm"])
 
 
-def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need(run: Run, tmp_path: Path) -> None:
-    found = sheet(run, tmp_path, FILE, "--scheme", "rhumb-line")
+def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() -> None:
+    found = sheet(FILE, "rhumb-line")
     fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")
     assert len(signature) == len(fired) + 1
     assert signature[-1]["after"] == f"pulse {len(fired)}"
     assert "the file gives no dispersions" in found.text
     plain = FILE.partition("sun: epoch")[0]
-    other = sheet(run, tmp_path, plain, "--scheme", "rhumb-line")
+    other = sheet(plain, "rhumb-line")
     assert "Sun phase deg" not in rows(other, "Pulses to fire")[0]
     assert "Sun angle deg" not in rows(other, "What gyros")[0]
 
 
-def test_it_is_in_markdown(run: Run, tmp_path: Path) -> None:
-    done = run("report", "-", *GOAL, "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
+def test_the_command_writes_it(run: Run, tmp_path: Path) -> None:
+    done = run("report", "-", "--target", "20deg,82deg", "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
     assert done.returncode in (0, 4), done.stderr
     text = (tmp_path / "page.md").read_text("utf-8")
     assert "## Manoeuvre sheet: rhumb-line" in text
@@ -101,7 +107,7 @@ def test_it_is_in_markdown(run: Run, tmp_path: Path) -> None:
 def test_the_signature_is_that_of_the_reference() -> None:
     """Nutation and Sun angle after each pulse against Euler's equations by DOP853."""
     body = read_spacecraft(FILE, "f.yaml", ())
-    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(3.0), 0.5)))
+    body = body.replace(goal=Goal(axis=body.direction_in_n(math.radians(3.0), 0.5)))
     plan = planning.plan(body, "rhumb-line")
     assert body.sun is not None
     _, after = plan.flight.around_pulses()
@@ -120,7 +126,7 @@ def test_the_signature_is_that_of_the_reference() -> None:
 
 def test_the_last_milestone_is_what_the_study_says_of_the_end() -> None:
     body = read_spacecraft(DISPERSED, "f.yaml", ())
-    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(5.0), 0.5)))
+    body = body.replace(goal=Goal(axis=body.direction_in_n(math.radians(5.0), 0.5)))
     for scheme in ("command-block", "rhumb-line"):
         study = study_of(body, planning.plan(body, scheme).pulses)
         results = run(Results(study, CASES))
@@ -132,7 +138,7 @@ def test_the_last_milestone_is_what_the_study_says_of_the_end() -> None:
 
 def test_the_first_pulses_are_those_of_the_first_blocks() -> None:
     body = read_spacecraft(FILE, "f.yaml", ())
-    body = body.replace(goal=body.goal.__class__(axis=body.direction_in_n(math.radians(5.0), 0.5)))
+    body = body.replace(goal=Goal(axis=body.direction_in_n(math.radians(5.0), 0.5)))
     made = planning.plan(body, "command-block").pulses
     part = first_pulses(made, 4)
     assert [block.count for block in part.blocks] == [4]

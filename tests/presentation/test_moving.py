@@ -8,6 +8,7 @@ import json
 import math
 import re
 import shlex
+from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation.page import moving
 from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.document import Section
 from nutdamp.presentation.page.html import page_html
 from nutdamp.presentation.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
 from nutdamp.presentation.page.scales import EDGES
@@ -183,7 +185,10 @@ def test_without_an_epoch_there_is_no_date() -> None:
 
 
 def parsed_view(text: str) -> str:
-    made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""), pictured=True)
+    compared = compare(read_spacecraft(text, "a.yaml"), CLASSIC)
+    assert compared.recommended is not None
+    section = Section("pictures", "Pictures", (moving_of(compared.recommended),))
+    made = replace(report_page(compared, Repeat("", "", ""), pictured=False), sections=(section,))
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     (found,) = (node for node in tree if "moving" in node.attributes.get("class", "").split())
     return found.text

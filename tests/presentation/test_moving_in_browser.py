@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from cases_dir import case
 from process import Run
+from samples import some
 
 from nutdamp.comparison import compare
 from nutdamp.files.examples import example_text
@@ -82,7 +83,7 @@ def on_screen(page: Any, which: str, x: float, y: float) -> tuple[float, float]:
     return box["x"] + x / 2000 * box["width"], box["y"] + y / 2000 * box["height"]
 
 
-@pytest.mark.parametrize("file", [EXAMPLE, LEAP, TARGET], ids=["example", "leap", "target"])
+@pytest.mark.parametrize("file", some([EXAMPLE, LEAP, TARGET]), ids=["example", "leap", "target"])
 def test_its_numbers_are_those_of_simulate_at_ten_times(browse: Browse, written: Any, run: Run, file: str) -> None:
     with browse(written(file)) as page:
         (command,) = re.findall(r"nutdamp (simulate .*?) FILE", page.locator(".moving .how").text_content())
@@ -181,7 +182,7 @@ def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Br
         assert "target" in part(page, "globe").text_content()
 
 
-@pytest.mark.parametrize("name", ["ace", "single-thruster", "communications-spinner"])
+@pytest.mark.parametrize("name", some(["ace", "single-thruster", "communications-spinner"]))
 def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(browse: Browse, written: Any, name: str) -> None:
     """ACE flies close to the Sun; the others point to where the equator has its numbers."""
     with browse(written((CONFIGS / f"{name}.yaml").read_text(encoding="utf-8"))) as page:
@@ -301,7 +302,7 @@ UNUSUAL = {
 }
 
 
-@pytest.mark.parametrize("name", UNUSUAL)
+@pytest.mark.parametrize("name", some(UNUSUAL))
 def test_unusual_motions_are_shown_too(browse: Browse, written: Any, name: str) -> None:
     with browse(written(f"name: {name}\n{UNUSUAL[name]}"), 800) as page:
         assert page.locator(".moving").is_visible()
@@ -337,7 +338,7 @@ def test_without_script_and_in_print_the_pictures_remain(browse: Browse, written
         assert page.locator("figure svg").first.is_visible()
 
 
-@pytest.mark.parametrize("width", [360, 400])
+@pytest.mark.parametrize("width", some([360, 400]))
 def test_on_a_phone_the_buttons_stand_in_one_line(browse: Browse, written: Any, width: int) -> None:
     with browse(written(EXAMPLE), width) as page:
         tops = page.eval_on_selector_all(
@@ -347,7 +348,7 @@ def test_on_a_phone_the_buttons_stand_in_one_line(browse: Browse, written: Any, 
         assert max(tops) - min(tops) < 3.0
 
 
-@pytest.mark.parametrize("width", [400, 800, 1280])
+@pytest.mark.parametrize("width", some([400, 800, 1280]))
 def test_nothing_of_it_is_cut(browse: Browse, written: Any, width: int) -> None:
     with browse(written(TARGET), width) as page:
         part(page, "slider").fill("100")

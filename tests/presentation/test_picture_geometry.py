@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import reference
 from builders import cross, spinner
+from scipy.spatial import ConvexHull
 
 from nutdamp import flight, planning
 from nutdamp.flight import Flight
@@ -223,3 +224,15 @@ def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
 
 def _still(body: Spacecraft) -> tuple[Flight, Vector, Vector]:
     return flight.flown(body, Schedule(), 1.0), body.initial.rates, body.initial.quaternion
+
+
+def test_a_hull_is_that_of_scipy() -> None:
+    random = np.random.default_rng(3)
+    for count in (3, 10, 400):
+        points = random.normal(size=(count, 2))
+        found = geometry.hull(points)
+        best = points[ConvexHull(points).vertices]
+        assert {tuple(point) for point in found} == {tuple(point) for point in best}
+    line = np.column_stack([np.linspace(0.0, 1.0, 9), np.linspace(0.0, 2.0, 9)])
+    assert np.ptp(geometry.hull(line), axis=0) == pytest.approx([1.0, 2.0])
+    assert geometry.hull(np.zeros((4, 2))).shape == (1, 2)

@@ -1,0 +1,43 @@
+"""What is in a picture as a file and in a page: text as text, and the same bytes in every process."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from builders import cross, spinner
+
+from nutdamp import planning
+from nutdamp.presentation import figures
+
+
+def test_svg_has_its_text_as_text() -> None:
+    made, track = figures.shown(planning.plan(spinner(channels=cross(20.0)), "two-pulse"))
+    shown = figures.svg(figures.flight_figure("timeline", made, track))
+    file = figures.picture("timeline", made, track, "a.svg").decode()
+    for content in (shown, file):
+        words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
+        assert "Firings" in words
+        assert any(word.startswith("1: ") for word in words)
+        assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
+    assert not re.search(r'\sd="[^"]*\.\d{3}', shown)
+
+
+def digest() -> str:
+    """Of the overview, which holds every panel, as a file and in a page."""
+    made, track = figures.shown(planning.plan(spinner(channels=cross(20.0)), "four-pulse"))
+    file = figures.picture("overview", made, track, "a.svg")
+    return hashlib.sha256(file + figures.svg(figures.flight_figure("overview", made, track)).encode()).hexdigest()
+
+
+def test_another_process_makes_the_same_bytes() -> None:
+    """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
+    folders = [str(Path(__file__).parents[1]), str(Path(__file__).parent)]
+    code = f"import sys; sys.path[:0] = {folders}; import {__name__}; print({__name__}.digest())"
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == f"{digest()}\n"

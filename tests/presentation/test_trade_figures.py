@@ -1,0 +1,130 @@
+"""Figures of trades: every point with its number, marks that are explained, fronts that are missing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from builders import spinner
+from colours import check_colours
+from compared_body import BODY, compared, line
+from layout import check_layout, texts
+from matplotlib.text import Annotation
+
+from nutdamp import fronts
+from nutdamp.planning import Plan
+from nutdamp.presentation import figures
+from nutdamp.schemes.options import OptimalOptions
+from nutdamp.spacecraft import Requirement
+
+
+@cache
+def traded() -> tuple[fronts.Front, ...]:
+    return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, fronts.EVERYWHERE))
+
+
+def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
+    figure = figures.trade_figure(BODY, traded())
+    check_layout(figure)
+    (axes,) = figure.axes
+    count = sum(len(front.points) for front in traded())
+    named = [int(number) for note in axes.texts for number in note.get_text().split(", ")]
+    assert sorted(named) == list(range(1, count + 1))
+    words = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"H ends where it was", "H may end anywhere", "no schedule takes less"} <= words
+    first, second = ({(p.plan.end, p.cost) for p in front.points} for front in traded())
+    assert first & second, "no point is on both fronts"
+    assert "the same schedule, on this front too" in words
+    rings = [one for one in axes.lines if one.get_markerfacecolor() == "none" and len(np.asarray(one.get_xdata())) == 1]
+    marks = [one for one in axes.lines if one.get_marker() == "o" and len(np.asarray(one.get_xdata()))]
+    assert len(rings) >= len(first & second)
+    assert all(ring.get_markersize() > mark.get_markersize() for ring in rings for mark in marks)
+
+
+def test_the_recommended_plan_is_marked_among_the_trade() -> None:
+    chosen: Plan | None = compared().recommended
+    assert chosen is not None
+    (axes,) = figures.trade_figure(BODY, traded(), chosen).axes
+    assert line(axes, f"recommended: {chosen.scheme}")[0] == pytest.approx([chosen.end, chosen.total_impulse])
+
+
+def test_a_trade_without_points_says_why_and_draws_no_axes() -> None:
+    figure = figures.trade_figure(spinner(), (fronts.Front(0.0, (), "no channel"),))
+    check_layout(figure)
+    assert not figure.axes
+    assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
+
+
+def test_a_front_that_is_missing_is_named_above_the_others() -> None:
+    (strict, free) = traded()
+    missing = fronts.Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
+    figure = figures.trade_figure(BODY, (missing, free))
+    check_layout(figure)
+    said = " ".join(figure.axes[0].get_title(loc="left").split())
+    assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
+    assert not any("none" in text.get_text() for text, _ in texts(figures.trade_figure(BODY, (strict, free))))
+
+
+def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
+    body = replace(BODY, requirement=Requirement(momentum_shift=math.radians(0.05)))
+    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))
+    failing = {
+        (point.plan.end, point.cost) for _, _, point in fronts.numbered(found) if point.plan.meets_requirement is False
+    }
+    assert failing
+    figure = figures.trade_figure(body, found)
+    check_layout(figure)
+    crossed = line(figure.axes[0], "does not meet the requirement")
+    assert {(end, cost) for end, cost in crossed.tolist()} == failing
+
+
+def test_points_close_together_keep_numbers_that_can_be_read() -> None:
+    """Eighty schedules of which each costs a little less, a little later."""
+    (strict, _) = traded()
+    point = strict.points[0]
+    assert point.plan.schedule is not None
+    close = []
+    for step in range(80):
+        pulses = tuple(
+            replace(one, t=one.t + 0.006 * step, impulse=one.impulse * (1.0 - 0.0022 * step))
+            for one in point.plan.schedule
+        )
+        made = replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))
+        close.append(point._replace(plan=made))
+    figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
+    check_layout(figure, crowded=True)
+    assert {str(count) for count in range(1, 81)} <= {text.get_text() for text, _ in texts(figure)}
+
+
+def test_numbers_of_points_close_together_are_nearest_to_their_own_or_joined_to_them() -> None:
+    (strict, _) = traded()
+    point = strict.points[0]
+    assert point.plan.schedule is not None
+    close = []
+    for step in range(5):
+        pulses = tuple(
+            replace(one, t=one.t + 0.4 * step, impulse=one.impulse * (1.0 - 0.004 * step))
+            for one in point.plan.schedule
+        )
+        close.append(point._replace(plan=replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))))
+    figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
+    check_layout(figure)
+    (axes,) = figure.axes
+    joined = [np.asarray(line.get_xydata())[0] for line in axes.lines if line.get_label() == "_leader"]
+    notes = [note for note in axes.texts if isinstance(note, Annotation)]
+    places = {note.get_text(): np.asarray(axes.transData.transform(note.xy)) for note in notes}
+    for note in notes:
+        box = note.get_window_extent()
+        away = {
+            name: np.hypot(*np.maximum(np.maximum(box.min - place, place - box.max), 0.0))
+            for name, place in places.items()
+        }
+        own = away.pop(note.get_text())
+        assert own < 0.5 * min(away.values()) or any(np.allclose(note.xy, end) for end in joined), note.get_text()
+
+
+def test_trades_can_be_seen_on_white_and_in_the_dark() -> None:
+    check_colours(figures.trade_figure(BODY, traded(), compared().recommended))
