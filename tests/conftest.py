@@ -24,6 +24,7 @@ PLANNED_ONCE = (
     "presentation",
     "files",
     "test_library_results.py",
+    "test_readme.py",
     "test_verification.py",
     "test_where_it_points.py",
 )

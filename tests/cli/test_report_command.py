@@ -53,7 +53,7 @@ def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
 
 
 def test_standard_output_holds_the_page_alone(run: Run) -> None:
-    done = run("report", "-o", "-")
+    done = run("report", "-", "--scheme", "four-pulse", "-o", "-", stdin=IDEAL)
     assert done.stdout.startswith("<!DOCTYPE html>")
     assert done.stdout.endswith("</html>\n")
     assert "wrote" not in done.stderr

@@ -35,10 +35,10 @@ dispersions:
 )
 
 
-def sheet(text: str, scheme: str, cases: int = 0) -> Node:
-    """The section of the page of a turn, without pictures."""
+def sheet(text: str, scheme: str, degrees: float, cases: int = 0) -> Node:
+    """The section of the page of a turn by some degrees, without pictures."""
     body = read_spacecraft(text, "f.yaml", ())
-    body = body.replace(goal=Goal(body.direction_in_n(math.radians(20.0), math.radians(82.0))))
+    body = body.replace(goal=Goal(body.direction_in_n(math.radians(degrees), math.radians(82.0))))
     compared = compare(body, [scheme])
     studied = {scheme: run(Results(study_of(body, compared[scheme].pulses), cases))} if cases else {}
     made = report_page(compared, Repeat("", "", ""), pictured=False, dispersed=studied)
@@ -54,7 +54,7 @@ def rows(found: Node, title: str) -> list[dict[str, str]]:
 
 
 def test_blocks_phases_signature_and_criteria() -> None:
-    found = sheet(DISPERSED, "command-block", 500)
+    found = sheet(DISPERSED, "command-block", 9.0, 500)
     body = read_spacecraft(FILE, "f.yaml", ())
     (block,) = rows(found, "Command blocks to load")
     fired = rows(found, "Pulses to fire")
@@ -85,13 +85,13 @@ def test_blocks_phases_signature_and_criteria() -> None:
 
 
 def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() -> None:
-    found = sheet(FILE, "rhumb-line")
+    found = sheet(FILE, "rhumb-line", 3.0)
     fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")
     assert len(signature) == len(fired) + 1
     assert signature[-1]["after"] == f"pulse {len(fired)}"
     assert "the file gives no dispersions" in found.text
     plain = FILE.partition("sun: epoch")[0]
-    other = sheet(plain, "rhumb-line")
+    other = sheet(plain, "rhumb-line", 3.0)
     assert "Sun phase deg" not in rows(other, "Pulses to fire")[0]
     assert "Sun angle deg" not in rows(other, "What gyros")[0]
 
