@@ -48,7 +48,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         blocks.append(_block("SPIN", {**_frames(reference.frame), **_spin(body)}))
     blocks.append(_block("INERTIA", _inertia(body)))
     blocks += [
-        _block("MAN", _manoeuvre(pulse, number, body, reference), f"pulse {number}: {pulse.channel}")
+        _block("MAN", _manoeuvre(pulse, number, body, reference), *told(pulse, number, reference))
         for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
     ]
     about = block("", APM_METADATA, {**identity(body), "TIME_SYSTEM": "UTC"})
@@ -78,6 +78,16 @@ def unsaid(body: Spacecraft) -> list[str]:
         found.append("The disturbances of the spacecraft file are not in this message.")
     if body.dissipation is not None:
         found.append("The energy dissipation of the spacecraft file is not in this message.")
+    return found
+
+
+def told(pulse: Pulse, number: int, reference: Reference) -> list[str]:
+    """What is said of the manoeuvre of a pulse: its channel, and through a valve what is commanded for it."""
+    found = [f"pulse {number}: {pulse.channel}"]
+    if pulse.command is not None:
+        start, on_time = pulse.loaded
+        found.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
+        found.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
     return found
 
 
