@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 from itertools import accumulate
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
-from nutdamp.presentation.end_tables import spin_text
+from nutdamp.presentation.end_tables import angle_names, angle_texts, spin_text
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import degrees, mass, moment
+from nutdamp.presentation.text import degrees, mass, moment, quantity
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
 
 
-def blocks_screen(flown: Flight) -> RenderableType:
-    """The blocks of a flown schedule, and its figures before and after."""
-    return Group(Text("Command blocks", style="bold"), blocks_table(flown), Text(), _effects(flown))
+def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
+    """The blocks of a flown schedule, and its figures before and after; ``velocity`` (3,) m/s is what it adds."""
+    return Group(Text("Command blocks", style="bold"), blocks_table(flown), Text(), _effects(flown, velocity))
 
 
 def blocks_table(flown: Flight, *, named: bool = False) -> Table:
@@ -65,7 +66,7 @@ def shown_pulses(made: Schedule) -> list[int]:
     return [index for index in shown if index < len(made)]  # a track may end before the last one
 
 
-def _effects(flown: Flight) -> Table:
+def _effects(flown: Flight, velocity: Vector | None) -> Table:
     body, made, final = flown.spacecraft, flown.schedule, flown.final
     before, after = flown.around_pulses()
     table = facts()
@@ -73,13 +74,21 @@ def _effects(flown: Flight) -> Table:
         start = pulse.loaded[0]
         dated = body.utc(start, 3)
         table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
+    for name, before_, after_ in zip(
+        angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
+    ):
+        table.add_row(f"H: {name}", f"{before_} to {after_}")
     table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
     table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
     largest = float(max(before.nutation.max(), after.nutation.max()))
     table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
     used = made.propellant
-    left = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
-    table.add_row("propellant", f"{mass(used)}{left}")
+    tank = body.tank
+    left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
+    weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
+    table.add_row("propellant", f"{mass(used)}{left}{weighs}")
+    if velocity is not None:
+        table.add_row("|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s"))
     return table
 
 

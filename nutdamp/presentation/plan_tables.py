@@ -39,7 +39,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
         return Group(*parts, *found)
     if decided.plan.pulses.blocks:
-        found += [Text(), blocks_screen(decided.plan.flight)]
+        found += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
         found += [Text(), pulse_table(decided.plan)]
     return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *found)

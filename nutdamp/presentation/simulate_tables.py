@@ -31,7 +31,7 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
         begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
         parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
     if flight.schedule.blocks:
-        parts += [Text(), blocks_screen(flight)]
+        parts += [Text(), blocks_screen(flight, simulation.plan.delta_v)]
     if len(flight.schedule):
         shown = shown_pulses(flight.schedule)
         parts += [Text(), _pulses(flight, shown)]

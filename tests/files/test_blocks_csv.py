@@ -201,3 +201,17 @@ def test_widths_of_a_list_are_counted_by_their_number(run: Run, tmp_path: Path) 
     path.write_text("channel,first_sun_pulse,delay_counts,width_counts,count\nT1,1,500,4,4\n")
     with pytest.raises(FaultyFile, match=r"the number of an entry of commands\.width, 1 to 3, got 4"):
         read_blocks(path, craft)
+
+
+def test_the_screen_has_what_an_operator_compares_before_and_after(run: Run, tmp_path: Path) -> None:
+    text = FILE + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
+    (tmp_path / "blocks.csv").write_text(TOP + "T1,1,1,0.3,12\n")
+    for columns in (80, 140):
+        done = run("simulate", "-", *GOAL, "--blocks", "blocks.csv", stdin=text, columns=columns)
+        shown = done.stdout[done.stdout.index("Command blocks") :].splitlines()
+        rows = {name: next(row for row in shown if row.startswith(name)) for name in ("H: right", "H: decl", "propell")}
+        assert " to " in rows["H: right"]
+        assert "H: declination      90" in rows["H: decl"]
+        assert " g of 30 kg; 29.98" in rows["propell"]
+        assert "mass 300 kg to 299.98" in rows["propell"]
+        assert any(row.startswith("|ΔV|") and row.endswith(" m/s") for row in shown)
