@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from nutdamp.library import *
 
 __all__ = [
+    "Budget",
     "Comparison",
     "Dispersion",
     "Flight",
@@ -31,6 +32,7 @@ __all__ = [
     "TwoPulseOptions",
     "Verified",
     "__version__",
+    "budget",
     "compare",
     "disperse",
     "disperse_loop",

@@ -70,6 +70,17 @@ def shifts(value: Any) -> tuple[float, ...]:
     raise BadRequest(f"allow = {shown(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)")
 
 
+def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
+    """Pairs of angles (start, stop) in rad, stop the smaller; raises BadRequest."""
+    pairs = tuple(value) if isinstance(value, Iterable) else (value,)
+    for pair in pairs:
+        angles = tuple(pair) if isinstance(pair, Sequence) and not isinstance(pair, str) else ()
+        if not (len(angles) == 2 and all(map(is_number, angles)) and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi):
+            what = "pairs of angles in rad below a right angle, the second smaller, such as [(0.01, 0.002)]"
+            raise BadRequest(f"thresholds: expected {what}, got {shown(pair)}")
+    return tuple((float(one), float(other)) for one, other in pairs)
+
+
 def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
     """One of the ``names``; raises BadRequest."""
     if isinstance(value, str) and value in names:

@@ -88,6 +88,8 @@ loop ace.yaml; 2
 disperse smoke.yaml --loop --set disturbances=[] --until 30s --samples 40 --csv loops.csv --json l.json --plot l.png
 disperse smoke.yaml --loop --until 20s --samples 2
 loop smoke.yaml --case 2 --json dispersed.json
+budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json --plot budget.png
+budget smoke.yaml; 2
 verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
 report smoke.yaml -o report.html
 report -o report.md --disperse 2000; 0 4

@@ -23,10 +23,12 @@ from nutdamp.library.craft import load as load
 from nutdamp.library.craft import read as read
 from nutdamp.library.reports import Report as Report
 from nutdamp.library.reports import report as report
+from nutdamp.library.studies import Budget as Budget
 from nutdamp.library.studies import Dispersion as Dispersion
 from nutdamp.library.studies import LoopDispersion as LoopDispersion
 from nutdamp.library.studies import Trade as Trade
 from nutdamp.library.studies import Verified as Verified
+from nutdamp.library.studies import budget as budget
 from nutdamp.library.studies import disperse as disperse
 from nutdamp.library.studies import disperse_loop as disperse_loop
 from nutdamp.library.studies import export as export

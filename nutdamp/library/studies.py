@@ -13,6 +13,7 @@ from nutdamp.dispersion.study import Results, run, threads_here
 from nutdamp.errors import BadRequest
 from nutdamp.library.craft import expected
 from nutdamp.library.views import feasible
+from nutdamp.loop import budget as budgets
 from nutdamp.planning import Plan
 from nutdamp.schemes.options import LEAST, OptimalOptions
 from nutdamp.spacecraft import Spacecraft
@@ -110,6 +111,27 @@ class Verified:
         return finite(verification_json(self.plan.flight, self.plan.scheme, self.core))
 
 
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """What it takes to hold the nutation against energy dissipation; ``core`` holds a row for each two thresholds."""
+
+    core: budgets.Budget
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``budget --json`` gives."""
+        from nutdamp.files.budget_files import budget_json
+        from nutdamp.files.output import finite
+
+        return finite(budget_json(self.core))
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write what ``budget --csv`` writes; raises CannotWrite."""
+        from nutdamp.files.budget_files import budget_csv
+        from nutdamp.files.output import write_whole
+
+        write_whole(arguments.path("path", path), budget_csv(self.core))
+
+
 def trade(
     spacecraft: Spacecraft,
     points: int = 10,
@@ -129,6 +151,29 @@ def trade(
     least = arguments.one_of("least", least, LEAST[:2])
     options = OptimalOptions(least=least, with_disturbances=with_disturbances)
     return Trade(body, fronts.fronts(body, options, count=count, shifts=shifts, progress=progress))
+
+
+def budget(
+    spacecraft: Spacecraft,
+    thresholds: Iterable[tuple[float, float]] = (),
+    *,
+    largest: float | None = None,
+    seed: int = 1,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Budget:
+    """Pulses a day and propellant a year that hold the nutation, as ``nutdamp budget`` does; raises BadRequest.
+
+    ``thresholds``: pairs (start, stop), rad, default those of the loop in the file; ``largest``: the nutation (rad) by
+    which damping must begin, default the one required.
+    """
+    body, pairs = expected(spacecraft), arguments.thresholds(thresholds)
+    if largest is not None and not (arguments.is_number(largest) and 0.0 < largest < 0.5 * math.pi):
+        raise BadRequest(f"largest = {arguments.shown(largest)}: expected an angle in rad between 0 and a right angle")
+    if pairs and body.loop is None:
+        raise BadRequest("thresholds: expected a spacecraft with a loop")
+    seed = arguments.instance("seed", seed, int, "a whole number")
+    made = [budgets.Thresholds(*pair) for pair in pairs]
+    return Budget(budgets.budget(body, made, largest, seed=seed, progress=progress))
 
 
 def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispersion.SEED) -> Dispersion:

@@ -241,11 +241,11 @@ class Estimator:
             sums += [both.real, -both.imag]
         weights = self._fit.weights
         sine = sum(one * weights[..., place, None] for place, one in enumerate(sums))
-        found = sine / (np.conj(self._seen_gain) * spin)
+        found = sine / (np.conj(self.seen_gain) * spin)
         return np.asarray(np.where(used >= size, found, math.nan))
 
     @property
-    def _seen_gain(self) -> complex:
+    def seen_gain(self) -> complex:
         """What the accelerometer shows of z, over ω3."""
         one, other = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
         return complex(one / self.law.gauge[0], other / self.law.gauge[1])
@@ -266,7 +266,7 @@ class Estimator:
 
     @property
     def _least_gain(self) -> float:
-        return abs(self._seen_gain) * 2.0 * math.pi / (self.law.period * abs(self.law.inertia.body_rate))
+        return abs(self.seen_gain) * 2.0 * math.pi / (self.law.period * abs(self.law.inertia.body_rate))
 
 
 class _Kept(NamedTuple):

@@ -102,14 +102,14 @@ class Watch:
         awake = active | np.any(shown >= self.law.loop.start, axis=-1)
         before = np.full((*fires.shape[:-1], 1), math.nan) if self._waits is None else self._waits
         if np.all(awake):
-            waits = self._all_waits(z, spin)
-            fires = self._triggered(np.concatenate([before, waits], axis=-1))
+            waits = self.waits(z, spin)
+            fires = self.triggered(np.concatenate([before, waits], axis=-1))
             self._waits = waits[..., -1:]
         else:
-            self._waits = self._all_waits(z[..., -1:], spin[..., -1:])
+            self._waits = self.waits(z[..., -1:], spin[..., -1:])
             if np.any(awake):
-                waits = np.concatenate([before[:, awake], self._all_waits(z[awake], spin[awake])], axis=-1)
-                fires[:, awake] = self._triggered(waits)
+                waits = np.concatenate([before[:, awake], self.waits(z[awake], spin[awake])], axis=-1)
+                fires[:, awake] = self.triggered(waits)
         return z, best, shown, fires
 
     def some(self, cases: NDArray[Any]) -> Watch:
@@ -132,16 +132,16 @@ class Watch:
             return None
         return Found(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
 
-    def _all_waits(self, z: ComplexArray, spin: Vector) -> Vector:
+    def waits(self, z: ComplexArray, spin: Vector) -> Vector:
         """`Law.waits` of all channels, (channels, ..., n)."""
         return np.array([self.law.waits(one, z, spin) for one in self.law.actuators])
 
-    def _triggered(self, waits: Vector) -> NDArray[np.bool_]:
+    def triggered(self, waits: Vector, ahead: float | None = None) -> NDArray[np.bool_]:
         """Whether each channel comes to fire at each moment but the first: its wait falls below `ahead`."""
-        before, now = waits[..., :-1], waits[..., 1:]
-        falls = (now < self.ahead) & (before >= self.ahead) & (before - now < 0.5 * self.law.period)
+        before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead if ahead is None else ahead
+        falls = (now < ahead) & (before >= ahead) & (before - now < 0.5 * self.law.period)
         slack = 1e-12 * self.law.period
-        begins = np.isnan(before) & (now >= -slack) & (now < max(self.ahead, slack))
+        begins = np.isnan(before) & (now >= -slack) & (now < max(ahead, slack))
         return np.asarray(falls | begins)
 
 

@@ -49,13 +49,14 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
     return Group(*parts)
 
 
-def described(loop: Loop) -> str:
+def described(loop: Loop, *, thresholds: bool = True) -> str:
     """The loop in a line: law, sensor, thresholds."""
     sensor = loop.sensor
     kind = "gyros" if sensor.kind == GYRO else "an accelerometer"
     rate = "a continuous signal" if sensor.rate is None else f"{sensor.rate:g} Hz"
     timing = "firings centred on their moments" if loop.predict else "firings begun as the sensor shows their moment"
-    return f"Loop: {loop.law}, from {kind} ({rate}); fires from {most(loop.start)} down to {most(loop.stop)}; {timing}"
+    band = f"; fires from {most(loop.start)} down to {most(loop.stop)}" if thresholds else ""
+    return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
 
 def stopped(run: Run) -> str:

@@ -10,6 +10,14 @@ from nutdamp.rounding import cleaned
 MISSING = "–"
 """Stands where a number is not known."""
 
+LONG = (
+    ("s", 1.0, 3600.0),
+    ("hours", 3600.0, 172_800.0),
+    ("days", 86_400.0, 63_115_200.0),
+    ("years", 31_557_600.0, math.inf),
+)
+"""Units of long times: their length, s, and up to which time, s, they are used."""
+
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """A number with its unit; what is not known or infinite says so."""
@@ -58,6 +66,14 @@ def duration(value: float | None) -> str:
     if value is None or not math.isfinite(value) or value == 0.0 or value >= 0.1:
         return quantity(value, "s")
     return quantity(1e3 * value, "ms")
+
+
+def lasting(value: float | None) -> str:
+    """A time given in s that may be long: in s, hours, days or years."""
+    if value is None or not math.isfinite(value):
+        return quantity(value, "s")
+    unit, size = next(one for one in LONG if value < one[2])[:2]
+    return quantity(value / size, unit)
 
 
 def moment(value: float) -> str:

@@ -22,6 +22,7 @@ COMMANDS = [
     ("disperse", "--scheme", "two-pulse", "--samples", "1e3", "--worst", "2"),
     ("trade", "--points", "2"),
     ("loop", str(CONFIGS / "upper-stage.yaml"), "--until", "400s"),
+    ("budget", str(CONFIGS / "upper-stage.yaml"), "--thresholds", "0.5deg,0.1deg", "--thresholds", "1deg,0.1deg"),
 ]
 
 

@@ -15,6 +15,7 @@ COMMANDS = {
     "disperse": ("--samples", "10"),
     "verify": (),
     "loop": (),
+    "budget": (),
     "report": ("-o", "-"),
     "animate": ("-o", "x.gif"),
     "check": (),

@@ -1,0 +1,399 @@
+"""The limit cycle of a closed loop from event to event: coasts in closed form, the firings by the law itself.
+
+Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ. Noise decides in
+which sample a threshold is first reached: see `Odds`. Only the few samples in which a channel may come to fire are
+worked out one by one. Many cycles are followed side by side, from random phases, until their mean is known.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
+from nutdamp.limits import commandable
+from nutdamp.loop.law import Actuator, ComplexArray, Law
+from nutdamp.loop.odds import FARTHEST, Odds
+from nutdamp.loop.transfer import transfer
+from nutdamp.loop.watch import SAMPLED, Watch
+from nutdamp.loop_settings import Loop
+from nutdamp.physics.valve import Ramp, shape_factor
+from nutdamp.schedule import Pulse, channel_pulse
+from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.supply import Supply
+
+CHAINS = 64
+"""Cycles that are followed side by side."""
+
+CYCLES = 16
+"""Cycles of each that count."""
+
+SETTLING = 2
+"""Cycles of each before those that count."""
+
+FIRINGS = 200
+"""Firings of each, at most."""
+
+FEW = 4
+"""Cycles in so many firings, below which firings are counted instead."""
+
+MOST_STEPS = 100_000
+"""Stretches in all, at most."""
+
+ROWS = 128
+"""Samples worked out one by one at a time, at most."""
+
+EARLY, LATE = 0.003, 3.0
+"""Chances of the start threshold between which it is awaited sample by sample, where these depend on each other."""
+
+LONGEST = 10_000
+"""Samples looked at one by one for that, at most."""
+
+SIGMAS = 5.0
+"""Reach of noise, sigmas, in which a channel may come to fire."""
+
+OUTGROWN = 4.0
+"""Times all that a loop should leave, at which it does not hold the nutation."""
+
+RISING = 1.1
+"""Factor by which nutation grows from the first of many firings to the middle, and on, where they do not hold it."""
+
+TOO_FAST = "the nutation grows faster than the firings damp it"
+
+REFINED = 4
+"""Steps in which the moment of a firing is found on a continuous signal."""
+
+Rows = NDArray[np.int64]
+
+
+class Cycle(NamedTuple):
+    """What goes on in the limit cycle; rates are 1/s.
+
+    ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
+    kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
+    ``high`` as firings begin (mean), ``low`` as they have ended (geometric mean), of each cycle, and the ``largest``.
+    """
+
+    pulses: float
+    cycles: float
+    impulse: float
+    propellant: float | None
+    spin_rate: float
+    doubt: float
+    high: float
+    low: float
+    largest: float
+
+
+class Sums(NamedTuple):
+    """What a chain has added up by a moment: time (s) of the last pulse, and its largest and last |z|, rad/s."""
+
+    time: float = 0.0
+    pulses: float = 0.0
+    impulse: float = 0.0
+    propellant: float = 0.0
+    spin: float = 0.0
+    cycles: float = 0.0
+    largest: float = 0.0
+    last: float = 0.0
+
+
+ADDED = 6
+"""Columns of `Sums` of which differences count."""
+
+
+@dataclass(eq=False)
+class _Chains:
+    """Where each chain is: z at the sample ``number``, what its channels waited before, the noise of its samples.
+
+    ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
+    """
+
+    z: ComplexArray
+    number: Rows
+    active: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    ready: Vector
+    carried: Vector
+    white: ComplexArray
+    sums: list[Sums]
+    firings: list[list[Sums]]
+    cycles: list[list[Sums]]
+
+
+class Map:
+    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant gone.
+
+    Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first, are left out.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1) -> None:
+        limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
+        self.truth, self.used = replace(spacecraft, cold=None, limits=limits), used
+        self.law, self.spin = Law(self.truth, loop), spacecraft.spin
+        self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
+        self.seen = transfer(self.law, self.spin)
+        self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
+        self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
+        self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.up = Odds(self.seen, self.start, self.law.growth, below=False)
+        self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
+        self.near = self._near()
+        reach = SIGMAS * self.seen.sigma + abs(self.seen.offset)
+        half = abs(0.5 * self.turn.imag)
+        acts = [abs(one.kick) * abs(math.sin(half * one.shortest)) / half for one in self.law.actuators]
+        self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
+        self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
+        self.shapes: dict[tuple[str, float], complex] = {}
+
+    def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
+        """The limit cycle; raises Infeasible where the loop does not hold the nutation."""
+        at = self._begin(chains)
+        wanted, going = SETTLING + cycles, np.ones(chains, dtype=bool)
+        for _ in range(MOST_STEPS):
+            self._wake(at, np.flatnonzero(going & ~at.active))
+            self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
+            self._look(at, np.flatnonzero(going))
+            going = np.array([one.cycles <= wanted and one.pulses < FIRINGS for one in at.sums])
+            if not going.any():
+                return self._summed(at)
+        raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
+
+    def _near(self) -> float | None:
+        """Size of z from which on every sample is looked at until one shows the start threshold.
+
+        None where the chances of the samples add up: where the noise of each is new, or z grows little while it lasts.
+        """
+        seen = self.seen
+        if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
+            return None
+        # No more likely than if each sample had a chance of its own.
+        bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth, below=False)
+        first, last = (
+            float(odds.size(1e-3 * self.start, chance)) for odds, chance in ((bound, EARLY), (self.up, LATE))
+        )
+        return first if math.log(last / first) / (self.turn.real * seen.step) < LONGEST else None
+
+    def _begin(self, count: int) -> _Chains:
+        """Coasts at half the start threshold, in random phases."""
+        z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
+        number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
+        quiet, waits = np.zeros(count, dtype=bool), np.full((len(self.law.actuators), count), math.nan)
+        firings: list[list[Sums]] = [[] for _ in range(count)]
+        cycles: list[list[Sums]] = [[] for _ in range(count)]
+        sums, white = [Sums() for _ in range(count)], self._drawn(count)
+        return _Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
+
+    def _drawn(self, rows: int) -> ComplexArray:
+        return self.seen.drawn(self.rng, rows, len(self.seen.weights))
+
+    def _waits(self, seen: ComplexArray) -> Vector:
+        """`Law.waits` of all channels, (channels, ...)."""
+        return self.watch.waits(seen, np.full(seen.shape, self.spin))
+
+    def _goes(self, at: _Chains, rows: Rows, samples: Rows) -> None:
+        """Coasts go on by so many samples, and the noise of those before is forgotten."""
+        at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
+        at.number[rows] += samples
+        at.white[rows] = self._drawn(len(rows))
+        at.carried[:, rows] = self._waits(self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step)))
+
+    def _until(self, size: Vector | float, now: Vector) -> Rows:
+        """Samples until |z| has grown from ``now`` to ``size``."""
+        found = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
+        return np.asarray(np.ceil(found - SAMPLED), dtype=np.int64)
+
+    def _wake(self, at: _Chains, rows: Rows) -> None:
+        """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
+        now = np.abs(at.z[rows])
+        if (now <= FARTHEST * self.start).any():
+            raise Infeasible("a firing leaves nothing that could grow: sensor and valves have no errors")
+        if self.near is not None:
+            far = now < self.near
+            self._goes(at, rows[far], self._until(self.near, now[far]))
+            return
+        self._goes(at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now))
+        at.active[rows] = True
+        if not any(self.seen.scatter):
+            return
+        for row in rows.tolist():
+            mean = complex(self.seen.mean(at.z[row]))
+            short = (self.start - abs(mean)) / self.seen.sigma
+            if short > 0.0:  # the noise of this sample is what was missing, and a little more
+                more = short + self.rng.exponential() / max(short, 1.0)
+                at.white[row] += self.seen.change(at.white[row], mean / abs(mean), more * self.seen.sigma)
+
+    def _skip(self, at: _Chains, rows: Rows) -> None:
+        """Over the samples in which no channel can come to fire: to the first that may, or to a pause."""
+        size, mean = np.abs(at.z[rows]), self.seen.mean(at.z[rows])
+        waits = self._waits(mean)
+        share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
+        slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
+        ahead = self._ahead
+        due = np.where(waits < ahead - slack, waits + self.law.period, waits) - ahead - slack
+        idle = np.isnan(due).all(axis=0)
+        soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
+        samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
+        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
+        samples[useless] = self._until(self.helps, size[useless])
+        for row in rows[useless].tolist():
+            self._rest(at, row)
+        if self.down is not None:
+            event = self.down.size(size, self.rng.exponential(size=len(rows)))
+            quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
+            samples[quiet] = self._until(event[quiet], size[quiet])
+            at.active[rows[quiet]] = False
+            for row in rows[quiet & ~useless].tolist():
+                self._rest(at, row)
+        moved = samples > 0
+        self._goes(at, rows[moved], samples[moved])
+
+    @property
+    def _ahead(self) -> float:
+        """How long before its start a firing is decided on, s."""
+        return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
+
+    def _look(self, at: _Chains, rows: Rows) -> None:
+        """The next samples one by one, up to the first event of each."""
+        step = self.seen.step
+        count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
+        white = np.concatenate([at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1)
+        course = np.exp(self.turn * step * np.arange(count))
+        seen = self.seen.stepped(self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white))
+        awake = np.logical_or.accumulate((np.abs(seen) >= self.start) | at.active[rows, None], axis=1)
+        waits = np.full((len(at.carried), *seen.shape), math.nan)
+        some = awake[:, -1]
+        waits[:, some] = self._waits(seen[some])
+        waits[:, ~some, -1] = self._waits(seen[~some, -1])
+        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2), self._ahead)
+        downs = awake & (np.abs(seen) <= self.stop)
+        firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
+        at.active[rows] = awake[:, -1]
+        for index, row in enumerate(rows.tolist()):
+            last = int(firsts[index])
+            if self._fires(at, row, seen[index], (fires & awake)[:, index, :last]):
+                continue
+            if last < count:
+                at.active[row] = False
+                self._rest(at, row)
+            passed = min(last + 1, count)
+            at.z[row] *= np.exp(self.turn * step * passed)
+            at.number[row] += passed
+            at.white[row] = white[index, passed : passed + white.shape[1] - count]
+            at.carried[:, row], at.fresh[row] = waits[:, index, passed - 1], False
+
+    def _fires(self, at: _Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
+        """Whether one of the moments at which a channel comes to fire leads to a firing, and that firing."""
+        for moment in np.flatnonzero(fires.any(axis=0)).tolist():
+            time = (int(at.number[row]) + moment) * self.seen.step
+            actuators = (self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist())
+            found = [made for one in actuators if (made := self._firing(one, complex(seen[moment]), time)) is not None]
+            if not found:
+                continue
+            start, lasts, pulse, actuator = min(found, key=lambda one: one[0])
+            if self.law.windows.allows(start, lasts, float(at.ready[row])):
+                self._fire(at, row, pulse, actuator)
+                return True
+        return False
+
+    def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
+        """When a firing that is decided on by what is ``seen`` at ``time`` s begins, how long it lasts, what it is."""
+        now, law = time + self.law.loop.sensor.delay, self.law
+        firing = law.firing(actuator, seen, self.spin)
+        for _ in range(REFINED if law.loop.sensor.rate is None else 0):  # a continuous signal shows the moment itself
+            if firing is None:
+                return None
+            now, seen = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait))
+            firing = law.firing(actuator, seen, self.spin)
+        if firing is None:
+            return None
+        begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
+        start = law.windows.nearest_tick(begins)
+        start = law.windows.tick_after(begins) if start < now else start
+        made = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
+        return start, firing.lasts, made if made.command is None else commandable(self.truth, made), actuator
+
+    def _fire(self, at: _Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
+        """The motion through a pulse, and on to the first estimate after it."""
+        made = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
+        level = made.magnitude / pulse.magnitude
+        (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
+        before, sums = complex(at.z[row]), at.sums[row]
+        size = abs(before) * math.exp(self.turn.real * (begins - time))
+        if size > self.bound:
+            raise Infeasible(TOO_FAST)
+        acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
+        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
+        spin = actuator.spin_rate * level * pulse.on_time - self._slowed(sums.last, size)
+        spent = math.nan if made.propellant is None else made.propellant
+        at.sums[row] = Sums(
+            pulse.t,
+            sums.pulses + 1.0,
+            sums.impulse + made.magnitude,
+            sums.propellant + spent,
+            sums.spin + spin,
+            sums.cycles,
+            max(sums.largest, size),
+            abs(after),
+        )
+        at.firings[row].append(at.sums[row]._replace(largest=size))
+        at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+        number = math.ceil((ends + self.seen.first) / self.seen.step - SAMPLED)
+        at.z[row], at.number[row] = after * np.exp(self.turn * (number * self.seen.step - ends)), number
+        at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
+        at.fresh[row] = at.active[row] = True
+
+    def _slowed(self, last: float, size: float) -> float:
+        """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
+        before, after = (math.cos(float(self.law.nutation(one, self.spin))) for one in (last, size))
+        return self.spin * (1.0 - after / before)
+
+    def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
+        """What a pulse loses on z by its width, with the growth in it."""
+        key = (pulse.channel, round(pulse.on_time, 9))
+        if key not in self.shapes:
+            ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
+            moved = [ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps]
+            rate = self.law.inertia.body_rate
+            self.shapes[key] = shape_factor(rate, self.spin, actuator.spin_rate, moved, 0.0, self.law.growth)
+        return self.shapes[key]
+
+    def _rest(self, at: _Chains, row: int) -> None:
+        """A cycle is over, if anything was fired in it: what it has added up is noted."""
+        sums = at.sums[row]
+        if sums.largest > 0.0:
+            sums = sums._replace(cycles=sums.cycles + 1.0)
+            at.cycles[row].append(sums)
+            at.sums[row] = sums._replace(largest=0.0)
+
+    def _summed(self, at: _Chains) -> Cycle:
+        """Of all chains, between the first and the last cycle, or firing, that counts."""
+        if all(len(one) >= SETTLING + FEW for one in at.cycles):
+            counted = [one[SETTLING:] for one in at.cycles]
+        else:
+            counted = [one[len(one) // 4 :] for one in at.firings]
+            sizes = np.array([[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]).mean(
+                axis=0
+            )
+            if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
+                raise Infeasible(TOO_FAST)
+        spans = np.array([np.subtract(one[-1], one[0])[:ADDED] for one in counted])
+        total = spans.sum(axis=0)
+        rates = (total / total[0]).tolist()
+        apart = spans[:, 1] - rates[1] * spans[:, 0]
+        angles = self.law.nutation(np.concatenate([np.array(one[1:])[:, ADDED:] for one in counted]), self.spin)
+        return Cycle(
+            pulses=rates[1],
+            cycles=rates[5],
+            impulse=rates[2],
+            propellant=None if math.isnan(rates[3]) else rates[3],
+            spin_rate=rates[4],
+            doubt=math.sqrt(float((apart**2).sum())) / float(total[1]),
+            high=float(angles[:, 0].mean()),
+            low=float(np.exp(np.log(np.maximum(angles[:, 1], 1e-300)).mean())),
+            largest=float(angles[:, 0].max()),
+        )
