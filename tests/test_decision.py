@@ -22,6 +22,7 @@ from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results
 from nutdamp.dispersion.study import run as fly
 from nutdamp.presentation import decisions, verdicts
+from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Goal, Keep, Requirement, Spacecraft
 
@@ -157,6 +158,12 @@ def test_the_warning_names_the_plans_that_keep_the_cones() -> None:
     (warning,) = verdicts.warnings(compared)
     assert warning.startswith("The spin axis comes to 5.0")
     assert warning.endswith("from star at 1.79 s (min = 5.2°); one-pulse keeps all cones.")
+    assert verdicts.warnings(compared, beside_verdict=True) == ("Plans that keep all cones: one-pulse.",)
+    alone = compare(body, ["two-pulse"])
+    assert verdicts.warnings(alone, beside_verdict=True) == ("Plans that keep all cones: none.",)
+    page = report_page(compared, Repeat("", "", ""), pictured=False)
+    assert page.verdict.count("the spin axis comes to") == 1
+    assert page.verdict.endswith("Plans that keep all cones: one-pulse.")
     assert verdicts.warnings(compare(body, ["one-pulse"]))[0].startswith("one-pulse does not meet the requirement.")
     assert verdicts.reason(compared) == "least propellant of the 2 plans that meet the requirement"
 

@@ -133,11 +133,11 @@ def end_facts(decision: Decision) -> Table:
 
 def decision_screen(compared: Comparison, decision: Decision, reason: str) -> list[RenderableType]:
     """The decision as the top of a screen: which plan and why, the verdict, its margins, and how it ends."""
-    plan = decision.plan
+    plan, missed = decision.plan, verdicts.warnings(compared, beside_verdict=True)
     return [
         Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
         *requirement(decision),
-        *[Text.assemble(("Warning: ", "bold red"), warning) for warning in verdicts.warnings(compared)],
+        *[Text.assemble(("Warning: ", "bold red"), warning) for warning in missed],
         *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
         *figures(decision),
     ]

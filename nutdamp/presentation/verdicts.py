@@ -109,20 +109,24 @@ def _those(body: Spacecraft, *, plural: bool = True) -> str:
     return f"reach{'es' * (not plural)} the target"
 
 
-def warnings(compared: Comparison) -> tuple[str, ...]:
+def warnings(compared: Comparison, *, beside_verdict: bool = False) -> tuple[str, ...]:
     """What the recommended plan does not reach, and what prevents it; nothing for one that complies.
 
-    Then the cones that the spin axis breaks.
+    Then the cones that the spin axis breaks; ``beside_verdict``: of these only which plans keep them, since the verdict
+    says the rest.
     """
     found = compared.recommendation
     if found.plan is None:
         return ()
-    return (*_missed(found.plan, compared), *_cones_broken(found.plan, compared))
+    return (*_missed(found.plan, compared), *_cones_broken(found.plan, compared, beside_verdict))
 
 
-def _cones_broken(chosen: Plan, compared: Comparison) -> Iterator[str]:
+def _cones_broken(chosen: Plan, compared: Comparison, beside_verdict: bool) -> Iterator[str]:
     """The cones that the spin axis does not keep with the recommended plan, and which plans do."""
     keeping = [one.scheme for one in compared.plans if one.feasible and one.kept]
+    if beside_verdict:
+        yield from [sentence(f"plans that keep all cones: {listed(keeping) or 'none'}")] * (chosen.kept is False)
+        return
     those = f"{listed(keeping)} keep{'s' * (len(keeping) == 1)} all cones" if keeping else "no plan compared keeps it"
     yield from (sentence(f"{strays(one)}; {those}") for one in chosen.aspects if not one.kept)
 

@@ -128,7 +128,7 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     whom = "Recommended" if decided.cases is None else "Recommended for nominal values"
     said = f"Requirement: {decisions.verdict(decided)}. {whom}: {decided.plan.scheme} – {reason}."
-    return " ".join((said, *verdicts.warnings(compared)))
+    return " ".join((said, *verdicts.warnings(compared, beside_verdict=True)))
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
