@@ -203,7 +203,7 @@ def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: 
 
 def test_simulate_says_whether_the_requirement_is_met(run: Run, tmp_path: Path) -> None:
     done = run("simulate", "-q", "-", "--scheme", "two-pulse", "--json", "a.json", stdin=FILE, columns=200)
-    assert done.returncode == 0
+    assert done.returncode == 4
     found = json.loads((tmp_path / "a.json").read_text("utf-8"))["decision"]
     assert f"\nRequirement: {found['verdict']}.\n" in done.stdout
     assert found["verdict"].startswith("NOT met: the spin axis comes to")
