@@ -18,6 +18,15 @@ from nutdamp.units import shown
 SAMPLES = 4.0
 """Samples a nutation period without which the phase of the nutation is hardly seen."""
 
+MOST_SAMPLES = 1e6
+"""Samples a nutation period, more than which tell no more and take for ever to fly."""
+
+LATE = 20.0
+"""Nutation periods after which a sample tells nothing: how long delay, filter and settling may be."""
+
+SCALES = (0.1, 10.0)
+"""Sizes of scales between which a sensor shows what it measures."""
+
 SENSOR: KeyPath = ("loop", "sensor")
 
 
@@ -37,6 +46,7 @@ def loop_findings(root: Node) -> Iterator[Finding]:
         yield Finding(("loop",), problem, True)
         return
     yield from _sampling(facts, abs(inertia.body_rate * spin))
+    yield from _lags(facts, 2.0 * math.pi / abs(inertia.body_rate * spin))
     yield from _accelerometer(facts, inertia)
     yield from _seen(facts, inertia, spin)
 
@@ -85,8 +95,12 @@ def _thresholds(facts: Facts) -> Iterator[Finding]:
 
 def _sensor(facts: Facts) -> Iterator[Finding]:
     kind = facts.text(*SENSOR, "kind")
-    if facts.number("ratio", *SENSOR, "scale") == 0.0:
+    scale = facts.number("ratio", *SENSOR, "scale")
+    if scale == 0.0:
         yield Finding((*SENSOR, "scale"), "zero: the sensor shows nothing; expected about 100 %")
+    elif scale is not None and not SCALES[0] <= abs(scale) <= SCALES[1]:
+        allowed = f"{100.0 * SCALES[0]:g} % to {100.0 * SCALES[1]:g} %, or the same below zero"
+        yield Finding((*SENSOR, "scale"), f"{100.0 * scale:g} % is no scale of a sensor; expected {allowed}")
     if not facts.has(*SENSOR, "rate"):
         for key in ("noise", "quantisation", "low_pass"):
             if facts.has(*SENSOR, key):
@@ -149,6 +163,19 @@ def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
     if given is not None and 0.0 < given < least and (alias is None or alias.value is not True):
         problem = f"{given:g} Hz is below four times the nutation frequency; expected at least {least:.4g} Hz"
         yield Finding((*SENSOR, "rate"), f"{problem}, or alias: true beside start")
+    most = MOST_SAMPLES * rate / (2.0 * math.pi)
+    if given is not None and given > most:
+        problem = f"{given:g} Hz is more than a million samples a nutation period; expected at most {most:.4g} Hz"
+        yield Finding((*SENSOR, "rate"), f"{problem}, or no rate for a continuous signal")
+
+
+def _lags(facts: Facts, period: float) -> Iterator[Finding]:
+    """Times after which what the sensor shows is of no use; ``period`` s is that of the nutation in the body."""
+    for path in ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle")):
+        value = facts.number("time", *path)
+        if value is not None and value > LATE * period:
+            problem = f"{value:g} s is {value / period:.3g} nutation periods; expected at most {LATE:g}"
+            yield Finding(path, f"{problem} of them, {LATE * period:.4g} s")
 
 
 def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
@@ -178,7 +205,7 @@ def _mounting(facts: Facts, inertia: Inertia) -> tuple[Vector | None, Vector | N
 
 
 def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
-    """Noise and steps in which the start threshold is lost."""
+    """Noise, steps and bias in which the start threshold is lost."""
     start, kind = facts.number("angle", "loop", "start"), facts.text(*SENSOR, "kind")
     if start is None or not 0.0 < start < 0.5 * math.pi or kind not in ("gyro", "accelerometer"):
         return
@@ -191,8 +218,9 @@ def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
             return
         size, unit = size * abs(spin) * math.hypot(*gain(inertia.moments, position, axis)), "m/s^2"
     quantity = "rate" if kind == "gyro" else "acceleration"
-    for key, share in (("noise", 1.0), ("quantisation", 2.0)):
+    # The offset of an accelerometer is fitted, and does not matter.
+    for key, share in (("noise", 1.0), ("quantisation", 2.0), *([("bias", 1.0)] * (kind == "gyro"))):
         value = facts.number(quantity, *SENSOR, key)
-        if value is not None and value > share * size > 0.0:
+        if value is not None and abs(value) > share * size > 0.0:
             problem = f"{value:.4g} {unit} hides start, which shows as {size:.4g} {unit}"
             yield Finding((*SENSOR, key), f"{problem}; expected at most {share * size:.4g} {unit}")

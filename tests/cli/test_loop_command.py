@@ -129,3 +129,23 @@ def test_pictures(run: Run, file: str, tmp_path: Path, sensor: str) -> None:
     picture, mapped = ((tmp_path / name).read_text() for name in ("l.svg", "m.svg"))
     assert "start" in picture
     assert "C/A" in mapped
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("loop.sensor.rate=1e9Hz", "more than a million samples a nutation period; expected at most 7.857e+05 Hz"),
+        ("loop.sensor.delay=1e6s", "nutation periods; expected at most 20 of them, 25.45 s"),
+        ("loop.sensor.low_pass=30s", "low_pass: 30 s is 23.6 nutation periods"),
+        ("loop.settle=30s", "settle: 30 s is 23.6 nutation periods"),
+        ("loop.sensor.scale=2000%", "2000 % is no scale of a sensor; expected 10 % to 1000 %"),
+        ("loop.sensor.scale=-1%", "-1 % is no scale of a sensor"),
+        ("loop.sensor={kind: gyro, bias: 2 deg/s}", "bias: 0.03491 rad/s hides start"),
+    ],
+)
+def test_senseless_numbers_are_refused(run: Run, setting: str, message: str) -> None:
+    run("init", "--from", "upper-stage", "stage.yaml")
+    done = run("check", "stage.yaml", "--set", setting)
+    assert done.returncode == 2
+    assert message in " ".join(done.stderr.split())
+    assert run("check", "stage.yaml", "--set", "loop.sensor.bias=3m/s^2").returncode == 0  # it is fitted

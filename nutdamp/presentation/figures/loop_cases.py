@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 60
+"""Bars of a histogram, at most."""
+
+NEAR = 2.0
+"""Times the largest value up to which a requirement is drawn beside it."""
 
 
 @style.styled
@@ -24,14 +28,15 @@ def loop_cases_figure(results: LoopResults) -> Figure:
     """Histograms of four outputs, with dead band and requirement."""
     study = results.study
     figure = style.sheet(7.4, 6.2)
-    quiet, settled, largest, propellant = figure.subplots(2, 2).ravel()
+    settled, quiet, largest, propellant = figure.subplots(2, 2).ravel()
     degrees = 180.0 / math.pi
     _histogram(settled, results, "settled", 1.0, "first quiet, s")
-    _histogram(quiet, results, "quiet", degrees, "nutation then, deg")
+    _histogram(quiet, results, "quiet", degrees, "left then, deg")
     quiet.axvline(degrees * study.band.most, color=GREY, linewidth=1.2, linestyle="--", label="dead band")
-    _histogram(largest, results, "nutation", degrees, "largest since, deg")
+    _histogram(largest, results, "nutation", degrees, "largest, deg")
     required = study.spacecraft.requirement
-    if required is not None and required.nutation is not None:
+    most = results.distribution("nutation")
+    if required is not None and required.nutation is not None and most and required.nutation < NEAR * most.maximum:
         largest.axvline(degrees * required.nutation, color=PULSE, linewidth=1.4, label="required")
     _histogram(propellant, results, "propellant", 1e3, "propellant, g")
     legend(figure, [quiet, largest])
@@ -47,5 +52,6 @@ def _histogram(axes: Axes, results: LoopResults, output: str, scale: float, name
         axes.set_yticks([])
         return
     low, high = float(values.min()), float(values.max())
-    edges = np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, low + 0.5])
+    bins = min(BINS, max(2 * math.isqrt(len(values)), 1))
+    edges = np.linspace(low, high, bins + 1) if high > low else np.array([low - 0.5, low + 0.5])
     axes.hist(values, edges.tolist(), color=MOTION)
