@@ -65,9 +65,9 @@ def fly(
     none) or the flight takes more than `MOST_STEPS`, BadRequest for times that cannot be.
     """
     if not 0.0 <= until < math.inf:
-        raise BadRequest(f"a flight ends at a time from 0 on, not at {until} s")
+        raise BadRequest(f"until = {until} s: expected a time of 0 s or later")
     if step is not None and not 0.0 < step < math.inf:
-        raise BadRequest(f"a step of integration is longer than 0 s, not {step} s")
+        raise BadRequest(f"step = {step} s: expected more than 0 s")
     if spacecraft.growth != 0.0:
         raise Infeasible("Basilisk is flown without energy dissipation, because its hub is rigid, and this body has it")
     longest = default_step(spacecraft, schedule, until) if step is None else step

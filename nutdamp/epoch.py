@@ -61,7 +61,7 @@ class Epoch:
         if hour > 23 or minute > 59 or second >= within:
             raise ValueError(f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…")
         if day < FIRST_DAY:
-            raise ValueError(f"{text!r} lies before 1972, when UTC had seconds of another length")
+            raise ValueError(f"{text!r} is before 1972, when the UTC second had another length")
         return cls(Fraction(86400 * (day - FIRST_DAY) + _leaps_before(day) + 60 * minutes) + second)
 
     def plus(self, seconds: float | Fraction) -> Epoch:

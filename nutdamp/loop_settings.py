@@ -61,7 +61,7 @@ class Loop:
 
     ``law`` is one of the names above; ``on_time`` s is the longest pulse of four-pulse (None: as the scheme) and every
     pulse of bang. After a firing the sensor is not looked at for ``settle`` s, and the next one begins ``min_interval``
-    s later at the earliest. ``predict``: delay, filter and half the on-time are reckoned with. ``reversed``: channels
+    s later at the earliest. ``predict``: delay, filter and half the on-time are compensated. ``reversed``: channels
     that in truth push the other way.
     """
 

@@ -105,8 +105,8 @@ def _broken(breach: Breach) -> str:
         Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
         Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
         Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",
-        Limit.START_TICK: f"starts off the ticks of {bound}",
-        Limit.ON_TIME_TICK: f"is on for a time off the ticks of {bound}",
+        Limit.START_TICK: f"does not start on a tick of {bound}",
+        Limit.ON_TIME_TICK: f"has an on-time that is not a multiple of the tick of {bound}",
     }[limit]
     return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"
 
@@ -148,11 +148,11 @@ def obstacle(plan: Plan) -> str:
     found = plan.hindrance
     return {
         Obstacle.UNPLANNED_DISTURBANCES: "the plan was made without the disturbances (--with-disturbances)",
-        Obstacle.STEADY_TILT: f"under the disturbances a steady tilt of {_degrees(found.steady_tilt)} stays",
+        Obstacle.STEADY_TILT: f"the disturbances leave a steady tilt of {_degrees(found.steady_tilt)}",
         Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} allows no more pulses",
         Obstacle.RESOLUTION: f"rounding to limits.tick can leave up to {_degrees(found.rounding)}",
         Obstacle.LIMITS: f"{plan.scheme} {_limited(found)}",
-        Obstacle.SCHEME: f"with these channels {plan.scheme} takes out no more",
+        Obstacle.SCHEME: f"with these channels {plan.scheme} removes no more",
     }[found.obstacle]
 
 

@@ -25,7 +25,7 @@ AGREE = 1e-9
 
 
 WITHOUT = "without "
-"""How the rows of the budget begin that leave out what plans reckon with."""
+"""How the rows of the budget begin that leave out what plans include."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Method:
 
 @dataclass(frozen=True, slots=True)
 class Imperfection:
-    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans reckon with."""
+    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans include."""
 
     name: str
     nutation: float
@@ -227,9 +227,9 @@ def _conserved(flown: Flight) -> tuple[float, float]:
 def _budget(
     spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
 ) -> tuple[Imperfection, ...]:
-    """Residual of the ideal flight, with each imperfection alone, with all of them; and without what plans reckon with.
+    """Residual of the ideal flight, with each imperfection alone, with all of them; and without what plans include.
 
-    Plans reckon with the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
+    Plans include the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
     with disturbances: these are part of the ideal flight, so that it leaves little.
     """
     exact = schedule if unrounded is None else unrounded

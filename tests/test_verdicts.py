@@ -152,7 +152,7 @@ def test_a_blackout_is_not_said_to_limit_what_it_may_not_touch() -> None:
     [
         (Limits(max_pulses=1), (), False, Obstacle.MAX_PULSES, "limits.max_pulses = 1 allows no more pulses."),
         (Limits(), (Disturbance(0.5 + 0j),), False, Obstacle.UNPLANNED_DISTURBANCES, "--with-disturbances plans with"),
-        (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "Under the disturbances a steady tilt of 0."),
+        (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "The disturbances leave a steady tilt of 0."),
         (Limits(tick=0.3), (), False, Obstacle.RESOLUTION, "Rounding to limits.tick can leave up to "),
     ],
 )
@@ -338,7 +338,7 @@ def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> No
     aware = compare(body, schemes.CLASSIC, schemes.Options(with_disturbances=True))
     assert aware.recommended is not None
     assert aware.recommended.meets_requirement
-    cure = f"--with-disturbances is the cure: {aware.recommended.scheme} then meets the requirement."
+    cure = f"With --with-disturbances {aware.recommended.scheme} meets the requirement."
     assert text.index(cure) < text.index("--scheme optimal")
     hopeless = replace(body, requirement=Requirement(nutation=math.radians(1e-6)))
     (text,) = verdicts.warnings(compare(hopeless, schemes.CLASSIC))

@@ -154,7 +154,7 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does() -> None:
     rows = {row.name: row for row in verify(body, made).budget}
     alone = flight.flown(replace(ideal, disturbances=body.disturbances), made).residual
     damped = flight.flown(replace(body, disturbances=()), made).residual
-    # Dissipation is part of what plans reckon with: it acts in every row but the one without.
+    # Dissipation is part of what plans include: it acts in every row but the one without.
     assert rows["none: ideal impulses"].nutation == damped.nutation > 1e-5
     assert rows["without dissipation"].nutation < 1e-12
     assert rows["disturbances"].nutation == flight.flown(body, made).residual.nutation
@@ -172,7 +172,7 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does() -> None:
     ],
 )
 def test_the_budget_of_a_plan_does_not_read_backwards(changes: dict[str, Any], scheme: str) -> None:
-    """What the plan reckons with is in the ideal flight, which leaves next to nothing; without it the pulses miss."""
+    """What the plan includes is in the ideal flight, which leaves next to nothing; without it the pulses miss."""
     body = replace(EXAMPLE, **changes)
     options = Options(with_disturbances=True)
     plan = planning.plan(body, scheme, options)
@@ -290,7 +290,7 @@ def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Pa
 @pytest.mark.parametrize(
     ("momentum", "energy", "said"),
     [
-        (0.0, 0.0, "On coasts neither |H| nor the energy changes by a single digit."),
+        (0.0, 0.0, "On coasts |H| and the energy are constant to the last digit."),
         (0.0, 2.3e-15, "rounding changes |H| by 0 of itself, the energy by < 1e-12, at most."),
         (3.1e-9, 0.0, "rounding changes |H| by 3.1e-09 of itself, the energy by 0, at most."),
     ],

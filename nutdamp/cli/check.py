@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.boundary import BAD_INPUT, UNREADABLE, tell
-from nutdamp.cli.common import DEFAULT_FILE, Input, load, quiet_option, set_option
+from nutdamp.cli.common import DEFAULT_FILE, Input, parsed, quiet_option, set_option, source
 from nutdamp.cli.job import deliver, remarks
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
@@ -74,7 +74,7 @@ def _looked_into(
     from nutdamp.files.check_json import checked_json
     from nutdamp.presentation.check_tables import check_screen
 
-    spacecraft = load(given, remark, doubts=doubts)
+    spacecraft = parsed(source(given.path, remark), given.settings, remark, doubts=doubts)
     try:
         return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft)
     except NutdampError as wrong:

@@ -31,7 +31,7 @@ dispersions:
   timing: {uniform: 5 ms}"""
 """What is said of a file that should have dispersions."""
 
-LOOP = """the spacecraft file has no loop: it does not say by what to fire. For example:
+LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
 
 loop:
   sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
@@ -74,7 +74,7 @@ set_option = click.option(
 
 
 def spacecraft_argument(command: Command) -> Command:
-    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`Input`) for `load`."""
+    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`Input`) for `job.begin`."""
 
     @functools.wraps(command)
     def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
@@ -104,13 +104,6 @@ def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Calla
     which = click.option("--figure", type=Named(names), default=names[0], show_default=True, help="What --plot draws.")
     where = click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
     return lambda command: where(which(command))
-
-
-def load(
-    given: Input, remark: Callable[[str], None], aim: Aim | None = None, doubts: list[Fault] | None = None
-) -> Spacecraft:
-    """The spacecraft named, else spacecraft.yaml in the working directory, else the built-in example; see `parsed`."""
-    return parsed(source(given.path, remark), given.settings, remark, aim, doubts)
 
 
 def parsed(

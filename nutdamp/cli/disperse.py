@@ -60,7 +60,7 @@ SAVED_EVERY = 30.0
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
-@click.option("--resume", type=FILE, help="Keep what is done in this file, and go on from it if it is there.")
+@click.option("--resume", type=FILE, help="Save finished cases in this file, and resume from it if it exists.")
 @quiet_option
 def command(
     spacecraft: Input,
@@ -90,7 +90,7 @@ def command(
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     if real and impulses:
-        raise click.UsageError("--flown or --impulses: the cases are flown in one way")
+        raise click.UsageError("--flown and --impulses exclude each other")
     expect_impulses(impulses, force, True, "disperse")
     files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
     _expect_study(case, files)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @click.option("--track", type=FILE, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=FILE, help="Write firings, dead band, margins.")
 @click.option("--plot", type=FILE, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
-@click.option("--map", "mapped", type=FILE, help="Where delay and C/A let it damp: .csv, or a picture.")
+@click.option("--map", "mapped", type=FILE, help="Map of damping over delay and C/A: .csv, or a picture.")
 @quiet_option
 def command(
     spacecraft: Input,

@@ -54,8 +54,8 @@ CONTROL = (
     ("title", "Title of the page."),
     ("document", "Number of the document."),
     ("issue", "Issue or revision."),
-    ("author", "Who answers for it."),
-    ("date", "Date of issue, as it is to stand there; default that of SOURCE_DATE_EPOCH."),
+    ("author", "Author of the page."),
+    ("date", "Date of issue, printed as given; default that of SOURCE_DATE_EPOCH."),
 )
 """What configuration control writes on a page: options, and what they are."""
 

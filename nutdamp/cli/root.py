@@ -23,7 +23,7 @@ COMMANDS = {
     "verify": "Fly a schedule by independent means; an error budget.",
     "report": "One page to hand on: HTML, Markdown or PDF.",
     "animate": "Film the body cone rolling on the space cone.",
-    "check": "All faults of spacecraft files, or what follows from them.",
+    "check": "Check spacecraft files: all faults, derived quantities.",
     "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",
     "import": "A spacecraft file from a CCSDS attitude parameter message.",
     "explain": "The schemes, the equations, the keys of the file, the units.",

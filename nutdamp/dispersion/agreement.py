@@ -54,9 +54,9 @@ def check_impulses(study: Study, *, force: bool = False) -> str:
         found = deviations(study)
     except Infeasible as reason:
         if force:
-            return f"nobody can tell how far the impulse sum (17) errs here: {reason}"
+            return f"the error of the impulse sum (17) cannot be determined here: {reason}"
         raise BadRequest(
-            f"--impulses: real widths cannot be flown to check it: {reason}; --force does without"
+            f"--impulses: real widths cannot be flown to check it: {reason}; --force skips this check"
         ) from None
     level = f"{100.0 * found[0].probability:.10g} % of the first {CASES:,} cases"
     text = f"the impulse sum (17) errs by up to {' and '.join(map(str, found))} in {level}"

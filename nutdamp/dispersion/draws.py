@@ -55,7 +55,7 @@ class Source:
         while len(rows):
             attempt += 1
             if attempt > MOST_ATTEMPTS:
-                problem = "hardly any draw gives a body or a thrust that can be (C > 2A, thrust < 0, delay < 0)"
+                problem = "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)"
                 raise Unsuitable(("dispersions",), problem)
             redrawn.append(rows)
             again = np.empty((len(self._random), len(rows)))

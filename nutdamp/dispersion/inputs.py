@@ -122,7 +122,7 @@ def of_sensor(spacecraft: Spacecraft) -> Inputs:
 
 def _no_size(entry: Input) -> str:
     if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
-        return "a share of a value that is zero"
+        return "given in % of a value that is zero"
     return "its size is zero"
 
 
@@ -222,7 +222,7 @@ def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | Non
         return
     thruster = members[name]
     if thruster is None:
-        yield Unused(f"position {name}", "a steerable torquer gives a torque, wherever it sits")
+        yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
     elif thruster.force is None:
         yield Unused(f"position {name}", KNOWN_BY_TORQUE)
     else:

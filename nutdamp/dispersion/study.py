@@ -265,7 +265,7 @@ class Results:
     def extended(self, requested: int) -> Results:
         """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
         if requested < self.done:
-            raise BadRequest(f"{self.done} cases are done already: ask for as many, or leave out what is resumed")
+            raise BadRequest(f"{self.done} cases are done already: expected at least as many, or no --resume")
         more = Results(
             self.study,
             requested,
@@ -301,7 +301,7 @@ def run(
     """
     if collect is not None and results.done:
         if results.values is None:
-            raise BadRequest(f"cases of an earlier run are kept singly only up to {EXACT_CASES}")
+            raise BadRequest(f"single cases of an earlier run are stored only for runs of up to {EXACT_CASES}")
         collect(0, results.values[:, : results.done])
     while results.done < results.requested and not stopped():
         first = results.done

@@ -153,7 +153,7 @@ def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
     given = [key for key in node.value if key in KINDS]
     said = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
     if not given and not said:
-        yield Finding(entry.path, f"says no distribution; give {_example(entry.kind)}")
+        yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
     for key in given[1:]:
         yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
     for key in given:

@@ -28,7 +28,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     if xml and form not in MESSAGES:
         raise BadRequest(f"{form} has no XML notation; {', '.join(MESSAGES)} have")
     if until is not None and form not in TRACKS:
-        raise BadRequest(f"an end belongs to a track ({', '.join(TRACKS)}); {form} is none")
+        raise BadRequest(f"until is for {', '.join(TRACKS)}; {form} has no end time")
     if form == "json":
         from nutdamp.comparison import Comparison
         from nutdamp.files.output import json_text

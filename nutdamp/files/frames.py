@@ -86,7 +86,9 @@ def stretches(flown: Flight, until: float) -> Iterator[Stretch]:
     legs = [leg for leg in flown.legs if leg.start < until]
     counts = [_records(leg, until) for leg in legs]
     if sum(counts) > MOST_RECORDS:
-        raise BadRequest(f"the track would have {sum(counts)} records, more than {MOST_RECORDS}; let it end earlier")
+        raise BadRequest(
+            f"the track would have {sum(counts)} records, more than {MOST_RECORDS}; choose an earlier end (until)"
+        )
     previous: Vector | None = None
     for leg, count in zip(legs, counts, strict=True):
         begin, end = (round(time * NANOSECONDS) for time in (leg.start, min(leg.end, until)))

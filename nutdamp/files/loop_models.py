@@ -120,7 +120,7 @@ class LoopSection(Section):
     )
     predict: bool = Field(
         default=True,
-        description="Whether delay, filter and half the on-time are reckoned with, so that firings are centred on "
+        description="Whether delay, filter and half the on-time are compensated, so that firings are centred on "
         "their moments; default true.",
         examples=[True],
     )

@@ -42,7 +42,7 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     if inertia is None or spin is None:
         return
     if inertia.body_rate == 0.0:
-        problem = "a sphere nutates without a turn of ω in the body, by which a loop fires; leave loop out"
+        problem = "in a sphere ω does not rotate in the body, so that a loop has no phase to fire by; leave loop out"
         yield Finding(("loop",), problem, True)
         return
     yield from _sampling(facts, abs(inertia.body_rate * spin))
@@ -104,7 +104,7 @@ def _sensor(facts: Facts) -> Iterator[Finding]:
     if not facts.has(*SENSOR, "rate"):
         for key in ("noise", "quantisation", "low_pass"):
             if facts.has(*SENSOR, key):
-                yield Finding((*SENSOR, key), "is of samples: it needs rate, such as rate: 100 Hz", True)
+                yield Finding((*SENSOR, key), "applies to samples: it needs rate, such as rate: 100 Hz", True)
     if kind == "accelerometer":
         for key in ("rate", "position"):
             if not facts.has(*SENSOR, key):
@@ -113,7 +113,7 @@ def _sensor(facts: Facts) -> Iterator[Finding]:
     elif kind == "gyro":
         for key in ("position", "axis"):
             if facts.has(*SENSOR, key):
-                yield Finding((*SENSOR, key), "goes with kind accelerometer; a gyro shows the same everywhere", True)
+                yield Finding((*SENSOR, key), "is for kind: accelerometer; a gyro measures the same everywhere", True)
     axis = facts.vector("number", 3, *SENSOR, "axis")
     if axis is not None and not axis.any():
         yield Finding((*SENSOR, "axis"), "zero; expected a direction, such as [0, 0, 1]")

@@ -61,7 +61,7 @@ def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
     seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
     angle = float(attitude.angle_between(seen, axis))
     if min(angle, math.pi - angle) < ALONG:
-        yield Finding(("sun",), "lies along the spin axis at t = 0: then there is no Sun pulse to fire blocks by")
+        yield Finding(("sun",), "lies along the spin axis at t = 0, so that no Sun pulse comes to fire blocks")
         return
     middle = facts.number("angle", "sun_sensor", "elevation") or 0.0
     half_width = facts.number("angle", "sun_sensor", "half_width")
@@ -83,7 +83,7 @@ def _orbit(facts: Facts) -> Iterator[Finding]:
         yield Finding(("orbit",), f"needs {names}: the moment of the position and the axes that it is in", True)
     position = facts.vector("length", 3, "orbit", "position")
     if position is not None and not position.any():
-        yield Finding(("orbit", "position"), "is the centre itself; expected the position of the spacecraft from it")
+        yield Finding(("orbit", "position"), "is zero; expected the position of the spacecraft relative to center")
     center = facts.text("orbit", "center")
     if center is not None and not (center.strip() and center.isascii() and center.isprintable()):
         yield Finding(("orbit", "center"), f"{shown(center)} is no name of a body; expected one such as EARTH")
@@ -126,7 +126,7 @@ def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
         yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
     least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
     if not facts.has(*path, "min") and not facts.has(*path, "max"):
-        yield Finding((*path, "min"), "missing; give min, max or both, else the cone keeps nothing")
+        yield Finding((*path, "min"), "missing; give min, max or both, else the cone has no effect")
     if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
         problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
         yield Finding((*path, "min"), problem)

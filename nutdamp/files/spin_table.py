@@ -48,7 +48,7 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     """
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
-        raise BadRequest(f"the table would have more than {MOST_SPINS} spins; let it end earlier")
+        raise BadRequest(f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)")
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
     starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])

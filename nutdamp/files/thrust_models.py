@@ -32,7 +32,7 @@ class ValveSection(Section):
     fall_time: Time = Field(default=0.0, description="From full thrust to none, s; default 0.", examples=["10 ms"])
     on_time_is: Literal["command", "effective"] = Field(
         default="command",
-        description="What on-times are that are loaded: the length of the command (default), or impulse over full "
+        description="Meaning of a commanded on-time: the length of the command (default), or impulse over full "
         "thrust, which the electronics of the valve turns into one.",
         examples=["command"],
     )
@@ -43,9 +43,11 @@ class TankSection(Section):
 
     propellant: Mass = Field(description="Propellant in it at t = 0, kg.", examples=["30 kg"])
     pressure: Pressure = Field(description="Pressure at t = 0, Pa.", examples=["22 bar"])
-    final_pressure: Pressure = Field(description="Pressure with nothing left, Pa.", examples=["8 bar"])
+    final_pressure: Pressure = Field(description="Pressure when the propellant is used up, Pa.", examples=["8 bar"])
     exponent: Annotated[float, Quantity("number", minimum=0)] = Field(
-        default=1.0, description="Power of the pressure that the thrust goes with; default 1.", examples=[1]
+        default=1.0,
+        description="Exponent n in thrust ~ pressure^n; default 1.",
+        examples=[1],
     )
     isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
         default=None,
@@ -62,5 +64,5 @@ class ColdSection(Section):
         description="Thrust of the first pulse of a channel, over that of a warm one.", examples=["90 %"]
     )
     pulses: Annotated[float, Quantity("number", exclusiveMinimum=0)] = Field(
-        description="Pulses over which the difference to a warm one falls to its e-th part.", examples=[4]
+        description="Pulses in which the difference from a warm one falls by a factor of e.", examples=[4]
     )

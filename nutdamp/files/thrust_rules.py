@@ -22,7 +22,7 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
     thrusters = [index for index, _ in facts.children("thrusters")]
     for key in THRUST_KEYS:
         if facts.has(key) and not thrusters:
-            yield Finding((key,), "is of thrusters, and the file has none; leave it out", True)
+            yield Finding((key,), "applies to thrusters, and the file has none; leave it out", True)
     named, said = thrusts(facts), set[KeyPath]()
     for index in thrusters:
         path: KeyPath = ("thrusters", index)

@@ -190,7 +190,7 @@ class _Builder:
             self.events = _Events(text)
         except ReaderError as error:
             place = _place(text, error.position)
-            raise self.fatal(place, f"the character {chr(error.character)!r} has no place in a text") from None
+            raise self.fatal(place, f"the character {chr(error.character)!r} is not allowed in a text") from None
 
     def fatal(self, place: Place, problem: str, path: KeyPath = ()) -> FaultyFile:
         """A fault after which reading on makes no sense, together with those found so far."""
@@ -358,9 +358,9 @@ def resolve(text: str) -> Scalar:
 _SYNTAX = (
     (r"'\\t' that cannot start", "a tab indents here; use spaces", False),
     (r"mapping values are not", "a second ': ' in one line, or wrong indentation; quote texts that hold ': '", False),
-    (r"could not find expected ':'", "no 'key: value' (the colon wants a space behind it)", True),
+    (r"could not find expected ':'", "no 'key: value' (a space must follow the colon)", True),
     (r"unexpected end of stream", "the quotation mark is never closed", True),
-    (r"unknown escape", "no such \\ escape; use single quotes for texts with a backslash", False),
+    (r"unknown escape", "unknown \\ escape; use single quotes for texts with a backslash", False),
     (r"expected <block end>", "indentation that fits no line above, or text behind a closed value", False),
     (r"expected ',' or '[\]}]'", "a comma or the closing bracket is missing", False),
     (r"sequence entries are not", "'- ' where no list can begin; put it on a line of its own", False),

@@ -224,5 +224,5 @@ def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
     yield table
     if unused:
         yield Text()
-        yield Text("Dispersions that touch nothing that can fire", style="bold")
+        yield Text("Dispersions without effect on anything that fires", style="bold")
         yield unused_table(unused)

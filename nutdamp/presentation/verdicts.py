@@ -210,7 +210,7 @@ def _unplanned(compared: Comparison) -> str:
     made = f"The plan{' was' if one else 's were'} made without the disturbances of the file"
     aware = compared.with_disturbances
     if aware is not None and aware.standing is Standing.COMPLIES:
-        return f"--with-disturbances is the cure: {aware.scheme} then {_those(body, plural=False)}. {made}."
+        return f"With --with-disturbances {aware.scheme} {_those(body, plural=False)}. {made}."
     plans = f"{made}; --with-disturbances plans with them"
     if aware is None:
         return f"{plans}."

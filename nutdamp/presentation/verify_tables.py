@@ -46,12 +46,12 @@ def verdict(found: Verification) -> str:
 def conservation(spacecraft: Spacecraft, found: Verification) -> str:
     """How far |H| and the energy change on coasts, in a sentence."""
     if found.momentum_drift == 0.0 == found.energy_drift:
-        return "On coasts neither |H| nor the energy changes by a single digit."
+        return "On coasts |H| and the energy are constant to the last digit."
     momentum, energy = _difference(found.momentum_drift), _difference(found.energy_drift)
     drifts = f"|H| by {momentum} of itself, the energy by {energy}, at most"
     if spacecraft.disturbances or spacecraft.growth != 0.0:
         return f"On coasts disturbances or dissipation change {drifts}."
-    return f"On coasts, where both should stay, rounding changes {drifts}."
+    return f"On coasts, where both should be constant, rounding changes {drifts}."
 
 
 def methods_table(found: Verification) -> Table:
@@ -78,7 +78,7 @@ def _difference(value: float | None) -> str:
 
 
 def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
-    """One row an imperfection: what it leaves, alone; then what is left without something that plans reckon with."""
+    """One row an imperfection: what it leaves, alone; then what is left without something that plans include."""
     aimed = spacecraft.goal.axis is not None
     table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
     for row in found.budget:
@@ -93,4 +93,4 @@ def budget_note(found: Verification) -> str:
     if not names:
         return ""
     subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    return f"Plans reckon with {subject}; a row 'without' shows what the same pulses leave in a body that lacks it."
+    return f"Plans include {subject}; a row 'without' shows what the same pulses leave on a body without it."

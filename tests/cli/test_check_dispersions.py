@@ -32,7 +32,7 @@ def test_the_table_of_dispersions(run: Run, tmp_path: Path) -> None:
     assert "thrust normal 3 % left 1, T2" in rows
     assert "thrust direction normal 0.5 deg left 1" in rows
     assert "timing uniform 2.89 ms" in rows
-    idle = "\n".join(rows[rows.index("Dispersions that touch nothing that can fire") :])
+    idle = "\n".join(rows[rows.index("Dispersions without effect on anything that fires") :])
     assert "A its size is zero" in idle
     assert "direction T2 the file gives only its torque" in idle
     assert "thrust T3, direction T3 no channel fires T3" in idle

@@ -86,6 +86,6 @@ def test_where_real_widths_cannot_be_flown_nobody_can_tell(monkeypatch: pytest.M
         raise Infeasible("too many radians")
 
     monkeypatch.setattr(agreement, "RealWidths", lambda _: fail)
-    with pytest.raises(BadRequest, match="cannot be flown to check it: too many radians; --force does without"):
+    with pytest.raises(BadRequest, match="cannot be flown to check it: too many radians; --force skips this check"):
         check_impulses(a_study())
     assert "too many radians" in check_impulses(a_study(), force=True)

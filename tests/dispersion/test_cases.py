@@ -147,7 +147,7 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
     assert "only its torque" in because["direction T1"]
     assert "only its torque" in because["position T1"]
     assert because["C"] == "its size is zero"
-    assert because["omega0_1"] == "a share of a value that is zero"
+    assert because["omega0_1"] == "given in % of a value that is zero"
 
     torquer = spinner(steerable=Steerable(20.0))
     steered = Schedule((steerable_pulse(Steerable(20.0), 1.0, 0.3, on_time=0.2),))

@@ -81,5 +81,5 @@ def test_what_cannot_be_is_drawn_again_and_reported() -> None:
 
 
 def test_dispersions_that_allow_nothing_are_refused() -> None:
-    with pytest.raises(BadRequest, match="hardly any draw"):
+    with pytest.raises(BadRequest, match="almost all draws"):
         Source([an_input("normal", 1.0)], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool)).block(0)

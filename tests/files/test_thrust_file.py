@@ -171,7 +171,7 @@ def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatc
 def test_a_valve_without_thrusters() -> None:
     bare = "".join(BODY.splitlines(keepends=True)[:3])
     found = faults(VALVE, "cold: {first: 90 %, pulses: 4}\n", body=bare)
-    assert [one.partition(": is of thrusters")[0] for one in found] == ["4:1: valve", "5:1: cold"]
+    assert [one.partition(": applies to thrusters")[0] for one in found] == ["4:1: valve", "5:1: cold"]
 
 
 def test_a_tank_needs_to_know_what_is_used() -> None:

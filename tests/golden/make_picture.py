@@ -20,7 +20,8 @@ FILE = Path(__file__).with_name("two-pulse.png")
 def main() -> None:
     """Draw it."""
     body = read_spacecraft(example_text(), "example.yaml")
-    FILE.write_bytes(figures.plan_picture("motion", planning.plan(body, "two-pulse"), str(FILE)))
+    drawn = figures.flight_figure("motion", *figures.shown(planning.plan(body, "two-pulse")))
+    FILE.write_bytes(figures.rendered(drawn, str(FILE)))
 
 
 if __name__ == "__main__":

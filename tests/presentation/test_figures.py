@@ -315,19 +315,19 @@ def test_the_ending_says_the_format(path: str, magic: bytes) -> None:
 @pytest.mark.parametrize("path", ["a.bmp", "a", "png", "a.png.gz", ".png"])
 def test_other_endings_are_refused_with_those_that_work(path: str) -> None:
     with pytest.raises(BadRequest, match=r"\.png, \.svg, \.pdf"):
-        figures.picture("timeline", *flown("no pulses"), path)
+        figures.rendered(drawn("timeline", "no pulses"), path)
 
 
 @pytest.mark.parametrize("path", ["a.png", "a.svg", "a.pdf"])
 def test_the_same_flight_gives_the_same_file(path: str) -> None:
-    first, second = (figures.picture("timeline", *flown("blackouts"), path) for _ in range(2))
+    first, second = (figures.rendered(drawn("timeline", "blackouts"), path) for _ in range(2))
     assert first == second
 
 
 def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for call in (
-        lambda: figures.picture("motion", *flown("no pulses"), "a.png"),
+        lambda: figures.rendered(drawn("motion", "no pulses"), "a.png"),
         lambda: figures.flight_figure("motion", *flown("no pulses")),
         lambda: figures.ending("a.png"),
     ):
@@ -336,9 +336,9 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_settings_of_the_user_change_nothing() -> None:
-    plain = figures.picture("timeline", *flown("blackouts"), "a.png")
+    plain = figures.rendered(drawn("timeline", "blackouts"), "a.png")
     with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
-        assert figures.picture("timeline", *flown("blackouts"), "a.png") == plain
+        assert figures.rendered(drawn("timeline", "blackouts"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
 
 

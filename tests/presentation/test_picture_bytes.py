@@ -18,7 +18,7 @@ from nutdamp.presentation import figures
 def test_svg_has_its_text_as_text() -> None:
     made, track = figures.shown(planning.plan(spinner(channels=cross(20.0)), "two-pulse"))
     shown = figures.svg(figures.flight_figure("timeline", made, track))
-    file = figures.picture("timeline", made, track, "a.svg").decode()
+    file = figures.rendered(figures.flight_figure("timeline", made, track), "a.svg").decode()
     for content in (shown, file):
         words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
         assert "Firings" in words
@@ -30,7 +30,7 @@ def test_svg_has_its_text_as_text() -> None:
 def digest() -> str:
     """Of the overview, which holds every panel, as a file and in a page."""
     made, track = figures.shown(planning.plan(spinner(channels=cross(20.0)), "four-pulse"))
-    file = figures.picture("overview", made, track, "a.svg")
+    file = figures.rendered(figures.flight_figure("overview", made, track), "a.svg")
     return hashlib.sha256(file + figures.svg(figures.flight_figure("overview", made, track)).encode()).hexdigest()
 
 

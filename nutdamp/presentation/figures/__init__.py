@@ -26,8 +26,6 @@ __all__ = [
     "dispersion_figure",
     "ending",
     "flight_figure",
-    "picture",
-    "plan_picture",
     "rendered",
     "schemes_figure",
     "shown",
@@ -38,12 +36,6 @@ __all__ = [
 
 ROWS = 1000
 """Rows of the track of a plan; the figures draw a finer one where they need it."""
-
-
-def picture(name: str, flight: Flight, track: Track, path: str) -> bytes:
-    """A `flight_figure` by its name, as the content of the file ``path``; raises as `rendered`."""
-    ending(path)
-    return rendered(flight_figure(name, flight, track), path)
 
 
 def shown(plan: Plan) -> tuple[Flight, Track]:
@@ -57,8 +49,3 @@ def until(flight: Flight) -> float:
     """End of the time axis of a flight, s: that of the flight where it was named, else `geometry.shown_until`."""
     usual = flight.schedule.end + flight.spacecraft.inertial_period
     return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)
-
-
-def plan_picture(name: str, plan: Plan, path: str) -> bytes:
-    """A figure of a plan, flown through its real widths, as the content of the file ``path``."""
-    return picture(name, *shown(plan), path)

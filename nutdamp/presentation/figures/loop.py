@@ -119,7 +119,7 @@ def map_figure(found: Map, ratio: float) -> Figure:
     mesh = axes.pcolormesh(found.delays, found.ratios, found.factor, cmap="RdBu_r", norm=norm, shading="nearest")
     axes.contour(found.delays, found.ratios, found.factor, levels=[1.0], colors=INK, linewidths=1.2)
     axes.axhline(ratio, color=INK, linewidth=0.9, linestyle="--", label="C/A of the file")
-    axes.set_xlabel("delay that the law does not reckon with, s")
+    axes.set_xlabel("delay that the law does not compensate, s")
     axes.set_ylabel("C/A")
     figure.colorbar(mesh, ax=axes, label="nutation left by a firing and a period: below 1 it damps")
     legend(figure, [axes])

@@ -60,7 +60,7 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
     return picture(
         figures.schemes_figure(compared, decided),
         "A row for each scheme: what it costs, when it ends, what it leaves. A cross marks a scheme that falls short, "
-        "whatever it costs. What is less than an axis shows stands at its left edge.",
+        "whatever it costs. Values below the range of an axis are drawn at its left edge.",
         "Dot plots of cost, end, nutation and shift of H by scheme",
     )
 

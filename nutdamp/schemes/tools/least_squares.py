@@ -73,18 +73,17 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
     return None if best is None else best[1], broken
 
 
-def misses(spacecraft: Spacecraft, schedule: Schedule, *, spin: bool = False) -> Vector:
+def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
-
-    ``spin`` adds a fifth, by how much of itself the final spin requested is missed.
 
     The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
-    return _missed(flight.flown(spacecraft, schedule), spin=spin)
+    return _missed(flight.flown(spacecraft, schedule))
 
 
-def _missed(flight_: flight.Flight, *, spin: bool) -> Vector:
+def _missed(flight_: flight.Flight, *, spin: bool = False) -> Vector:
+    """`misses` of a flight; ``spin`` adds a fifth, by how much of itself the final spin of the goal is missed."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
     moments = np.asarray(flight_.moments)
     body = flight_.settled.rates * moments

@@ -181,7 +181,7 @@ def test_notation_and_end_belong_to_some_formats() -> None:
     plan = messages.planned("prolate")
     with pytest.raises(BadRequest, match="stk has no XML"):
         export_text(plan, "stk", xml=True)
-    with pytest.raises(BadRequest, match="apm is none"):
+    with pytest.raises(BadRequest, match="apm has no end time"):
         export_text(plan, "apm", until=3.0)
-    with pytest.raises(BadRequest, match="let it end earlier"):
+    with pytest.raises(BadRequest, match="choose an earlier end"):
         export_text(plan, "aem", until=1e7)
