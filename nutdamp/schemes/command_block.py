@@ -26,7 +26,7 @@ from nutdamp.outcome import left_by
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.options import CommandBlockOptions
 from nutdamp.schemes.tools import block_notes
-from nutdamp.schemes.tools.block_model import BlockModel, State, Trial, acts
+from nutdamp.schemes.tools.block_model import BlockModel, State, Trial, acts, evenly
 from nutdamp.schemes.tools.reasons import no_channels
 from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -34,7 +34,10 @@ from nutdamp.spacecraft import Channel, Spacecraft
 Array = NDArray[np.float64]
 
 FLOWN = 12
-"""Sequences of blocks that are flown."""
+"""Sequences of blocks that are flown; as many more where none of them complies."""
+
+GENTLE = 10
+"""Times as many sequences of which these are those with the smallest pulses."""
 
 AROUND = (0, 1)
 """Steps of the delay that are looked at, from the one below the best delay."""
@@ -112,8 +115,9 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     pulses = 0
     best = search.best(options.max_blocks or BLOCKS)
-    for found in best:
-        if pulses > FLOWN_PULSES or work.exhausted():
+    for number, found in enumerate(best):
+        met = any(one.rank[:2] == (False, 0.0) for one in flights)
+        if pulses > FLOWN_PULSES or work.exhausted() or (met and number >= FLOWN):
             break
         try:
             flights.append(search.flown(found))
@@ -170,7 +174,16 @@ class Search:
         ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
         clear = sorted(ranked, key=lambda one: one.share)[: FLOWN // 2]
         each = {len(one.blocks): one for one in reversed(ranked)}.values()
-        return list({one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}.values())
+        first = {one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}
+        # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
+        gentle = sorted(sorted(ranked, key=lambda one: one.share)[: GENTLE * FLOWN], key=self._largest_pulse)
+        return [*first.values(), *(one for one in gentle if one.blocks not in first)][: len(first) + FLOWN]
+
+    def _largest_pulse(self, found: Found) -> float:
+        """The most by which one of its pulses turns H, rad."""
+        named = {one.name: one for one in self.channels}
+        spin = self.body.spin
+        return max(float(self.model.turned_by(named[one.channel], one.width, spin)) for one in found.blocks)
 
     def flown(self, found: Found) -> Flown:
         """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
@@ -294,7 +307,7 @@ class Search:
         state, least = before.state, self.pause if before.blocks else self.earliest
         _, way = self.model.course(state)
         for channel in self.channels:
-            widths = _spread(commandable_widths(self.commands, channel), MOST_WIDTHS)
+            widths = evenly(commandable_widths(self.commands, channel), MOST_WIDTHS)
             if not len(widths):
                 continue
             step = self.model.turned_by(channel, widths, float(state.spin))
@@ -315,7 +328,7 @@ class Search:
         if self.body.goal.axis is None or every is None:
             return
         for channel in self.channels:
-            widths = _spread(commandable_widths(self.commands, channel), 3)
+            widths = evenly(commandable_widths(self.commands, channel), 3)
             for width in widths.tolist():
                 step = float(self.model.turned_by(channel, width, float(start.state.spin)))
                 delay = self._commanded(self.model.delay(channel, heading, width))
@@ -384,9 +397,3 @@ def _promising(found: Iterable[Found], most: int) -> list[Found]:
         if not front or one.rank[1] < front[-1].rank[1]:
             front.append(one)
     return list({one.blocks: one for one in (*ranked[:most], *front[:most])}.values())
-
-
-def _spread(values: Array, most: int) -> Array:
-    """At most so many of the ``values``, evenly."""
-    index = np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int))
-    return np.asarray(values[index])

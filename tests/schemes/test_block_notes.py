@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spinners import FILE
+from spinners import FILE, some_body
 
 from nutdamp import flight, planning
 from nutdamp.commands import Block
@@ -17,6 +17,7 @@ from nutdamp.outcome import left_by
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
+from nutdamp.schemes.command_block import FLOWN, Flown, Found, Search
 from nutdamp.schemes.tools.block_model import BlockModel, Trial
 from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Limits, Requirement, Spacecraft
@@ -98,3 +99,21 @@ def test_a_supply_counts_what_was_fired() -> None:
     supply = Supply(FED)
     supply.count(Schedule())
     assert (supply.fired, supply.used) == (Counter(), 0.0)
+
+
+def test_where_the_first_dozen_miss_sequences_of_smaller_pulses_are_flown_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body of which the best in closed form fly badly: 4.5 times the bound without those more, now less than half."""
+    body = replace(some_body(2), requirement=Requirement(math.radians(0.1), math.radians(0.1)))
+    fired_: list[float] = []
+    flown = Search.flown
+
+    def counted(self: Search, found: Found) -> Flown:
+        made = flown(self, found)
+        fired_.append(made.rank[1])
+        return made
+
+    monkeypatch.setattr(Search, "flown", counted)
+    plan = planning.plan(body, "command-block")
+    assert len(fired_) > FLOWN
+    assert plan.severity == pytest.approx(min(fired_))
+    assert plan.severity < 2.0

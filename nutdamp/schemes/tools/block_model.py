@@ -69,6 +69,12 @@ def _acts(valve: Valve, width: float) -> Acts:
     return Acts(on_time, centroid, spread(ramps, centroid), max([width, *(ramp.end for ramp in ramps)]))
 
 
+def evenly(values: Any, most: int) -> Any:
+    """At most so many of the ``values``, evenly."""
+    index = np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int))
+    return np.asarray(values[index])
+
+
 @dataclass(frozen=True)
 class State:
     """The motion between two blocks: one, or many at once.
