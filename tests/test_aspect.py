@@ -120,7 +120,7 @@ def between(body: Spacecraft, share: float) -> Array:
 TURNING = aimed(spinner(80.0, 120.0, degrees=0.2, channels=cross(8.0, max_on_time=0.3)), 12.0, 30.0)
 
 
-@pytest.mark.parametrize("scheme", ["rhumb-line", "optimal"])
+@pytest.mark.parametrize("scheme", some(["optimal", "rhumb-line"]))
 def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     free = planning.plan(cones(TURNING), scheme)
     assert free.feasible
