@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from nutdamp.errors import Infeasible
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
-from nutdamp.loop.run import Alone, Course, Pilot, Scatter, largest_since
+from nutdamp.loop.pilot import Course, Pilot, Scatter
+from nutdamp.loop.run import Alone, largest_since
 from nutdamp.loop.sensor import Noise, felt, stepped
 from nutdamp.loop.watch import SAMPLED, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER

@@ -144,7 +144,7 @@ class LoopStudy:
         begin = time.perf_counter()
         self.fly(self.nominal_case)
         seconds = samples * (time.perf_counter() - begin)
-        return f"about {seconds:.0f} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
+        return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
 
     def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> Flown:
         """The loops of ``cases``."""

@@ -184,7 +184,7 @@ def test_what_cannot_go_together_is_named() -> None:
 
 
 def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.loop.run.MOST_FIRINGS", 3)
+    monkeypatch.setattr("nutdamp.loop.pilot.MOST_FIRINGS", 3)
     craft = spinner(degrees=3.0, channels=(channel("a", 6.0, 0.0, 0.0), channel("b", -6.0, 0.0, 0.0)))
     loop = Loop(Sensor(rate=20.0), start=0.01, stop=0.005, on_time=0.2)
     still = replace(craft, omega0=np.array([0.021, 0.0, 3.0]))

@@ -286,7 +286,7 @@ def test_nothing_is_looked_at_while_the_nutation_cannot_show() -> None:
 
 
 def test_a_flight_that_would_look_at_too_many_samples_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.loop.run.MOST", 100_000)
+    monkeypatch.setattr("nutdamp.loop.pilot.MOST", 100_000)
     craft = growing(sensor=Sensor(rate=1e6, noise=rad(0.25)))
     assert craft.loop is not None
     with pytest.raises(Infeasible, match="samples"):

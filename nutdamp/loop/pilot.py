@@ -1,0 +1,262 @@
+"""The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from enum import Enum
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
+from nutdamp.limits import commandable
+from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
+from nutdamp.loop.law import ComplexArray, Firing, Law
+from nutdamp.loop.sensor import Estimator
+from nutdamp.loop.watch import GRID, MOST, Found, Seen, Watch
+from nutdamp.loop_settings import ACCELEROMETER, Loop
+from nutdamp.schedule import Pulse, channel_pulse, on_command
+from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.supply import Supply
+
+MOST_FIRINGS = 10_000
+"""Firings of one flight, at most."""
+
+NO_NOISE = 8.0
+"""Sigmas that noise does not reach: a chance of 1e-15 a sample."""
+
+WAVES = 40.0
+"""Time constants of the low-pass filter after which it has forgotten how it began."""
+
+
+class Fired(NamedTuple):
+    """A firing: the ``pulse`` as it acts, when it was ``decided`` on (s), and the nutation (rad) that was seen then.
+
+    ``true_nutation`` rad is what it was in truth as the pulse began.
+    """
+
+    pulse: Pulse
+    decided: float
+    seen: float
+    true_nutation: float
+
+
+class Scatter(Protocol):
+    """By what single firings are off: the factor on the thrust of each, and by how many s it comes late."""
+
+    def of(self, number: int) -> tuple[float, float]:
+        """Of the firing of a ``number`` from 0."""
+        ...
+
+
+class Course(Enum):
+    """What a loop does next where it neither fires nor waits: looks on, or is over."""
+
+    ON = "on"
+    OVER = "over"
+
+
+class Pilot:
+    """The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+
+    The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
+    ``free``: coasts are those of a symmetric body without torque from outside.
+    """
+
+    def __init__(
+        self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
+    ) -> None:
+        self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
+        self.diagnosis = Diagnosis(law.period)
+        self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
+        self.channels = {channel.name: channel for channel in truth.channels}
+        self.supply = Supply(truth)
+        self.fired: list[Fired] = []
+        self.quiet: list[float] = []
+        self.active, self.looked_at = False, 0
+        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
+        self._found: Found | None = None
+        self._pending: tuple[Pulse, Firing, Glimpse] | None = None
+        self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
+
+    def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
+        """What comes after a stretch of a coast: a pulse; nothing to be seen until a time, s; or `Course`."""
+        self.looked_at += len(seen.times)
+        if self.looked_at > MOST:
+            raise Infeasible(
+                f"more than {MOST:.2g} samples by {seen.times[0]:.6g} s; an earlier end, or a lower rate, helps"
+            )
+        self._seen.append((seen.times, seen.best, seen.spin))
+        self._latest, self._shown = len(seen.times), seen.shown
+        self._found = self._decide(coast, seen)
+        if self.ending[0].fault:
+            return Course.OVER
+        if self._found is not None:
+            return self._pulse(self._found) or Course.OVER
+        self._forget()
+        later = None if self.active or self._pending is not None else self._idle_until(seen)
+        if later is None:
+            return Course.ON
+        self._seen = []
+        return later
+
+    def _pulse(self, found: Found) -> Pulse | None:
+        """What the channel does in truth when it is commanded; None where it may not, or not before the end."""
+        known, channel = found.actuator.channel, self.channels[found.actuator.channel.name]
+        made = channel_pulse(known, found.start + found.firing.lead, found.firing.on_time)
+        if known.valve is not None:
+            made = commandable(self.law.spacecraft, made)
+        factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
+        if channel is not known or late != 0.0:
+            begins, lasts = made.loaded
+            made = on_command(channel, max(begins + late, found.now), lasts)
+        if made.over > self.until:
+            return None
+        if len(self.fired) == self.most:
+            self.ending = Stop.FULL, ""
+            if self.most == MOST_FIRINGS:
+                raise Infeasible(f"more than {MOST_FIRINGS} firings by {made.start:.6g} s; an earlier end helps")
+            return None
+        made = self.supply.fire(made, channel)
+        sense = -factor if channel.name in self.loop.reversed else factor
+        return made if sense == 1.0 else _scaled(made, sense)
+
+    def take(self, pulse: Pulse, size: float, spin: float) -> None:
+        """Notes a firing, with |z| and ω3 (rad/s) in truth as it begins, and what was seen before it."""
+        found = self._found
+        assert found is not None
+        true = float(self.law.nutation(size, spin))
+        self.fired.append(Fired(pulse, found.now, float(self._shown[found.row]), true))
+        glimpse = self._glimpse(pulse.t, found.row, last=True)
+        self._pending = None if glimpse is None else (pulse, found.firing, glimpse)
+        self._seen = []
+        self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+
+    def _forget(self) -> None:
+        """Keeps of what was seen the last period, or all since a firing that is not judged yet."""
+        if self._pending is None:
+            last = self._seen[-1][0]
+            edge = last[-1] - self.law.period
+            if last[0] <= edge:
+                row = int(np.searchsorted(last, edge))
+                times, best, spin = self._seen[-1]
+                self._seen = [(times[row:].copy(), best[row:].copy(), spin[row:].copy())]
+            else:
+                self._seen = self._seen[-3:]
+
+    def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
+        """What was seen on this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
+        times, best, spin = (
+            self._seen[0] if len(self._seen) == 1 else map(np.concatenate, zip(*self._seen, strict=True))
+        )
+        count = len(times) - self._latest + row + 1
+        times, best, spin = times[:count], best[:count], spin[:count]
+        known = ~np.isnan(best)
+        if not known.any():
+            return None
+        times, best, spin = times[known], best[known], spin[known]
+        edge = times[-1] - self.law.period if last else times[0] + self.law.period
+        near = times >= edge if last else times <= edge
+        rate = complex(self.law.rate(float(spin[-1])), self.law.growth)
+        return Glimpse.of(times[near], best[near], rate, centre)
+
+    def _decide(self, coast: Watch, seen: Seen) -> Found | None:
+        """The first firing among the moments of a stretch; thresholds and firings are judged in their order."""
+        shown, fires, count, row = seen.shown, seen.fires, len(seen.times), 0
+        while row < count:
+            if not self.active:
+                begins = _first(np.asarray(shown >= self.law.loop.start), row)
+                if begins is None:
+                    break
+                self.active, row = True, begins
+            downs = _first(np.asarray(shown <= self.law.loop.stop), row)
+            fire = _first(np.asarray(fires.any(axis=0)), row)
+            if downs is not None and (fire is None or downs <= fire):
+                self.active, row = False, downs + 1
+                self.diagnosis.rest()
+                self.quiet.append(float(seen.now[downs]))
+                continue
+            if fire is None:
+                break
+            if self._faulty(coast, seen, fire):
+                return None
+            found = self._allowed(coast, seen, fire, np.flatnonzero(fires[:, fire]).tolist())
+            if found is not None:
+                return found
+            row = fire + 1
+        if count and not (self._pending is not None and seen.times[-1] < self._known(coast)):
+            self._faulty(coast, seen, count - 1)
+        return None
+
+    def _known(self, coast: Watch) -> float:
+        """When enough has been seen of the coast after a firing to judge it, s."""
+        return float(coast.estimator.first) + 0.25 * self.law.period
+
+    def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
+        """Judges the last firing by what was seen since, up to a ``row``; whether the loop has to stop."""
+        if self._pending is not None:
+            pulse, firing, before = self._pending
+            after = self._glimpse(pulse.t, row, last=False)
+            if after is not None and seen.now[row] > pulse.t + STALE * self.law.period:
+                self._pending = None
+            elif after is not None:
+                self._pending = None
+                estimator = coast.estimator
+                doubt = (estimator.doubt(before.samples), estimator.doubt(after.samples), estimator.offset)
+                verdict = self.diagnosis.judge(pulse.channel, float(seen.now[row]), before, after, firing.acts, doubt)
+                if verdict is not None:
+                    self.ending = verdict
+        if self._pending is None and not self.ending[0].fault:
+            overdue = self.diagnosis.overdue(float(seen.now[row]))
+            if overdue is not None:
+                self.ending = overdue
+        return self.ending[0].fault
+
+    def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Found | None:
+        """The firing at a row, on a tick, if the limits allow it."""
+        usable = [index for index in channels if self.law.actuators[index].channel.name != self.diagnosis.suspect]
+        found = coast.found(seen, row, usable)
+        if found is None:
+            return None
+        windows = self.law.windows
+        start = windows.nearest_tick(found.start)
+        start = windows.tick_after(found.start) if start < found.now else start
+        return found._replace(start=start) if windows.allows(start, found.firing.lasts, self.ready) else None
+
+    def _idle_until(self, seen: Seen) -> float | None:
+        """When the sensor can first show the start threshold, less what it takes to be looking; None where soon."""
+        law, sensor = self.law, self.loop.sensor
+        if not self.free:
+            return None
+        now, spin = float(seen.times[-1]), float(seen.spin[-1])
+        share = 0.5 if sensor.kind == ACCELEROMETER else 1.0
+        reach = (share * law.size(law.loop.start, spin) - self._margin) / max(map(abs, sensor.scales))
+        if reach <= seen.size:
+            return None
+        growth = self.truth.growth
+        # tan θ grows by e^{κt}, and |ω| by no more.
+        waits = math.log(reach / seen.size) / growth if growth > 0.0 < seen.size else math.inf
+        later = min(now + waits, self.until) - max(law.period, WAVES * sensor.low_pass) - law.period / GRID
+        return later if later > now + law.period else None
+
+    @cached_property
+    def _margin(self) -> float:
+        """By how much the sensor may show too much of |z|, rad/s."""
+        estimator = Estimator(self.law, self.loop.sensor, 0.0)
+        return estimator.offset + NO_NOISE * estimator.doubt(1)
+
+
+def _scaled(pulse: Pulse, factor: float) -> Pulse:
+    """A pulse of so many times the thrust; backwards where that is negative."""
+    torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
+    used = None if pulse.propellant is None else abs(factor) * pulse.propellant
+    return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
+
+
+def _first(mask: NDArray[np.bool_], row: int) -> int | None:
+    """Number of the first true one from ``row`` on."""
+    found = int(np.argmax(mask[row:]))
+    return row + found if mask[row + found] else None
