@@ -44,10 +44,7 @@ class Odds:
         sizes = np.abs(shown[:, None] * turns + seen.offset)
         chance = _exceeds(limit / sigma, sizes / sigma)
         chance = 1.0 - chance if below else chance
-        # Noise that lasts for many samples reaches a threshold in clusters: Pickands' rate for a covariance that
-        # begins as 1 - fresh |k|.
-        apart = np.maximum(np.abs(limit - sizes) / sigma, 1.0)
-        chance = (chance * np.minimum(seen.fresh * apart**2, 1.0)).mean(axis=1)
+        chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
         expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
         self.sizes = np.log(shown / gain)
         pieces = 0.5 * (expected[1:] + expected[:-1]) * np.diff(self.sizes)
@@ -58,6 +55,21 @@ class Odds:
         wanted = np.interp(np.log(now), self.sizes, self.sum) + drawn
         found = np.maximum(np.exp(np.interp(wanted, self.sum, self.sizes)), now)
         return np.where(wanted > self.sum[-1], math.inf, found)
+
+
+def _clustered(fresh: float, apart: Vector) -> Any:
+    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a cluster of such.
+
+    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
+    walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
+    """
+    from scipy.special import ndtr
+
+    if fresh > 0.5:
+        return 1.0
+    half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
+    below = ndtr(half)
+    return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
 
 
 def _exceeds(limit: float, shown: Vector) -> Vector:
