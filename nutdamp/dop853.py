@@ -1,6 +1,7 @@
 """Euler's equations by scipy's DOP853: written apart from everything else that flies, so that it can judge it.
 
-Cross products, a matrix for the tensor, in the axes of the file, and restarts at every edge of a pulse.
+Cross products, a matrix for the tensor, in the axes of the file, and restarts at every edge of a pulse. Where the
+moments fall with the propellant, what is used of it is one number more to be integrated.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from nutdamp.errors import Infeasible
+from nutdamp.lightening import shed
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 EVALUATIONS = 200_000
@@ -26,40 +28,63 @@ Push = tuple[Vector, Vector | None]
 class Equations:
     """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far.
 
-    A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file.
+    A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
+    the propellant used too, kg.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
         self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
         self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
-        self.inverse = np.linalg.inv(self.tensor)
+        self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)
+        per_kg = shed(spacecraft)
+        self.shed = None if per_kg is None else self.axes @ np.diag(per_kg) @ self.axes.T
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
         """The state of a motion."""
         turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
-        return np.concatenate([self.axes @ motion.rates, turned])
+        return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
 
     def motion(self, states: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) and quaternions (n, 4) in principal axes of ``states`` (n, 7)."""
-        quaternion = states[:, 3:] / np.linalg.norm(states[:, 3:], axis=1, keepdims=True)
+        """Rates (n, 3) and quaternions (n, 4) in principal axes of ``states`` (n, 7) or (n, 8)."""
+        quaternion = states[:, 3:7] / np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
         return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
 
-    def kicked(self, state: Vector, impulse: Vector) -> Vector:
-        """The state after an ``impulse`` (3,) N m s in principal axes."""
-        return np.concatenate([state[:3] + self.inverse @ (self.axes @ impulse), state[3:]])
+    def kicked(self, state: Vector, impulse: Vector, propellant: float = 0.0) -> Vector:
+        """The state after an ``impulse`` (3,) N m s in principal axes, which takes so many kg of ``propellant``."""
+        _, inverse = self._body(state[7:] + 0.5 * propellant)
+        return np.concatenate([state[:3] + inverse @ (self.axes @ impulse), state[3:7], state[7:] + propellant])
 
-    def solved(self, state: Vector, start: float, end: float, pushes: Iterable[Push], *, dense: bool = False) -> Any:
+    def _body(self, used: Vector) -> tuple[Vector, Vector]:
+        """The tensor and its inverse once so many kg are ``used``, (1,), or (0,) where they stay."""
+        if self.shed is None:
+            return self.tensor, self.inverse
+        tensor: Vector = self.tensor - used[0] * self.shed
+        return tensor, np.asarray(np.linalg.inv(tensor), dtype=np.float64)
+
+    def solved(
+        self,
+        state: Vector,
+        start: float,
+        end: float,
+        pushes: Iterable[Push],
+        *,
+        burn: tuple[float, float] = (0.0, 0.0),
+        dense: bool = False,
+    ) -> Any:
         """What solve_ivp gives from ``state`` at ``start`` to ``end`` s, with its interpolant where it is ``dense``.
 
-        Raises Infeasible where all of them together take more than `EVALUATIONS`.
+        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
+        together take more than `EVALUATIONS`.
         """
         from scipy.integrate import solve_ivp
 
-        derivative = self._derivative(start, tuple(pushes))
+        derivative = self._derivative(start, tuple(pushes), burn)
         return solve_ivp(derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense)
 
-    def _derivative(self, start: float, pushes: tuple[Push, ...]) -> Callable[[float, Vector], Vector]:
+    def _derivative(
+        self, start: float, pushes: tuple[Push, ...], burn: tuple[float, float]
+    ) -> Callable[[float, Vector], Vector]:
         constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
         slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
 
@@ -67,15 +92,17 @@ class Equations:
             self.evaluations += 1
             if self.evaluations > EVALUATIONS:
                 raise Infeasible(f"the motion takes more than {EVALUATIONS} evaluations of Euler's equations")
-            body, q = y[:3], y[3:]
-            momentum = self.tensor @ body
+            body, q = y[:3], y[3:7]
+            tensor, inverse = self._body(y[7:])
+            momentum = tensor @ body
             drive = self._sink(momentum)
             torque = self.axes @ (constant + slope * (t - start) + self._disturbed(t))
-            spin = self.inverse @ (torque + drive - np.cross(body, momentum))
+            spin = inverse @ (torque + drive - np.cross(body, momentum))
             # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
             slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
             turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
-            return np.concatenate([spin, turning])
+            flow = [burn[0] + burn[1] * (t - start)]
+            return np.concatenate([spin, turning, flow[: len(y) - 7]])
 
         return derivative
 
@@ -116,9 +143,17 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
     for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
         for pulse in schedule:
             if pulse.on_time == 0.0 and pulse.t == now:
-                state = equations.kicked(state, pulse.impulse)
+                state = equations.kicked(state, pulse.impulse, pulse.propellant or 0.0)
         rows[now] = state
         if end > now:
-            pushes = [push for push in (pulse.push(now, end) for pulse in schedule) if push is not None]
-            state = equations.solved(state, now, end, pushes).y[:, -1]
+            firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
+            burn = np.sum([_flow(*one) for one in firing], axis=0) if firing else (0.0, 0.0)
+            state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
     return equations.motion(np.array([rows[time] for time in times.tolist()]))
+
+
+def _flow(pulse: Pulse, push: Push) -> tuple[float, float]:
+    """Flow of propellant, kg/s, as a stretch of a pulse begins, and its slope, kg/s²: as the torque, over all of it."""
+    torque, slope = push
+    along = (pulse.propellant or 0.0) * pulse.impulse / float(pulse.impulse @ pulse.impulse)
+    return float(along @ torque), 0.0 if slope is None else float(along @ slope)

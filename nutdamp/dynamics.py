@@ -11,7 +11,7 @@ import numpy as np
 from nutdamp import work
 from nutdamp.motion import Arc, Integrated, Path
 from nutdamp.physics import rigid
-from nutdamp.physics.rigid import Forcing
+from nutdamp.physics.rigid import Falling, Forcing
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 LEG, PULSE = 0.03, 0.4
@@ -61,37 +61,50 @@ class Dynamics:
         slope: Vector | None = None,
         *,
         most: int,
+        falling: Falling | None = None,
     ) -> tuple[Path, SpinState]:
         """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
 
-        With a ``slope`` (3,) N m/s the torque runs evenly from that sum. Raises Infeasible where it takes more than
-        ``most`` steps of integration.
+        With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
+        Infeasible where it takes more than ``most`` steps of integration.
         """
         if self.known is None:
-            return self._path(state, start, end, torques, slope, most)
-        ramp = () if slope is None else (slope,)
-        leg = np.concatenate([state.rates, state.quaternion, (start, end), *torques, *ramp]).tobytes()
+            return self._path(state, start, end, torques, slope, most, falling)
+        more = (*(() if slope is None else (slope,)), *(falling or ()))
+        leg = np.concatenate([self.moments, state.rates, state.quaternion, (start, end), *torques, *more]).tobytes()
         found = self.known.get(leg)
         if found is None or found[0].steps > most:
             if len(self.known) >= REMEMBERED:
                 self.known.clear()
-            found = self.known[leg] = self._path(state, start, end, torques, slope, most)
+            found = self.known[leg] = self._path(state, start, end, torques, slope, most, falling)
         return found
 
     def _path(
-        self, state: SpinState, start: float, end: float, torques: Sequence[Vector], slope: Vector | None, most: int
+        self,
+        state: SpinState,
+        start: float,
+        end: float,
+        torques: Sequence[Vector],
+        slope: Vector | None,
+        most: int,
+        falling: Falling | None,
     ) -> tuple[Path, SpinState]:
         work.spend(LEG)
-        if end == start or (self.free and not torques):
+        if end == start or (self.free and not torques and falling is None):
             arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         pieces = rigid.integrate(
-            self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope
+            self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
         )
         work.spend(PULSE + self.step_cost * len(pieces))
         rates_, quaternion_ = pieces[-1].final
         return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+
+    def with_moments(self, moments: Vector) -> Dynamics:
+        """The same with these principal moments (3,) kg m²."""
+        first, second, third = moments.tolist()
+        return replace(self, moments=(first, second, third))
 
     def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
         """The state after an ``impulse`` (3,) N m s."""

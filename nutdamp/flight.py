@@ -9,17 +9,18 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.lightening import Lightening, lightened, shed
 from nutdamp.motion import Path
 from nutdamp.physics import attitude, rates, rigid
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.track import PIECE, Track, even_times, in_file_axes, make_track, widest
 from nutdamp.views import Tabled
 
@@ -89,7 +90,7 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 class Flight(Tabled):
     """A schedule flown by one ``model``: its legs in order, and the motion as the last pulse ends.
 
-    ``moments`` are those flown with; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
+    ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
     the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
     ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``
     is what planned it, empty where that is not known.
@@ -114,13 +115,13 @@ class Flight(Tabled):
     @property
     def residual(self) -> Residual:
         """Cone angles after the last pulse, and where H went."""
-        start, moments = self.spacecraft.initial, np.asarray(self.moments)
-        before = attitude.rotate(start.quaternion, start.rates * moments)
+        start, moments = self.spacecraft.initial, self.last_moments
+        before = attitude.rotate(start.quaternion, start.rates * np.asarray(self.moments))
         target = self.spacecraft.goal.axis
-        body = self.settled.rates * moments
+        body = self.settled.rates * np.asarray(moments)
         after = attitude.rotate(self.settled.quaternion, body)
         shift = float(attitude.angle_between(before, after))
-        left = arc_cones(self.moments, self.settled.rates, self._sense)
+        left = arc_cones(moments, self.settled.rates, self._sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 
@@ -128,13 +129,29 @@ class Flight(Tabled):
     def final(self) -> Final:
         """Where spin axis and angular momentum end."""
         state = self.settled
-        momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.moments))
+        momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.last_moments))
         return Final(
             axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self._sense])),
             momentum=np.asarray(momentum / np.linalg.norm(momentum)),
             spin=state.spin,
             nutation=self.residual.nutation,
         )
+
+    def moments_at(self, times: Vector) -> Vector:
+        """Principal moments (kg m²) at ``times`` (n,) s: (3,), or (n, 3) where they fall with the propellant used."""
+        per_kg = shed(self.spacecraft)
+        if per_kg is None:
+            return np.asarray(self.moments)
+        used = self.schedule.used_by(np.asarray(times, dtype=float), at_once=self.model == IMPULSE_SUM)
+        return self.moments - used[:, None] * per_kg
+
+    @property
+    def last_moments(self) -> tuple[float, float, float]:
+        """Principal moments after the last pulse, kg m²."""
+        if shed(self.spacecraft) is None:
+            return self.moments
+        first, second, third = self.moments_at(np.array([math.inf]))[0].tolist()
+        return first, second, third
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""
@@ -182,7 +199,7 @@ class Flight(Tabled):
 
     def _joined(self, motions: Iterable[Motion]) -> Track:
         t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
-        return make_track(self.moments, self.spacecraft.spin, t, body, quaternion, pulse)
+        return make_track(self.moments_at(t), self.spacecraft.spin, t, body, quaternion, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
         """The rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
@@ -213,8 +230,9 @@ class Flight(Tabled):
         body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
         quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
         numbers = completed + np.arange(len(t), dtype=np.int64)
-        made = make_track(self.moments, self.spacecraft.spin, t, body, quaternion, numbers)
-        return widest(made, self.moments, self.spacecraft.spin)
+        moments = self.moments_at(t)
+        made = make_track(moments, self.spacecraft.spin, t, body, quaternion, numbers)
+        return widest(made, moments, self.spacecraft.spin)
 
     @property
     def _sense(self) -> float:
@@ -231,19 +249,23 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     """
     dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     legs: list[Leg] = []
-    now = 0.0
+    now, used = 0.0, 0.0
     for index, pulse in enumerate(schedule):
         path, state = dynamics.path(state, now, pulse.t, most=allowed)
         allowed -= path.steps
         legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
-        kick = _effective_impulse(spacecraft, pulse, state.spin)
-        state = dynamics.kicked(state, np.array([kick.real, kick.imag, pulse.impulse[2]]))
-        now = pulse.t
+        taken = pulse.propellant or 0.0
+        inertia = lightened(spacecraft, used + 0.5 * taken)
+        kick = _effective_impulse(spacecraft, inertia, pulse, state.spin)
+        impulse = np.array([kick.real, kick.imag, pulse.impulse[2]])
+        state = replace(dynamics, moments=inertia.moments).kicked(state, impulse)
+        now, used = pulse.t, used + taken
+        dynamics = replace(dynamics, moments=lightened(spacecraft, used).moments)
     last = max(until, schedule.end)
     path, _ = dynamics.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
     spans = tuple((one.t, one.t) for one in schedule)
-    return Flight(spacecraft, schedule, tuple(legs), state, dynamics.moments, spans, IMPULSE_SUM)
+    return Flight(spacecraft, schedule, tuple(legs), state, spacecraft.inertia.moments, spans, IMPULSE_SUM)
 
 
 def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
@@ -253,12 +275,17 @@ def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np
     """
     arcs = by_impulses(spacecraft, schedule).legs[:-1]  # each up to its pulse
     spins = [float(leg.path.motion(np.array([leg.end]))[0][0, 2]) for leg in arcs]
-    return np.array([_effective_impulse(spacecraft, *one) for one in zip(schedule, spins, strict=True)], dtype=complex)
+    found, used = [], 0.0
+    for pulse, spin in zip(schedule, spins, strict=True):
+        taken = pulse.propellant or 0.0
+        found.append(_effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin))
+        used += taken
+    return np.array(found, dtype=complex)
 
 
-def _effective_impulse(spacecraft: Spacecraft, pulse: Pulse, spin: float) -> complex:
-    """What ``pulse`` acts like on ω at its centre, N m s; ``spin`` is ω3 there before it acts, rad/s."""
-    inertia, drift = spacecraft.inertia, spacecraft.spin_drift
+def _effective_impulse(spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float) -> complex:
+    """What ``pulse`` acts like on ω at its centre, N m s, with the ``inertia`` and ω3 before it acts, rad/s, there."""
+    drift = spacecraft.spin_drift
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
     if pulse.command is not None and pulse.command.ramps:
         from nutdamp.physics import valve  # few spacecraft have any
@@ -295,9 +322,11 @@ def flown(
     starts, ends = np.array(spans).reshape(-1, 2).T
     last = max(until, over)
     edges = sorted({0.0, over, last, *(time for pulse in pulses for time in pulse.edges)})
+    light = Lightening(dynamics, spacecraft, schedule, edges)
     legs: list[Leg] = []
     settled = state
     for now, end in zip(edges, [*edges[1:], last], strict=True):
+        dynamics, falling = light.between(dynamics, now, end)
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
@@ -305,11 +334,11 @@ def flown(
                 Leg(now, now, dynamics.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0)
             )
         for kick in kicks:
-            state = dynamics.kicked(state, kick)
+            state = light.halfway(dynamics, now).kicked(state, kick)
         if now == over:
             settled = state
         on = [pulses[index] for index in np.flatnonzero((starts <= now) & (end <= ends))]
-        path, following = dynamics.path(state, now, end, *_torques(on, now, end), most=allowed)
+        path, following = dynamics.path(state, now, end, *_torques(on, now, end), most=allowed, falling=falling)
         allowed -= path.steps
         completed, at_end = (
             int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
@@ -317,7 +346,7 @@ def flown(
         )
         legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
         state = following
-    return Flight(spacecraft, schedule, tuple(legs), settled, dynamics.moments, spans)
+    return Flight(spacecraft, schedule, tuple(legs), settled, light.first, spans)
 
 
 def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:

@@ -99,6 +99,18 @@ class Pulse:
                 return self.torque * (ramp.first + slope * (start - ramp.begin)), self.torque * slope
         return None
 
+    def share(self, times: Vector) -> Vector:
+        """Share of its impulse that it has given by each of the ``times`` (n,) s; an ideal impulse at once."""
+        if self.on_time == 0.0:
+            return np.where(times >= self.t, 1.0, 0.0)
+        if self.command is None:
+            return np.clip((times - self.start) / self.on_time, 0.0, 1.0)
+        given = np.zeros(len(times))
+        for ramp in self.command.ramps:
+            since = np.clip(times, ramp.begin, ramp.end) - ramp.begin
+            given += since * (ramp.first + 0.5 * (ramp.last - ramp.first) * since / (ramp.end - ramp.begin))
+        return given / self.on_time
+
     def moved(self, by: float) -> Pulse:
         """The same ``by`` s later."""
         command = self.command
@@ -270,6 +282,17 @@ class Schedule:
     def total_impulse(self) -> float:
         """Σ |J| in N m s."""
         return math.fsum(pulse.magnitude for pulse in self.pulses)
+
+    def used_by(self, times: Vector, *, at_once: bool = False) -> Vector:
+        """Propellant (n,) kg used by the ``times`` (n,) s, as far as it is known.
+
+        It flows as the thrust goes; ``at_once``: each pulse takes all of it at its centre.
+        """
+        used = np.zeros(len(times))
+        for pulse in self.pulses:
+            share = np.where(times >= pulse.t, 1.0, 0.0) if at_once else pulse.share(times)
+            used += (pulse.propellant or 0.0) * share
+        return used
 
     @property
     def propellant(self) -> float | None:

@@ -38,7 +38,7 @@ from nutdamp.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
 
-VALVES, COLD, BLOWDOWN = "valves", "cold pulses", "blowdown"
+VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
 """The `Spacecraft.thrust_laws` that there are."""
 
 
@@ -234,7 +234,8 @@ class Spacecraft(views.Data, views.Shown):
         """What makes the pulse of a command other than a rectangle of the thrust of the file, in words."""
         valves = any(channel.valve is not None for channel in self.channels)
         laws = (VALVES, valves), (COLD, self.cold is not None), (BLOWDOWN, self.tank is not None)
-        return tuple(name for name, holds in laws if holds)
+        lighter = self.tank is not None and self.tank.inertia_per_kg is not None
+        return tuple(name for name, holds in (*laws, (LIGHTER, lighter)) if holds)
 
     @property
     def rates(self) -> Vector:

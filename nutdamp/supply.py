@@ -9,8 +9,9 @@ from typing import Any
 
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.errors import Infeasible
+from nutdamp.lightening import lightened
 from nutdamp.schedule import Pulse, Schedule, on_command
-from nutdamp.spacecraft import BLOWDOWN, COLD, VALVES, Channel, Spacecraft
+from nutdamp.spacecraft import BLOWDOWN, COLD, LIGHTER, VALVES, Channel, Spacecraft, Tank
 
 
 class Supply:
@@ -33,9 +34,15 @@ class Supply:
         cold, tank = later.cold, later.tank
         return replace(
             later,
+            inertia=lightened(later, self.since),
             cold=None if cold is None else replace(cold, fired=dict(self.fired)),
             tank=None if tank is None else replace(tank, used=self.used),
         )
+
+    @property
+    def since(self) -> Any:
+        """What of it has been used since t = 0, kg."""
+        return self.used if self.spacecraft.tank is None else self.used - self.spacecraft.tank.used
 
     def level(self, channel: str) -> Any:
         """Thrust of the next pulse of ``channel``, over that of the file."""
@@ -103,8 +110,10 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
     """The body without one ``law`` of `Spacecraft.thrust_laws`, and what the commands of ``schedule`` give then."""
     if law == VALVES:
         body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
+    elif law == LIGHTER and spacecraft.tank is not None:
+        body = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
     else:
-        body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=None)
+        body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=_steady(spacecraft.tank))
     known = {channel.name: channel for channel in body.channels}
     fired = [
         on_command(known[pulse.channel], *pulse.loaded)
@@ -113,3 +122,8 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         for pulse in schedule
     ]
     return body, Schedule(supplied(body, fired))
+
+
+def _steady(tank: Tank | None) -> Tank | None:
+    """The tank with its pressure kept; None where nothing else is known of it."""
+    return None if tank is None or tank.inertia_per_kg is None else replace(tank, final_pressure=tank.pressure)

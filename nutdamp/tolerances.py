@@ -35,10 +35,12 @@ class Dispersions:
     relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes across the force) and
     ``position`` (m, each component) are by thruster too. The steerable torquer counts as the thruster
     `nutdamp.schedule.STEERABLE`. ``timing`` s shifts each pulse, ``timing_offset`` s the whole schedule; ``attitude``
-    rad tilts the spin axis at t = 0 about two axes across it. ``open_delay`` and ``close_delay`` s and ``impulse_bit``,
-    a relative one, are by thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is
-    off. ``sensor_bias`` (rad/s or m/s²) and the relative ``sensor_scale`` are of each gyro, or of the accelerometer, of
-    a loop, the relative ``sensor_noise`` and ``sensor_delay`` s of all its samples.
+    rad tilts the spin axis at t = 0 about two axes across it. ``open_delay``, ``close_delay``, ``rise_time`` and
+    ``fall_time`` s and ``impulse_bit``, a relative one, are by thruster and alike in all its pulses; ``cold`` is how
+    far the factor of a first cold pulse is off, ``cold_pulses`` how far their number; ``tank_…`` are those of the tank
+    (kg, Pa, a bare number), ``inertia_per_kg`` a relative one of all its moments alike. ``sensor_bias`` (rad/s or
+    m/s²) and the relative ``sensor_scale`` are of each gyro, or of the accelerometer, of a loop, the relative
+    ``sensor_noise`` and ``sensor_delay`` s of all its samples.
     """
 
     A: Tolerance | None = None
@@ -53,9 +55,17 @@ class Dispersions:
     attitude: Tolerance | None = None
     open_delay: Mapping[str, Tolerance] = field(default_factory=dict)
     close_delay: Mapping[str, Tolerance] = field(default_factory=dict)
+    rise_time: Mapping[str, Tolerance] = field(default_factory=dict)
+    fall_time: Mapping[str, Tolerance] = field(default_factory=dict)
     impulse_bit: Mapping[str, Tolerance] = field(default_factory=dict)
     cold: Tolerance | None = None
     sensor_bias: Tolerance | None = None
     sensor_scale: Tolerance | None = None
     sensor_noise: Tolerance | None = None
     sensor_delay: Tolerance | None = None
+    cold_pulses: Tolerance | None = None
+    tank_propellant: Tolerance | None = None
+    tank_pressure: Tolerance | None = None
+    tank_final_pressure: Tolerance | None = None
+    tank_exponent: Tolerance | None = None
+    inertia_per_kg: Tolerance | None = None

@@ -45,7 +45,7 @@ class Track:
 
 
 def make_track(
-    moments: tuple[float, float, float],
+    moments: Array,
     spin0: float,
     t: Array,
     rates: Array,
@@ -54,11 +54,11 @@ def make_track(
 ) -> Track:
     """Everything that follows from rates (n, 3) and attitude (n, 4) for a body with principal ``moments`` (kg m²).
 
-    The spin axis is the end of body axis 3 about which the body spins at t = 0, by the sign of ``spin0``. The cone
-    angles are those of each moment; with I1 ≠ I2 they swing, see `widest`.
+    These are (3,), or (n, 3) where they change. The spin axis is the end of body axis 3 about which the body spins at
+    t = 0, by the sign of ``spin0``. The cone angles are those of each moment; with I1 ≠ I2 they swing, see `widest`.
     """
     sense = math.copysign(1.0, spin0)
-    momentum = rates * np.asarray(moments)
+    momentum = rates * moments
     nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
     body_cone = np.arctan2(np.hypot(rates[:, 0], rates[:, 1]), sense * rates[:, 2])
     return Track(
@@ -74,11 +74,12 @@ def make_track(
     )
 
 
-def widest(track: Track, moments: tuple[float, float, float], spin0: float) -> Track:
+def widest(track: Track, moments: Array, spin0: float) -> Track:
     """The track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
-    if moments[0] == moments[1]:
+    if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
-    found = [arc_cones(moments, row, math.copysign(1.0, spin0)) for row in track.rates]
+    sense, rows = math.copysign(1.0, spin0), np.broadcast_to(moments, track.rates.shape).tolist()
+    found = [arc_cones((row[0], row[1], row[2]), rates, sense) for row, rates in zip(rows, track.rates, strict=True)]
     nutation, body_cone = np.array(found, dtype=float).reshape(-1, 2).T
     return replace(track, nutation=nutation, body_cone=body_cone, space_cone=nutation - body_cone)
 

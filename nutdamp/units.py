@@ -45,6 +45,7 @@ KINDS: dict[str, Kind] = {
     "force": Kind("a force", {"N": 1.0, "mN": 1e-3}),
     "torque": Kind("a torque", {"N m": 1.0, "mN m": 1e-3}),
     "inertia": Kind("a moment of inertia", {"kg m^2": 1.0}),
+    "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
     "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3}),

@@ -10,6 +10,7 @@ import numpy as np
 from nutdamp import basilisk, dop853, flight
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import Flight, Residual
+from nutdamp.lightening import shed
 from nutdamp.limits import commandable
 from nutdamp.physics import attitude, rates
 from nutdamp.physics.arc_cones import arc_cones
@@ -112,10 +113,10 @@ def verify(
     times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
     reference = judge.motion(times)
     methods = (
-        _closed_form(spacecraft, schedule, end, times, reference),
+        _closed_form(judge, end, times, reference),
         Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
-        _by_dop853(spacecraft, schedule, times, reference),
-        _by_basilisk(spacecraft, schedule, end),
+        _by_dop853(judge, times, reference),
+        _by_basilisk(judge, end),
     )
     momentum_drift, energy_drift = _conserved(judge)
     return Verification(
@@ -123,14 +124,13 @@ def verify(
     )
 
 
-def _closed_form(
-    spacecraft: Spacecraft, schedule: Schedule, end: float, times: Vector, reference: tuple[Vector, Vector]
-) -> Method:
+def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vector, Vector]) -> Method:
     """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
+    spacecraft, schedule = judge.spacecraft, judge.schedule
     arcs = flight.by_impulses(spacecraft, schedule, end)
     body, quaternion = arcs.motion(times)
     inertia = spacecraft.inertia
-    if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0:
+    if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0 and shed(spacecraft) is None:
         omega, spin = rates.impulse_sum(
             times,
             complex(spacecraft.omega0[0], spacecraft.omega0[1]),
@@ -144,59 +144,54 @@ def _closed_form(
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    return _method("impulse sum (17), arcs", spacecraft, arcs.residual, (body, quaternion), reference, between)
+    moments = judge.moments_at(times)
+    return _method("impulse sum (17), arcs", moments, arcs.residual, (body, quaternion), reference, between)
 
 
-def _by_dop853(spacecraft: Spacecraft, schedule: Schedule, times: Vector, reference: tuple[Vector, Vector]) -> Method:
+def _by_dop853(judge: Flight, times: Vector, reference: tuple[Vector, Vector]) -> Method:
     name = "DOP853, full tensor"
     try:
-        motion = dop853.integrate(spacecraft, schedule, times)
+        motion = dop853.integrate(judge.spacecraft, judge.schedule, times)
     except Infeasible as reason:
         return Method(name, missing=str(reason), outside=True)
-    return _compared(name, spacecraft, schedule, times, motion, reference)
+    return _compared(name, judge, times, motion, reference)
 
 
-def _by_basilisk(spacecraft: Spacecraft, schedule: Schedule, end: float) -> Method:
+def _by_basilisk(judge: Flight, end: float) -> Method:
     name = "Basilisk"
+    if shed(judge.spacecraft) is not None:
+        return Method(name, missing="it flies with constant moments, and those of the file fall", outside=True)
     try:
-        flown = basilisk.fly(spacecraft, schedule, end)
+        flown = basilisk.fly(judge.spacecraft, judge.schedule, end)
     except (MissingExtra, Infeasible) as reason:
         return Method(name, missing=str(reason), outside=True)
-    reference = flight.flown(spacecraft, schedule, end).motion(flown.t)
-    return _compared(name, spacecraft, schedule, flown.t, (flown.rates, flown.quaternion), reference)
+    return _compared(name, judge, flown.t, (flown.rates, flown.quaternion), judge.motion(flown.t))
 
 
 def _compared(
-    name: str,
-    spacecraft: Spacecraft,
-    schedule: Schedule,
-    times: Vector,
-    motion: tuple[Vector, Vector],
-    reference: tuple[Vector, Vector],
+    name: str, judge: Flight, times: Vector, motion: tuple[Vector, Vector], reference: tuple[Vector, Vector]
 ) -> Method:
     """A method that gives motion only: its residual is read at the first time after the last pulse."""
-    last = int(np.searchsorted(times, schedule.end - 1e-9))
-    moments = np.asarray(spacecraft.inertia.moments)
-    start = spacecraft.initial
-    before = attitude.rotate(start.quaternion, start.rates * moments)
-    after = attitude.rotate(motion[1][last], motion[0][last] * moments)
+    last = int(np.searchsorted(times, judge.schedule.end - 1e-9))
+    start = judge.spacecraft.initial
+    before = attitude.rotate(start.quaternion, start.rates * np.asarray(judge.moments))
+    after = attitude.rotate(motion[1][last], motion[0][last] * np.asarray(judge.last_moments))
     shift = float(attitude.angle_between(before, after))
-    left = arc_cones(spacecraft.inertia.moments, motion[0][last], math.copysign(1.0, spacecraft.spin))
+    left = arc_cones(judge.last_moments, motion[0][last], math.copysign(1.0, judge.spacecraft.spin))
     residual = Residual(left.nutation, left.body, left.space, shift, shift)
-    method = _method(name, spacecraft, residual, motion, reference, np.ones(len(times), dtype=bool))
+    method = _method(name, judge.moments_at(times), residual, motion, reference, np.ones(len(times), dtype=bool))
     return replace(method, outside=True)
 
 
 def _method(
     name: str,
-    spacecraft: Spacecraft,
+    moments: Vector,
     residual: Residual,
     motion: tuple[Vector, Vector],
     reference: tuple[Vector, Vector],
     rows: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
 ) -> Method:
-    """Largest differences between two motions over the ``rows`` compared."""
-    moments = np.asarray(spacecraft.inertia.moments)
+    """Largest differences between two motions over the ``rows`` compared; ``moments`` (3,) or of each row (n, 3)."""
     spin_axis = np.array([0.0, 0.0, 1.0])
     (body, turn), (other_body, other_turn) = motion, reference
     differences = (
@@ -212,13 +207,13 @@ def _method(
 
 def _conserved(flown: Flight) -> tuple[float, float]:
     """Largest relative change of |H| and of the energy along one coast."""
-    moments = np.asarray(flown.moments)
     firing = [pulse.thrust for pulse in flown.schedule]
     worst = [0.0, 0.0]
     for leg in flown.legs:
         if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
             continue
         body, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
+        moments = flown.moments_at(np.array([leg.start])).ravel()
         for index, value in enumerate((np.linalg.norm(body * moments, axis=1), body**2 @ moments)):
             worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
     return worst[0], worst[1]
@@ -265,7 +260,13 @@ def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     effective = flight.effective_impulses(spacecraft, schedule)
     return Schedule(
         tuple(
-            Pulse(pulse.t, 0.0, pulse.channel, np.array([impulse.real, impulse.imag, pulse.impulse[2]]))
+            Pulse(
+                pulse.t,
+                0.0,
+                pulse.channel,
+                np.array([impulse.real, impulse.imag, pulse.impulse[2]]),
+                propellant=pulse.propellant,
+            )
             for pulse, impulse in zip(schedule, effective, strict=True)
         )
     )

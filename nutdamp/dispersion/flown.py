@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion import sun_fired
-from nutdamp.dispersion.cases import DispersedCases, Model, Triple, rotated
+from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.elementwise import Cases, Triple, rotated
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dispersion.watched import number_of, watch_of
 from nutdamp.dynamics import Dynamics, make_dynamics
@@ -46,14 +47,16 @@ class RealWidths:
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
-            pulses = rigid_cases.Pulses(starts, np.array(self.model.on_times), impulses)
+            pulses = rigid_cases.Pulses(starts, np.array(self.model.on_times), impulses, sheds=_sheds(cases, count))
             if self.model.schedule.through_valves:
-                pulses = self._ramps(starts, impulses)
+                pulses = self._ramps(cases, starts, impulses)
             settled, turned = rigid_cases.fly(self._bodies(moments), rates, _upright(count), pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
+        shed = _sheds(cases, count)
+        last = moments if shed is None else moments - shed.sum(axis=0)
         if watch is not None:
-            watch.turn(self._bodies(moments), settled, turned, over)
-        momentum = _triple(moments * settled)
+            watch.turn(self._bodies(last), settled, turned, over)
+        momentum = _triple(last * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)
         return Ends(
@@ -64,7 +67,7 @@ class RealWidths:
             spin=settled[2],
             spin_change=settled[2] - rates[2],
             propellant=propellant,
-            nutation=None if cases.moments[0] is cases.moments[1] else largest_nutation(moments, momentum, sense),
+            nutation=None if np.array_equal(last[0], last[1]) else largest_nutation(last, momentum, sense),
             aspects=None if watch is None else watch.angles,
         )
 
@@ -90,25 +93,52 @@ class RealWidths:
         taken = np.array([pulse.propellant for pulse in self.model.schedule], dtype=float)
         return np.asarray(taken @ seen / taken.sum())
 
-    def _ramps(self, starts: Array, impulses: Array) -> rigid_cases.Pulses:
+    def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> rigid_cases.Pulses:
         """The pulses by the ramps of their thrust, each as one of its own; as in `rigid_cases.Pulses`."""
-        begins, lengths, parts, leans = [], [], [], []
-        schedule, on_times = self.model.schedule, self.model.on_times
-        for pulse, on_time, start, impulse in zip(schedule, on_times, starts, impulses, strict=True):
-            if pulse.command is None:
-                begins.append(start)
-                lengths.append(on_time)
-                parts.append(impulse)
-                leans.append(0.0)
+        count, sheds = starts.shape[1], _sheds(cases, starts.shape[1])
+        begins, lengths, parts, leans, falls = [], [], [], [], []
+
+        def add(begin: Array, length: Cases, impulse: Array, lean: Cases, number: int, share: Cases) -> None:
+            begins.append(begin)
+            lengths.append(np.broadcast_to(length, count))
+            parts.append(impulse)
+            leans.append(np.broadcast_to(lean, count))
+            falls.append(np.zeros((3, count)) if sheds is None else share * sheds[number])
+
+        for number, (pulse, on_time, start, impulse) in enumerate(
+            zip(self.model.schedule, self.model.on_times, starts, impulses, strict=True)
+        ):
+            ramps, thrust = None if pulse.command is None else pulse.command.ramps, cases.thrust[number]
+            if ramps is None:
+                add(start, on_time, impulse, 0.0, number, 1.0)
                 continue
-            for ramp in pulse.command.ramps:
-                begins.append(start + (ramp.begin - (pulse.t - 0.5 * on_time)))
-                lengths.append(ramp.end - ramp.begin)
-                parts.append(impulse * (ramp.impulse / pulse.on_time))
-                leans.append((ramp.last - ramp.first) / (ramp.last + ramp.first))
-        count = starts.shape[1]
-        starts, impulses = np.array(begins).reshape(-1, count), np.array(parts).reshape(-1, 3, count)
-        return rigid_cases.Pulses(starts, np.array(lengths), impulses, np.array(leans))
+            if not thrust:
+                for ramp in ramps:
+                    share, lean = ramp.impulse / pulse.on_time, (ramp.last - ramp.first) / (ramp.last + ramp.first)
+                    begin = start + (ramp.begin - (pulse.t - 0.5 * on_time))
+                    add(begin, ramp.end - ramp.begin, impulse * share, lean, number, share)
+                continue
+            command = start - cases.leads[number]
+            for one in thrust:
+                acts = one.opened.acts[0]
+                for begin, length, level, lean in one.opened.pieces:
+                    area = level * length
+                    part = area / np.where(acts == 0.0, 1.0, acts) / len(thrust)
+                    add(command + begin, length, _whole(one.torque, count) * area, lean, number, part)
+        return rigid_cases.Pulses(
+            np.array(begins).reshape(-1, count),
+            np.array(lengths).reshape(-1, count),
+            np.array(parts).reshape(-1, 3, count),
+            np.array(leans).reshape(-1, count),
+            None if sheds is None else np.array(falls).reshape(-1, 3, count),
+        )
+
+
+def _sheds(cases: DispersedCases, count: int) -> Array | None:
+    """What each pulse takes off the moments, (k, 3, n) kg m²; None where they stay."""
+    if cases.per_kg is None or cases.spent is None:
+        return None
+    return np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
 
 
 def _upright(count: int) -> Array:

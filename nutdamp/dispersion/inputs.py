@@ -10,10 +10,11 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from nutdamp.lightening import shed
 from nutdamp.loop_settings import ACCELEROMETER
 from nutdamp.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft import Spacecraft, Thruster
-from nutdamp.tolerances import Tolerance
+from nutdamp.tolerances import Dispersions, Tolerance
 
 SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
 """Standard deviation of each kind for a size of one."""
@@ -145,14 +146,10 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
         yield from _direction(name, tolerance, members)
     for name, tolerance in requested.position.items():
         yield from _position(name, tolerance, members)
-    for key in ("open_delay", "close_delay", "impulse_bit"):
+    for key in ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit"):
         for name, tolerance in getattr(requested, key).items():
             yield _valve(key, name, tolerance, members)
-    if requested.cold is not None:
-        cold = spacecraft.cold
-        known = cold is not None and bool(members)
-        why = "the file has no cold nozzles" if cold is None else "the schedule fires no thruster"
-        yield _input("cold", "cold", requested.cold, 1.0, "") if known else Unused("cold", why)
+    yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
     pulses = range(1, len(schedule) + 1)
     if requested.thrust_per_pulse is not None:
         named = [f"thrust pulse {number}" for number in pulses]
@@ -228,6 +225,27 @@ def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | Non
     else:
         for axis in "xyz":
             yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
+
+
+def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
+    """Tolerances of cold nozzles and of the tank; ``fires``: whether any thruster does."""
+    cold, tank = spacecraft.cold, spacecraft.tank
+    of_cold = {"cold": (1.0, ""), "cold_pulses": (0.0 if cold is None else cold.pulses, "")}
+    units = {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}
+    of_tank = {f"tank_{name}": (0.0 if tank is None else getattr(tank, name), unit) for name, unit in units.items()}
+    for key, (nominal, unit) in (of_cold | of_tank | {"inertia_per_kg": (1.0, "")}).items():
+        tolerance: Tolerance | None = getattr(requested, key)
+        if tolerance is None:
+            continue
+        name = key.replace("tank_", "tank ")
+        if (cold if key in of_cold else tank) is None:
+            yield Unused(name, f"the file has no {'cold nozzles' if key in of_cold else 'tank'}")
+        elif key == "inertia_per_kg" and shed(spacecraft) is None:
+            yield Unused(name, "the tank has no inertia_per_kg")
+        elif not fires:
+            yield Unused(name, "the schedule fires no thruster")
+        else:
+            yield _input(name, key, tolerance, nominal, unit)
 
 
 def _valve(key: str, name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:

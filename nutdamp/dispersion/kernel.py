@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.cases import TINY, Cases, DispersedCases, Model, Triple, plus, rotated, times
+from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.elementwise import TINY, Cases, Triple, plus, rotated, times
 from nutdamp.dispersion.watched import watch_of
 from nutdamp.physics import energy_sink
 from nutdamp.physics.axis_watch import AxisWatch
@@ -68,16 +69,15 @@ class ClosedForm:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end."""
-        on_times = self.model.on_times
         nodes = self._nodes
-        mixed = _out_of_order(cases.starts, on_times)
+        mixed = _out_of_order(cases.starts, cases.widths)
         growth = self.model.spacecraft.growth
         watch = self._watch(cases)
-        ends = _fly(cases, on_times, nodes, growth, watch)
+        ends = _fly(cases, nodes, growth, watch)
         if mixed is not None:
             # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
             again = None if watch is None else watch.anew(mixed)
-            others = _fly(*_reordered(cases, on_times, mixed), (max(nodes),) * len(nodes), growth, again)
+            others = _fly(_reordered(cases, mixed), (max(nodes),) * len(nodes), growth, again)
             ends = _replaced(ends, mixed, others)
         return ends if watch is None else replace(ends, aspects=watch.angles)
 
@@ -100,15 +100,14 @@ class ClosedForm:
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _fly(
-    cases: DispersedCases, on_times: Any, nodes: tuple[int, ...], growth: float, watch: AxisWatch | None = None
-) -> Ends:
-    """How cases end whose pulses stand in order; ``on_times`` and ``nodes`` by pulse, ``growth`` κ in 1/s.
+def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: AxisWatch | None = None) -> Ends:
+    """How cases end whose pulses stand in order; ``nodes`` by pulse, ``growth`` κ in 1/s.
 
     ``watch`` sees the motion, and one turn of the axis after the last pulse.
     """
     A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
+    sheds = cases.sheds
     x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
     spin = cases.omega0[2]
     z = C * spin
@@ -117,11 +116,11 @@ def _fly(
     now: Cases = 0.0
     turn: tuple[Cases, ...] | None = None
     for number, (start, impulse) in enumerate(zip(cases.starts, cases.impulses, strict=True)):
-        on_time = on_times[number]
+        on_time = cases.widths[number]
         centre = start + 0.5 * on_time
         coast = centre - now
         if watch is not None:
-            _show(watch, cases, (x, y, spin), turn, growth, coast)
+            _show(watch, (A, C), (x, y, spin), turn, growth, coast)
         turn = _turned_on(turn, (x, y, z), coast * per_A)
         if growth == 0.0:
             phase = phase + a * spin * coast
@@ -130,6 +129,9 @@ def _fly(
             phase = phase + a * spin * found.turned
             x, y, spin = x * found.transverse, y * found.transverse, spin * found.axial
             z = C * spin
+        if sheds is not None:  # half before the pulse and half after it, the rates as they are
+            x, y, A, C = _lighter(x, y, A, C, 0.5, sheds[number])
+            a, z = 1.0 - C / A, C * spin
         along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number], growth)
         cosine, sine = cos_sin(phase)
         x = x + along * cosine - across * sine
@@ -137,9 +139,12 @@ def _fly(
         if not (isinstance(gained, float) and gained == 0.0):
             spin = spin + gained / C
             z = C * spin
+        if sheds is not None:
+            x, y, A, C = _lighter(x, y, A, C, 0.5, sheds[number])
+            a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin
         now = centre
     if watch is not None:
-        _show(watch, cases, (x, y, spin), turn, growth)
+        _show(watch, (A, C), (x, y, spin), turn, growth)
     after = (x, y, z) if turn is None else carried(turn, (x, y, z))
     return Ends(
         momentum=(x, y, z),
@@ -154,7 +159,7 @@ def _fly(
 
 def _show(
     watch: AxisWatch,
-    cases: DispersedCases,
+    moments: tuple[Cases, Cases],
     motion: Triple,
     turn: tuple[Cases, ...] | None,
     growth: float,
@@ -162,21 +167,29 @@ def _show(
 ) -> None:
     """Show a ``coast`` (s) to a ``watch``, by default one turn of the axis about H.
 
-    ``motion``: AΩ1, AΩ2 and ω3 in the frame that turns with the nutation and ``turn`` in space: its third axis is that
-    of the body, and more of the body is not looked at.
+    ``moments``: A and C. ``motion``: AΩ1, AΩ2 and ω3 in the frame that turns with the nutation and ``turn`` in space:
+    its third axis is that of the body, and more of the body is not looked at.
     """
     count = watch.count
 
     def rows(*values: Cases) -> Any:
         return np.array([np.broadcast_to(np.asarray(value, dtype=float), count) for value in values])
 
-    (x, y, spin), A = motion, cases.A
-    bodies = Bodies(rows(A, A, cases.C), np.zeros(3), Forcing(growth=growth))
+    (x, y, spin), (A, C) = motion, moments
+    bodies = Bodies(rows(A, A, C), np.zeros(3), Forcing(growth=growth))
     rates, quaternion, now = rows(x / A, y / A, spin), rows(*(turn or (1.0, 0.0, 0.0, 0.0))), np.zeros(count)
     if coast is None:
         watch.turn(bodies, rates, quaternion, now)
     else:
         watch.motion(bodies, rates, quaternion, now, rows(coast)[0], None)
+
+
+def _lighter(
+    x: Cases, y: Cases, A: Cases, C: Cases, share: float, sheds: tuple[Cases, Cases]
+) -> tuple[Cases, Cases, Cases, Cases]:
+    """AΩ1, AΩ2, A and C with a ``share`` of ``sheds`` off A and C, which leaves the rates as they are."""
+    less = A - share * sheds[0]
+    return x * (less / A), y * (less / A), less, C - share * sheds[1]
 
 
 def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
@@ -298,7 +311,7 @@ def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
     return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
 
 
-def _out_of_order(starts: tuple[Cases, ...], on_times: tuple[float, ...]) -> NDArray[np.intp] | None:
+def _out_of_order(starts: tuple[Cases, ...], on_times: tuple[Cases, ...]) -> NDArray[np.intp] | None:
     """Rows of the cases in which a pulse comes before one that is planned earlier; None where there are none."""
     centres = [start + 0.5 * on_time for start, on_time in zip(starts, on_times, strict=True)]
     mixed: Any = False
@@ -310,33 +323,39 @@ def _out_of_order(starts: tuple[Cases, ...], on_times: tuple[float, ...]) -> NDA
     return rows if len(rows) else None
 
 
-def _reordered(
-    cases: DispersedCases, on_times: tuple[float, ...], rows: NDArray[np.intp]
-) -> tuple[DispersedCases, Any]:
-    """The ``rows`` of ``cases`` with the pulses of each in the order of their centres, and their on-times."""
+def _reordered(cases: DispersedCases, rows: NDArray[np.intp]) -> DispersedCases:
+    """The ``rows`` of ``cases`` with the pulses of each in the order of their centres."""
 
     def taken(value: Cases) -> Any:
         return value[rows] if np.ndim(value) else np.full(len(rows), value)
 
     starts = np.array([taken(start) for start in cases.starts])
-    widths = np.array([np.full(len(rows), on_time) for on_time in on_times])
+    widths = np.array([taken(width) for width in cases.widths])
     impulses = np.array([[taken(part) for part in impulse] for impulse in cases.impulses])
-    order = np.argsort(np.real(starts) + 0.5 * widths, axis=0, kind="stable")
+    order = np.argsort(np.real(starts + 0.5 * widths), axis=0, kind="stable")
     starts, widths = np.take_along_axis(starts, order, 0), np.take_along_axis(widths, order, 0)
     impulses = np.take_along_axis(impulses, order[:, None, :], 0)
     first, second, third = (taken(moment) for moment in cases.moments)
     one, two, three = (taken(rate) for rate in cases.omega0)
-    return (
-        DispersedCases(
-            moments=(first, first if cases.moments[0] is cases.moments[1] else second, third),
-            omega0=(one, two, three),
-            starts=tuple(starts),
-            impulses=tuple((impulse[0], impulse[1], impulse[2]) for impulse in impulses),
-            tilt=(taken(cases.tilt[0]), taken(cases.tilt[1])),
-            propellant=None if cases.propellant is None else taken(cases.propellant),
-        ),
-        widths,
+    spent = None
+    if cases.spent is not None:
+        spent = tuple(np.take_along_axis(np.array([taken(one) for one in cases.spent]).reshape(starts.shape), order, 0))
+    return replace(
+        cases,
+        moments=(first, first if cases.moments[0] is cases.moments[1] else second, third),
+        omega0=(one, two, three),
+        starts=tuple(starts),
+        widths=tuple(widths),
+        impulses=tuple((impulse[0], impulse[1], impulse[2]) for impulse in impulses),
+        tilt=(taken(cases.tilt[0]), taken(cases.tilt[1])),
+        spent=spent,
+        per_kg=None if cases.per_kg is None else _triple([taken(part) for part in cases.per_kg]),
     )
+
+
+def _triple(parts: list[Any]) -> Triple:
+    first, second, third = parts
+    return first, second, third
 
 
 def _replaced(ends: Ends, rows: NDArray[np.intp], others: Ends) -> Ends:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.cases import Cases, Model, Triple
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.elementwise import Cases, Triple
 from nutdamp.dispersion.kernel import Ends
 
 Array = NDArray[np.float64]

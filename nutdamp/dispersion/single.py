@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import flight
-from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.cases import Model, Thrusting
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.physics import attitude
-from nutdamp.schedule import Pulse, Schedule
+from nutdamp.schedule import Command, Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Spacecraft
 
 Array = NDArray[np.float64]
@@ -21,28 +21,57 @@ Array = NDArray[np.float64]
 def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
     body, case = model.spacecraft, RealWidths(model).timed(model.cases(draws))
-    pulses = []
-    for planned, width, start, parts in zip(model.schedule, model.on_times, case.starts, case.impulses, strict=True):
-        impulse = np.array(parts, dtype=float).reshape(3)
+    pulses, spent = [], case.spent or (None,) * len(case.starts)
+    for number, (planned, used) in enumerate(zip(model.schedule, spent, strict=True)):
+        width, start = case.widths[number], case.starts[number]
+        impulse = np.array(case.impulses[number], dtype=float).reshape(3)
         torque = None if planned.on_time == 0.0 else impulse / planned.on_time
-        t = float(np.squeeze(start)) + 0.5 * width
-        if planned.command is not None:
-            pulses.append(replace(planned.moved(t - planned.t), impulse=impulse, torque=torque))
+        propellant = None if used is None else float(np.squeeze(used))
+        t = float(np.squeeze(start + 0.5 * width))
+        if case.thrust[number]:
+            begin = float(np.squeeze(start - case.leads[number]))
+            pulses += [
+                _thrusting(planned, begin, one, propellant, len(case.thrust[number])) for one in case.thrust[number]
+            ]
+        elif planned.command is not None:
+            moved = planned.moved(t - planned.t)
+            pulses.append(replace(moved, impulse=impulse, torque=torque, propellant=propellant))
         else:
-            pulses.append(Pulse(t, planned.on_time, planned.channel, impulse, torque))
+            pulses.append(Pulse(t, planned.on_time, planned.channel, impulse, torque, propellant=propellant))
     tilt = np.array([*case.tilt, 0.0], dtype=float)
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])
     axes = body.inertia.axes
     quaternion = attitude.multiply(attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T))
     first, second, third = (float(moment) for moment in case.moments)
+    per_kg = None
+    if case.per_kg is not None:
+        one, two, three = (float(np.squeeze(part)) for part in case.per_kg)
+        per_kg = one, two, three
     true = replace(
         body,
         inertia=replace(body.inertia, moments=(first, second, third)),
         omega0=np.array(case.omega0, dtype=float),
         attitude=Attitude(quaternion),
+        tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
     )
     return true, Schedule(tuple(pulses))
+
+
+def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int) -> Pulse:
+    """What one of ``count`` thrusters gives of a pulse, as a pulse of its own; its command begins at ``start`` s."""
+    from nutdamp.physics.valve import Ramp  # few spacecraft have any
+
+    acts, centroid, _ = (float(np.squeeze(part)) for part in one.opened.acts)
+    ramps = []
+    for begin, length, level, lean in (tuple(float(np.squeeze(part)) for part in piece) for piece in one.opened.pieces):
+        if start + begin + length > start + begin:
+            ramps.append(Ramp(start + begin, start + begin + length, level * (1.0 - lean), level * (1.0 + lean)))
+    torque = np.array([float(np.squeeze(part)) for part in one.torque])
+    assert planned.command is not None
+    command = Command(start, planned.command.on_time, tuple(ramps))
+    used = None if propellant is None else propellant / count
+    return Pulse(start + centroid, acts, planned.channel, acts * torque, torque, propellant=used, command=command)
 
 
 def flown_outputs(model: Model, draws: Draws) -> Array:
@@ -50,7 +79,7 @@ def flown_outputs(model: Model, draws: Draws) -> Array:
     true, schedule = realised(model, draws)
     made = flight.flown(true, schedule)
     settled, left = made.settled, made.residual
-    momentum = attitude.rotate(settled.quaternion, settled.rates * np.asarray(made.moments))
+    momentum = attitude.rotate(settled.quaternion, settled.rates * np.asarray(made.last_moments))
     target = attitude.rotate(model.spacecraft.initial.quaternion, model.target)
     propellant = model.cases(draws).propellant
     return np.array(

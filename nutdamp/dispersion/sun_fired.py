@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.cases import DispersedCases, Model, Thrusting
 from nutdamp.dispersion.watched import in_body
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid_cases import Bodies
-from nutdamp.physics.sun_clock import Stretch, SunClock
+from nutdamp.physics.sun_clock import Push, Stretch, SunClock
+from nutdamp.schedule import Pulse
 
 Array = NDArray[np.float64]
 
@@ -49,36 +52,62 @@ def fly(
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     over = np.zeros(count)
     rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    pulses, shifts, leads, ramps = model.schedule.pulses, [], [], []
-    for pulse, width, start in zip(pulses, model.on_times, cases.starts, strict=True):
-        begins = pulse.start if pulse.command is None else pulse.t - 0.5 * width
-        shifts.append(start - begins)
-        leads.append(begins - pulse.loaded[0])
-        thrust = None if pulse.command is None else pulse.command.ramps
-        back = -pulse.loaded[0]
-        ramps.append(thrust and [one._replace(begin=one.begin + back, end=one.end + back) for one in thrust])
+    pulses, shifts = model.schedule.pulses, []
+    for pulse, start, lead in zip(pulses, cases.starts, cases.leads, strict=True):
+        shifts.append(start - lead - pulse.loaded[0])
     for begin in range(0, count, rigid_cases.BLOCK):
         rows = slice(begin, min(begin + rigid_cases.BLOCK, count))
 
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
 
-        start = Stretch(np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
+        start = Stretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
         sense = math.copysign(1.0, body.spin)
-        clock = SunClock(bodies.some(rows), start, sun[:, rows], sense, body.sun_sensor.azimuth)
+        clock = SunClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
         for index, (block, number) in enumerate(commanded):
-            impulse, found = np.array([part(one) for one in cases.impulses[index]]), clock.sun_pulse(number)
+            found = clock.sun_pulse(number)
             seen[index, rows] = body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
-            torque = np.where(seen[index, rows], impulse, 0.0) / (pulses[index].on_time or 1.0)
-            delay = block.delay + part(shifts[index])
-            starts[index, rows] = clock.fire(found, delay, block.width, torque, ramps[index]) + leads[index]
+            impulse = np.where(seen[index, rows], np.array([part(one) for one in cases.impulses[index]]), 0.0)
+            if cases.thrust[index]:
+                pushes = _pushes(cases.thrust[index], seen[index, rows], part)
+            else:
+                pushes = _as_planned(pulses[index], impulse)
+            sheds = None
+            if cases.per_kg is not None and cases.spent is not None:
+                sheds = np.array([part(one * cases.spent[index]) * seen[index, rows] for one in cases.per_kg])
+            fired = clock.fire(found, block.delay + part(shifts[index]), block.width, pushes, sheds)
+            starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:
                     lasts = end - here.since
-                    watch.some(rows).motion(clock.bodies, here.rates, here.quaternion, here.since, lasts, *here[3:])
+                    watch.some(rows).motion(here.bodies, here.rates, here.quaternion, here.since, lasts, *here[4:])
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
     return Fired(rates, quaternion, starts, seen, over)
+
+
+def _as_planned(pulse: Pulse, impulse: Array) -> list[Push]:
+    """The torques (3, n) N m of a pulse of this ``impulse`` (3, n) N m s that has the shape of the planned one."""
+    torque = impulse / (pulse.on_time or 1.0)
+    if pulse.command is None:
+        return [Push(0.0, pulse.on_time, torque, torque)]
+    back, ramps = pulse.command.start, pulse.command.ramps
+    return [Push(one.begin - back, one.end - back, torque * one.first, torque * one.last) for one in ramps]
+
+
+def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:
+    """The torques of thrusters through valves of their own, together, from one corner of any of them to the next."""
+    torques = [np.array([part(one) for one in each.torque]) * seen for each in thrust]
+    corners = [[part(corner) for corner in each.opened.corners] for each in thrust]
+    edges = np.sort(np.array(corners).reshape(-1, len(seen)), axis=0)
+    found = []
+    for begin, end in pairwise(edges):
+        middle, first, last = 0.5 * (begin + end), np.zeros_like(torques[0]), np.zeros_like(torques[0])
+        for each, torque in zip(thrust, torques, strict=True):
+            first = first + torque * part(each.opened.within(middle, begin))
+            last = last + torque * part(each.opened.within(middle, end))
+        found.append(Push(begin, end, first, last))
+    return found
 
 
 def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:

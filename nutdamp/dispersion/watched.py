@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dispersion.cases import DispersedCases, Model, rotated
+from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.elementwise import rotated
 from nutdamp.physics import attitude
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.spacecraft import Vector
@@ -29,5 +30,5 @@ def in_body(model: Model, cases: DispersedCases, count: int, direction: Vector) 
 
 def number_of(cases: DispersedCases) -> int:
     """How many cases there are."""
-    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt)
+    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt, *(cases.spent or ()), *(cases.per_kg or ()))
     return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))

@@ -32,19 +32,29 @@ QUANTITIES = {
     "attitude": "angle",
     "open_delay": "time",
     "close_delay": "time",
+    "rise_time": "time",
+    "fall_time": "time",
     "impulse_bit": "ratio",
     "cold": "ratio",
     "sensor_bias": READING,
     "sensor_scale": "ratio",
     "sensor_noise": "ratio",
     "sensor_delay": "time",
+    "cold_pulses": "ratio",
+    "tank_propellant": "mass",
+    "tank_pressure": "pressure",
+    "tank_final_pressure": "pressure",
+    "tank_exponent": "ratio",
+    "inertia_per_kg": "ratio",
 }
 """The keys of dispersions with the kind of quantity that they hold."""
 
-RELATIVE = ("inertia", "rate", "force", "ratio")
+RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
-BY_THRUSTER = ("thrust", "thrust_direction", "position", "open_delay", "close_delay", "impulse_bit")
+VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
+
+BY_THRUSTER = ("thrust", "thrust_direction", "position", *VALVE_TIMES, "impulse_bit")
 """The keys that hold one tolerance for all thrusters, or one by name."""
 
 ALL = ""
@@ -203,6 +213,16 @@ class DispersionsSection(Section):
         description="Of each valve's close_delay, the same in all its pulses, s; or by name.",
         examples=[{"normal": "1 ms"}],
     )
+    rise_time: Annotated[_ByThruster, _Alike("rise_time")] | None = Field(
+        default=None,
+        description="Of each valve's rise_time, the same in all its pulses, s; or by name.",
+        examples=[{"normal": "0.5 ms"}],
+    )
+    fall_time: Annotated[_ByThruster, _Alike("fall_time")] | None = Field(
+        default=None,
+        description="Of each valve's fall_time, the same in all its pulses, s; or by name.",
+        examples=[{"normal": "1 ms"}],
+    )
     impulse_bit: Annotated[_ByThruster, _Alike("impulse_bit")] | None = Field(
         default=None,
         description="Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.",
@@ -230,6 +250,36 @@ class DispersionsSection(Section):
         default=None,
         description="Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.",
         examples=[{"uniform": "2 ms"}],
+    )
+    cold_pulses: Annotated[ToleranceSection, _Alike("cold_pulses")] | None = Field(
+        default=None,
+        description="Of the number of pulses over which nozzles warm up, in %.",
+        examples=[{"normal": "10 %"}],
+    )
+    tank_propellant: Annotated[ToleranceSection, _Alike("tank_propellant")] | None = Field(
+        default=None,
+        description="Of the propellant in the tank at t = 0, kg or %.",
+        examples=[{"normal": "1 %"}],
+    )
+    tank_pressure: Annotated[ToleranceSection, _Alike("tank_pressure")] | None = Field(
+        default=None,
+        description="Of the pressure at t = 0, for which the file gives the thrust, Pa or %.",
+        examples=[{"normal": "0.2 bar"}],
+    )
+    tank_final_pressure: Annotated[ToleranceSection, _Alike("tank_final_pressure")] | None = Field(
+        default=None,
+        description="Of the pressure with nothing left, Pa or %.",
+        examples=[{"normal": "0.2 bar"}],
+    )
+    tank_exponent: Annotated[ToleranceSection, _Alike("tank_exponent")] | None = Field(
+        default=None,
+        description="Of the power of the pressure that the thrust goes with, in %.",
+        examples=[{"normal": "5 %"}],
+    )
+    inertia_per_kg: Annotated[ToleranceSection, _Alike("inertia_per_kg")] | None = Field(
+        default=None,
+        description="Of what each kg that is used takes off the moments of inertia, of all alike, in %.",
+        examples=[{"normal": "10 %"}],
     )
 
 
@@ -277,12 +327,20 @@ def dispersions(
         attitude=one("attitude"),
         open_delay=each("open_delay"),
         close_delay=each("close_delay"),
+        rise_time=each("rise_time"),
+        fall_time=each("fall_time"),
         impulse_bit=each("impulse_bit"),
         cold=one("cold"),
         sensor_bias=one("sensor_bias"),
         sensor_scale=one("sensor_scale"),
         sensor_noise=one("sensor_noise"),
         sensor_delay=one("sensor_delay"),
+        cold_pulses=one("cold_pulses"),
+        tank_propellant=one("tank_propellant"),
+        tank_pressure=one("tank_pressure"),
+        tank_final_pressure=one("tank_final_pressure"),
+        tank_exponent=one("tank_exponent"),
+        inertia_per_kg=one("inertia_per_kg"),
     )
 
 

@@ -10,7 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.files.dispersion_models import BY_THRUSTER, QUANTITIES, READING, by_name, size_of, thrust_behind
+from nutdamp.files.dispersion_models import (
+    BY_THRUSTER,
+    QUANTITIES,
+    READING,
+    VALVE_TIMES,
+    by_name,
+    size_of,
+    thrust_behind,
+)
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.fields import RIGHT_ANGLE
 from nutdamp.files.rules import symmetric, tensor_fault, tensor_of
@@ -19,6 +27,7 @@ from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
 from nutdamp.tolerances import KINDS
+from nutdamp.units import KINDS as KINDS_OF
 from nutdamp.units import shown
 
 LARGEST_SIGMA = 0.5
@@ -50,6 +59,62 @@ def dispersion_findings(root: Node) -> Iterator[Finding]:
         yield from _kinds(facts, entry)
     yield from _shifted_moments(facts)
     yield from _of_sensor(facts)
+    yield from _below_zero(facts)
+
+
+def _below_zero(facts: Facts) -> Iterator[Finding]:
+    """Times of valves and numbers of the tank that draws would turn negative."""
+    for key in VALVE_TIMES:
+        for path in _each(facts, key):
+            for name, nominal in _valve_times(facts, key, path[2:]).items():
+                size = _size_of(facts, path, "time")
+                if size is not None and size[1] > (1.0 + 1e-12) * nominal:
+                    yield _negative(path, size, f"the {key} of {name}, {nominal:g} s")
+                    break
+    for key in ("tank_propellant", "tank_pressure", "tank_final_pressure"):
+        nominal_, path_ = facts.number(QUANTITIES[key], "tank", key.removeprefix("tank_")), ("dispersions", key)
+        size = _size_of(facts, path_, QUANTITIES[key]) if nominal_ is not None else None
+        if size is not None and nominal_ is not None and size[1] > nominal_:
+            yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {nominal_:g} {KINDS_OF[QUANTITIES[key]].si}")
+
+
+def _negative(path: KeyPath, size: tuple[str, float], of: str) -> Finding:
+    reach = "draws beyond three sigma" if size[0] == "normal" else "draws"
+    problem = f"{reach} would make {of}, negative; expected a smaller spread, or a larger nominal value"
+    return Finding((*path, size[0]), problem)
+
+
+def _each(facts: Facts, key: str) -> list[KeyPath]:
+    """Where the tolerances of ``key`` are: one, or one a thruster."""
+    path: KeyPath = ("dispersions", key)
+    node = facts.root.get(*path)
+    if node is None or not isinstance(node.value, dict):
+        return []
+    return [(*path, name) for name, _ in node.children()] if by_name(node.value) else [path]
+
+
+def _size_of(facts: Facts, path: KeyPath, kind: str) -> tuple[str, float] | None:
+    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``."""
+    for name in KINDS:
+        size = facts.number(kind, *path, name)
+        if size is not None:
+            return name, -size if name == "bias" else 3.0 * size if name == "normal" else size
+    return None
+
+
+def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
+    """The time of ``key`` of the valve of each thruster that a tolerance concerns, s."""
+    found = {}
+    for index, _ in facts.children("thrusters"):
+        path: KeyPath = ("thrusters", index)
+        name = facts.text(*path, "name")
+        valve: KeyPath = (*path, "valve") if facts.has(*path, "valve") else ("valve",)
+        if name is None or facts.has(*path, "impulse_bit") or not facts.has(*valve) or (named and named[0] != name):
+            continue
+        time = facts.number("time", *valve, key) if facts.has(*valve, key) else 0.0
+        if time is not None:
+            found[name] = time
+    return found
 
 
 def _probability(facts: Facts) -> Iterator[Finding]:
@@ -86,7 +151,7 @@ def _entries(facts: Facts) -> Iterator[Entry]:
 def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
     """The value that a tolerance is compared with, and what it is; None where it cannot be read, or nothing bounds."""
     if key in ("A", "C"):
-        moments = _moments(facts)
+        moments = moments_of(facts)
         return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
     if key == "omega0":
         return _spin(facts), "the spin"
@@ -95,7 +160,7 @@ def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
     return (RIGHT_ANGLE, "a right angle") if QUANTITIES[key] == "angle" else (None, "")
 
 
-def _moments(facts: Facts) -> tuple[float, float, float] | None:
+def moments_of(facts: Facts) -> tuple[float, float, float] | None:
     """Principal moments in kg m², the one about the spin axis last; None where they cannot be read."""
     tensor = tensor_of(facts)
     if tensor is not None:
@@ -165,6 +230,8 @@ def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
 def _example(kind: str) -> str:
     sizes = {
         "inertia": "2 %",
+        "mass": "1 %",
+        "pressure": "2 %",
         "rate": "0.1 deg/s",
         "force": "3 %",
         "ratio": "1 %",
@@ -212,7 +279,7 @@ def _without_thrust(facts: Facts, entry: Entry) -> str | None:
 
 def _shifted_moments(facts: Facts) -> Iterator[Finding]:
     """Fixed offsets of A and C that make a body no body: every draw would be refused."""
-    moments = _moments(facts)
+    moments = moments_of(facts)
     if moments is None:
         return
     wider = _offset(facts, "A", 0.5 * (moments[0] + moments[1]))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from nutdamp.files.dispersion_models import VALVE_TIMES
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.rules import inertia_of, spin_of
-from nutdamp.files.thrust_rules import VALVE_TIMES
 from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.physics.cones import momentary
 from nutdamp.units import KINDS

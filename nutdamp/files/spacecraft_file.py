@@ -176,7 +176,13 @@ def _tank(section: TankSection | None) -> Tank | None:
     if section is None:
         return None
     isp = None if section.isp is None else tuple((pressure, value) for pressure, value in section.isp)
-    return Tank(section.propellant, section.pressure, section.final_pressure, section.exponent, isp)
+    shed = section.inertia_per_kg
+    per_kg = None
+    if shed is not None and any(rows := shed if isinstance(shed, list) else [shed.A, shed.A, shed.C]):
+        per_kg = rows[0], rows[1], rows[2]
+    return Tank(
+        section.propellant, section.pressure, section.final_pressure, section.exponent, isp, inertia_per_kg=per_kg
+    )
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:

@@ -11,6 +11,8 @@ from nutdamp.files.sections import Field, Length, Section
 Pressure = Annotated[float, Quantity("pressure", exclusiveMinimum=0)]
 Impulse = Annotated[float, Quantity("impulse", exclusiveMinimum=0)]
 
+Shed = Annotated[float, Quantity("shed", minimum=0)]
+
 ImpulseBits = Annotated[list[tuple[PositiveTime, Impulse, PositiveTime]], Length(2)]
 """Rows of on-time, impulse and centroid."""
 
@@ -38,6 +40,13 @@ class ValveSection(Section):
     )
 
 
+class ShedSection(Section):
+    """What the propellant in the tank gives to the moments of inertia."""
+
+    A: Shed = Field(description="Off the transverse moment for each kg used, kg m²/kg.", examples=["0.4 kg m^2/kg"])
+    C: Shed = Field(description="Off the moment about axis 3 for each kg used, kg m²/kg.", examples=["0.6 kg m^2/kg"])
+
+
 class TankSection(Section):
     """A tank in blowdown: the gas expands as the propellant is used, and pressure and thrust fall."""
 
@@ -54,6 +63,12 @@ class TankSection(Section):
         description="Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; it runs "
         "evenly between them, and below the first it is that of the first.",
         examples=[[["8 bar", "215 s"], ["22 bar", "228 s"]]],
+    )
+    inertia_per_kg: Annotated[list[Shed], Length(3, 3)] | ShedSection | None = Field(
+        default=None,
+        description="What each kg that is used takes off the moments of inertia, kg m²/kg: A and C, or a list of the "
+        "three principal moments, the one about axis 3 last. Default: they stay.",
+        examples=[{"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"}],
     )
 
 

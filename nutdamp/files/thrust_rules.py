@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from nutdamp.files.dispersion_rules import thrusts
+import numpy as np
+
+from nutdamp.files.dispersion_models import VALVE_TIMES
+from nutdamp.files.dispersion_rules import moments_of, thrusts
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.yaml_tree import KeyPath, Node
-
-VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
 
 THRUST_KEYS = ("valve", "cold", "tank")
 """At the root of the file."""
@@ -132,6 +133,8 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
     if full is not None and known and not min(known) <= full <= max(known):
         problem = f"{min(known):g} Pa to {max(known):g} Pa leave out the pressure at t = 0, {full:g} Pa; add a row"
         yield Finding(("tank", "isp"), problem)
+    if propellant is not None and facts.has("tank", "inertia_per_kg"):
+        yield from _emptied(facts, propellant)
     for index, _ in facts.children("thrusters"):
         name = facts.text("thrusters", index, "name") or ""
         if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):
@@ -140,6 +143,27 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
         if named.get(name, 0.0) is None and not facts.has("thrusters", index, "force"):
             problem = "missing; tank needs to know the propellant that is used, and so the thrust"
             yield Finding(("thrusters", index, "lever_arm"), problem)
+
+
+def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
+    """Moments of inertia that no body can have once all ``propellant`` kg are used."""
+    path: KeyPath = ("tank", "inertia_per_kg")
+    moments, rows = moments_of(facts), facts.vector("shed", 3, *path)
+    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
+    if rows is None and transverse is not None and axial is not None:
+        rows = np.array([transverse, transverse, axial])
+    if moments is None or rows is None or rows.min() < 0.0:
+        return  # what cannot be read, or is out of range, is said already
+    empty = np.asarray(moments) - propellant * rows
+    values = ", ".join(f"{moment:.4g}" for moment in empty)
+    least, middle, largest = np.sort(empty).tolist()
+    if least <= 0.0:
+        worst = int(np.argmax(rows / moments))
+        most = f"expected less than {moments[worst] / propellant:.4g} kg m^2/kg of the moment {moments[worst]:g} kg m^2"
+        yield Finding(path, f"leaves {values} kg m^2 once {propellant:g} kg are used, all must be above 0; {most}")
+    elif largest > (least + middle) * (1.0 + 1e-9):
+        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the largest exceeds the sum of the others"
+        yield Finding(path, f"{problem}, which no body has; expected less off the smaller ones, or more off it")
 
 
 def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
+from nutdamp.lightening import shed
 from nutdamp.limits import commandable
 from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
 from nutdamp.loop.law import ComplexArray, Firing, Law
@@ -69,6 +70,8 @@ class Pilot:
     def __init__(
         self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
     ) -> None:
+        if shed(truth) is not None:
+            raise Infeasible("the loop flies with constant moments of inertia; leave tank.inertia_per_kg out")
         self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
         self.diagnosis = Diagnosis(law.period)
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)

@@ -103,7 +103,7 @@ def largest_since(run: Run) -> tuple[float, float]:
     if run.settled is None:
         rates = made.motion(np.array([run.until]))[0][0]
         return arc_cones(made.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
-    track = widest(made.sampled(ROWS, run.until), made.moments, run.spacecraft.spin)
+    track = widest(made.sampled(ROWS, run.until), np.asarray(made.moments), run.spacecraft.spin)
     later = track.t >= run.settled
     most = float(track.nutation[later].max())
     row = int(np.argmax(later & (track.nutation >= most * (1.0 - 1e-9))))  # not where rounding has its largest

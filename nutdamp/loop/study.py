@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from nutdamp import compliance
 from nutdamp.compliance import Left
 from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.cases import rotated
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
+from nutdamp.dispersion.elementwise import rotated
 from nutdamp.dispersion.kernel import carried
 from nutdamp.dispersion.outputs import angle
 from nutdamp.dispersion.statistics import Exact, Worst

@@ -13,7 +13,7 @@ from nutdamp.dynamics import Dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.loop.run import SEED, Run, fly
 from nutdamp.motion import Path
-from nutdamp.physics.rigid import NOTHING
+from nutdamp.physics.rigid import NOTHING, Falling
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 AGREE = 1e-6
@@ -52,6 +52,7 @@ class _Independent(Dynamics):
         torques: Sequence[Vector],
         slope: Vector | None,
         most: int,  # noqa: ARG002 - of steps
+        falling: Falling | None,  # noqa: ARG002 - no loop is flown with moments that fall
     ) -> tuple[Path, SpinState]:
         first = self.equations.state(state)
         if end <= start:

@@ -39,6 +39,16 @@ REMAINDER = 2.0**-53
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
 
 
+class Falling(NamedTuple):
+    """Principal moments that change: ``rate`` (3,) kg m²/s as an integration starts, and its own, (3,) kg m²/s².
+
+    What leaves the body takes along the angular momentum that it has there: I dω/dt = M - ω × (I ω), I as it falls.
+    """
+
+    rate: Array
+    growth: Array
+
+
 class Forcing(NamedTuple):
     """What acts on a body besides a constant torque.
 
@@ -88,12 +98,13 @@ def integrate(
     forcing: Forcing = NOTHING,
     most: int = MOST_STEPS,
     slope: Array | None = None,
+    falling: Falling | None = None,
 ) -> list[Piece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    With a ``slope`` (3,) N m/s the torque is that at ``start`` and runs evenly from there. Raises Infeasible for
-    motions over more than `LONGEST` rad or ``most`` steps.
+    With a ``slope`` (3,) N m/s the torque is that at ``start`` and runs evenly from there; moments that are ``falling``
+    are those at ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
@@ -102,7 +113,8 @@ def integrate(
     strength = _strength(acceleration, jerk, forcing, min(moments), end - start)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
-    if moments[0] == moments[1] and forcing.growth == 0.0 and jerk is None and not turned <= SHORT:
+    even = jerk is None and falling is None
+    if moments[0] == moments[1] and forcing.growth == 0.0 and even and not turned <= SHORT:
         return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
     size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
@@ -118,7 +130,14 @@ def integrate(
         unit = 1.0 / pace if pace > 0.0 else left
         state = np.concatenate([rates, quaternion])
         here = acceleration if jerk is None else acceleration + jerk * gone
-        series = _series(moments, here, forcing, floor, now, state, unit, jerk)
+        if falling is None:
+            series = _series(moments, here, forcing, floor, now, state, unit, jerk)
+        else:
+            light = inertia + gone * (falling.rate + 0.5 * gone * falling.growth)
+            changed, scaled_ = inertia / light, (light[0], light[1], light[2])
+            further = Falling(falling.rate + gone * falling.growth, falling.growth)
+            bent = None if jerk is None else jerk * changed
+            series = _series(scaled_, here * changed, forcing, floor, now, state, unit, bent, further)
         step = min(_reach(series, unit) * unit, left)
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
@@ -217,17 +236,19 @@ def _series(
     state: Array,
     unit: float,
     jerk: Array | None = None,
+    falling: Falling | None = None,
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
     dω1/dt = (I2 - I3)/I1 ω2 ω3 + M1/I1 and round, Magnus 1970 (1) for three different moments;
-    dq/dt = q (0, ω)/2, and the terms of `_Sink` where energy is dissipated.
+    dq/dt = q (0, ω)/2, and the terms of `_Sink` where energy is dissipated, of `_Light` where moments are ``falling``.
     """
     first, second, third = moments
     coupling = ((second - third) / first, (third - first) / second, (first - second) / third)
     series = np.zeros((ORDER + 1, 7))
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
+    light = None if falling is None else _Light(np.asarray(moments), falling, unit)
     sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing.growth, floor)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
@@ -245,14 +266,43 @@ def _series(
             following[0] += step * size.real / first
             following[1] += step * size.imag / second
             turning[index] = (size * turn / (k + 1), turn)
+        if light is not None:
+            following[:3] += light.change(series, np.array([w[1, 2], w[2, 0], w[0, 1]]), k)
         if sink is not None:
-            following[:3] += step * sink.acceleration(series[k, :3], k)
+            more = None if light is None else light.momentum(series, k)
+            following[:3] += step * sink.acceleration(series[k, :3], k, more)
             w = series[: k + 1].T @ (series[k::-1, :3] + sink.slip[k::-1])
         following[3] = -0.5 * step * (w[4, 0] + w[5, 1] + w[6, 2])
         following[4] = 0.5 * step * (w[3, 0] + w[5, 2] - w[6, 1])
         following[5] = 0.5 * step * (w[3, 1] + w[6, 0] - w[4, 2])
         following[6] = 0.5 * step * (w[3, 2] + w[4, 1] - w[5, 0])
     return series
+
+
+class _Light:
+    """Moments that fall as series: I(x) = I0 + I1 x + I2 x², x the time in the ``unit`` of the series."""
+
+    def __init__(self, moments: Array, falling: Falling, unit: float) -> None:
+        self.parts = moments, unit * falling.rate, 0.5 * unit**2 * falling.growth
+        self.unit, self.products = unit, list[Array]()
+
+    def change(self, series: Array, product: Array, k: int) -> Array:
+        """What I1 and I2 add to coefficient k + 1 of ω, (3,); ``product``: coefficient k of (ω2 ω3, ω3 ω1, ω1 ω2).
+
+        By (k + 1) I0 ω_(k+1) + k I1 ω_k + (k - 1) I2 ω_(k-1) = unit Σ (ΔI_j) (ω ω)_(k-j), ΔI = (I2 - I3, …) of each.
+        """
+        self.products.append(product)
+        total = np.zeros(3)
+        for order, part in enumerate(self.parts[1:], start=1):
+            if order <= k:
+                total += self.unit * (np.roll(part, -1) - np.roll(part, -2)) * self.products[k - order]
+                total -= (k + 1 - order) * part * series[k + 1 - order, :3]
+        return np.asarray(total / ((k + 1) * self.parts[0]))
+
+    def momentum(self, series: Array, k: int) -> Array:
+        """What I1 and I2 add to coefficient k of H, (3,)."""
+        orders = range(1, min(k, 2) + 1)
+        return np.asarray(sum((self.parts[order] * series[k - order, :3] for order in orders), np.zeros(3)))
 
 
 class _Sink:
@@ -269,10 +319,13 @@ class _Sink:
         self.quotient = np.zeros(ORDER)  # q
         self.slip = np.zeros((ORDER, 3))  # s
 
-    def acceleration(self, rates: Array, k: int) -> Array:
-        """Coefficient k of (H × s)/I, (3,); makes that of ``slip`` on the way. ``rates`` (3,): coefficient k of ω."""
+    def acceleration(self, rates: Array, k: int, more: Array | None = None) -> Array:
+        """Coefficient k of (H × s)/I, (3,); makes that of ``slip`` on the way. ``rates`` (3,): coefficient k of ω.
+
+        ``more`` (3,) is added to that of H, I ω with the moments of the beginning.
+        """
         momentum, slip = self.momentum, self.slip
-        momentum[k] = self.moments * rates
+        momentum[k] = self.moments * rates if more is None else self.moments * rates + more
         self.squares[k] = momentum[: k + 1].ravel() @ momentum[k::-1].ravel()
         if k == 0:
             self.squares[0] += self.floor

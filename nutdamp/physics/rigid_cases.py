@@ -53,23 +53,34 @@ class Bodies:
         """Those of ``cases`` (an index of arrays)."""
         return Bodies(self.moments[:, cases], self.constant, self.forcing)
 
+    def lighter(self, by: Array | None) -> Bodies:
+        """The same with moments smaller ``by`` (3, n) kg m²; None: as they are."""
+        return self if by is None else Bodies(self.moments - by, self.constant, self.forcing)
+
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
     """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
 
     An on-time of 0 is an ideal impulse. With ``leans`` (k,) torques run evenly from 1 - lean times their mean to 1 +
-    lean times it.
+    lean times it. On-times and leans that differ are (k, n). The moments fall by ``sheds`` (k, 3, n) kg m², half as a
+    pulse begins and half as it ends, which errs in second order; None: they stay.
     """
 
     starts: Array
     on_times: Array
     impulses: Array
     leans: Array | None = None
+    sheds: Array | None = None
 
     def some(self, cases: Any) -> Pulses:
         """Those of ``cases`` (an index of arrays)."""
-        return Pulses(self.starts[:, cases], self.on_times, self.impulses[:, :, cases], self.leans)
+        on_times, leans = (
+            one if one is None or one.ndim == 1 else one[:, cases] for one in (self.on_times, self.leans)
+        )
+        sheds = None if self.sheds is None else self.sheds[:, :, cases]
+        assert on_times is not None
+        return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
 
     @property
     def slopes(self) -> Array | None:
@@ -77,25 +88,29 @@ class Pulses:
         if self.leans is None or not self.leans.any():
             return None
         lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
-        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None, None])
+        return np.asarray(self.impulses * _of_each(2.0 * self.leans / lasts**2))
 
     @property
     def edges(self) -> Array:
         """Starts and ends in turn, (2k, n) s."""
-        return np.stack([self.starts, self.starts + self.on_times[:, None]], axis=1).reshape(-1, self.starts.shape[1])
+        ends = self.starts + (self.on_times[:, None] if self.on_times.ndim == 1 else self.on_times)
+        return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
 
     @property
     def jumps(self) -> tuple[Array, Array]:
         """What changes at each of the edges, (2k, 3, n) each: the torque in N m, and the momentum in N m s."""
-        ideal = self.on_times == 0.0
-        torque = self.impulses / np.where(ideal, 1.0, self.on_times)[:, None, None]
-        torque[ideal] = 0.0
+        ideal = _of_each(self.on_times == 0.0)
+        torque = np.where(ideal, 0.0, self.impulses / _of_each(np.where(self.on_times == 0.0, 1.0, self.on_times)))
+        kick = np.where(ideal, self.impulses, 0.0)
         if self.leans is not None:  # what begins at its first value, less than its mean, ends at its last
-            first, last = (1.0 - self.leans)[:, None, None] * torque, (1.0 + self.leans)[:, None, None] * torque
-            kick = np.where(ideal[:, None, None], self.impulses, 0.0)
+            first, last = _of_each(1.0 - self.leans) * torque, _of_each(1.0 + self.leans) * torque
             return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
-        kick = np.where(ideal[:, None, None], self.impulses, 0.0)
         return _edgewise(torque, -torque), _edgewise(kick, 0.0 * kick)
+
+
+def _of_each(values: Any) -> Any:
+    """What pulses have, (k,) or (k, n), beside vectors (k, 3, n)."""
+    return values[:, None, None] if values.ndim == 1 else values[:, None, :]
 
 
 def _edgewise(begins: Array, ends: Array) -> Array:
@@ -168,6 +183,7 @@ def _fly_alike(
 ) -> None:
     """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
     edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
+    half = None if pulses.sheds is None else 0.5 * pulses.sheds
     now = np.zeros(rates.shape[1])
     on: set[int] = set()
     for edge in order.tolist():
@@ -182,7 +198,8 @@ def _fly_alike(
         advance(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
         now = edges[edge]
         number, ends = divmod(edge, 2)
-        if pulses.on_times[number] == 0.0:
+        bodies = bodies.lighter(None if half is None else half[number])
+        if not np.any(pulses.on_times[number]):
             rates += kicks[edge] / bodies.moments
         elif ends:
             on.remove(edge - 1)
@@ -197,6 +214,11 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     edges = np.take_along_axis(edges, order, axis=0)
     turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
     slopes, slope = pulses.slopes, None
+    half = (
+        None
+        if pulses.sheds is None
+        else np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), order[:, None, :], axis=0)
+    )
     bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), order[:, None, :], axis=0)
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
@@ -208,6 +230,7 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
         now = edge
         if bends is not None:
             slope = bends[number] if slope is None else slope + bends[number]
+        bodies = bodies.lighter(None if half is None else half[number])
         rates += kick / bodies.moments
 
 

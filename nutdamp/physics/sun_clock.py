@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics.rigid_cases import Bodies, advance
-from nutdamp.physics.valve import Ramp
 
 Array = NDArray[np.float64]
 
@@ -30,12 +29,22 @@ AHEAD = 8
 CIRCLE = 2.0 * math.pi
 
 
+class Push(NamedTuple):
+    """Torque that runs evenly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
+
+    begin: Any
+    end: Any
+    first: Array
+    last: Array
+
+
 class Stretch(NamedTuple):
-    """Motion under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
+    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
 
     ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
     """
 
+    bodies: Bodies
     since: Array
     rates: Array
     quaternion: Array
@@ -44,17 +53,18 @@ class Stretch(NamedTuple):
 
     def some(self, cases: NDArray[np.intp]) -> Stretch:
         """That of some cases."""
-        torque, slope = (None if one is None else one[:, cases] for one in self[3:])
-        return Stretch(self.since[cases], self.rates[:, cases], self.quaternion[:, cases], torque, slope)
+        torque, slope = (None if one is None else one[:, cases] for one in self[4:])
+        motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
+        return Stretch(self.bodies.some(cases), *motion, torque, slope)
 
-    def moved(self, bodies: Bodies, times: Array) -> Stretch:
+    def moved(self, times: Array) -> Stretch:
         """The same from ``times`` (n,) s on."""
         rates, quaternion = self.rates.copy(), self.quaternion.copy()
-        advance(bodies, rates, quaternion, self.since, times - self.since, self.torque, self.slope)
+        advance(self.bodies, rates, quaternion, self.since, times - self.since, self.torque, self.slope)
         torque = self.torque
         if torque is not None and self.slope is not None:
             torque = torque + self.slope * (times - self.since)
-        return Stretch(times, rates, quaternion, torque, self.slope)
+        return Stretch(self.bodies, times, rates, quaternion, torque, self.slope)
 
 
 class SunClock:
@@ -66,8 +76,8 @@ class SunClock:
     thrust, is over.
     """
 
-    def __init__(self, bodies: Bodies, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
-        self.bodies, self.sun, self.sense, self.azimuth = bodies, sun, sense, azimuth
+    def __init__(self, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
+        self.sun, self.sense, self.azimuth = sun, sense, azimuth
         self._stretches, self.over = [start], start.since
         ahead, _ = self._ahead(start, sun)
         self._number, self.time = 0, start.since + (ahead - CIRCLE) / self._pace  # as if one had come before t = 0
@@ -84,32 +94,35 @@ class SunClock:
         return zip(self._stretches, (one.since for one in self._stretches[1:]), strict=False)
 
     def fire(
-        self, found: Stretch, delay: Array, width: float, torque: Array, ramps: Sequence[Ramp] | None = None
+        self, found: Stretch, delay: Array, width: float, pushes: Sequence[Push], sheds: Array | None = None
     ) -> Array:
-        """Fire ``torque`` (3, n) N m for ``width`` s, the ``delay`` (n,) s after the Sun pulse ``found``, the last one.
+        """Fire a command of ``width`` s, the ``delay`` (n,) s after the Sun pulse ``found``, the last one.
 
-        ``ramps`` are the thrust that follows the command, in parts of the torque and s after its start; None is full
-        thrust for as long as the command. Returns the starts (n,) s of the commands: not before the pulse before is
-        over.
+        ``pushes`` are the torques that follow it, s after its start; the moments fall by ``sheds`` (3, n) kg m², half
+        as the first begins. Returns the starts (n,) s of the commands: not before the pulse before is over.
         """
-        before = self.here
+        before, half = self.here, None if sheds is None else 0.5 * sheds
         starts = np.maximum(found.since + delay, self.over)
-        thrust = (Ramp(0.0, width, 1.0, 1.0),) if ramps is None else ramps
-        self.over = starts + max([width, *(ramp.end for ramp in thrust)])
-        if not thrust:
+        lasts: Any = width
+        for push in pushes:
+            lasts = np.maximum(lasts, push.end)
+        self.over = starts + lasts
+        if not pushes:
             return starts
-        begun = found.moved(self.bodies, starts + thrust[0].begin)
+        begun = found.moved(starts + pushes[0].begin)
         late = np.flatnonzero(found.since < before.since)  # it came while the pulse before was on
         if len(late):
-            again = before.some(late).moved(self.bodies.some(late), begun.since[late])
+            again = before.some(late).moved(begun.since[late])
             begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
+        begun = begun._replace(bodies=before.bodies.lighter(half))
         self._stretches = [before]
-        for ramp in thrust:
-            slope = None if ramp.first == ramp.last else torque * ((ramp.last - ramp.first) / (ramp.end - ramp.begin))
-            firing = begun._replace(since=starts + ramp.begin, torque=torque * ramp.first, slope=slope)
-            begun = firing.moved(self.bodies, starts + ramp.end)._replace(torque=None, slope=None)
+        for push in pushes:
+            length = np.where(push.end - push.begin == 0.0, 1.0, push.end - push.begin)
+            slope = None if np.array_equal(push.first, push.last) else (push.last - push.first) / length
+            firing = begun._replace(since=starts + push.begin, torque=push.first, slope=slope)
+            begun = firing.moved(starts + push.end)._replace(torque=None, slope=None)
             self._stretches.append(firing)
-        self._stretches.append(begun)
+        self._stretches.append(begun._replace(bodies=begun.bodies.lighter(half)))
         return starts
 
     def sun_pulse(self, number: int) -> Stretch:
@@ -120,7 +133,7 @@ class SunClock:
             pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
             passed = np.rint((pace * (self.here.since - self.time) + ahead) / CIRCLE)
             expected = self.here.since + (ahead + CIRCLE * (step - passed)) / pace
-            found = self._root(self.bodies, self.here.moved(self.bodies, expected), pace, self.sun)
+            found = self._root(self.here.moved(expected), pace, self.sun)
             self._look_back(found, expected, pace)
             off, rate = self._off(found, self.sun)
             astray = np.abs(found.since - expected) * pace > math.pi
@@ -141,9 +154,9 @@ class SunClock:
 
         The body turns about H at |H|/A, and about its axis at aω3: together, and at small angles, at ω3.
         """
-        first, second, C = self.bodies.moments
+        first, second, C = self.here.bodies.moments
         A, spin = 0.5 * (first + second), self.here.rates[2]
-        size = np.sqrt(np.sum((self.bodies.moments * self.here.rates) ** 2, axis=0))
+        size = np.sqrt(np.sum((self.here.bodies.moments * self.here.rates) ** 2, axis=0))
         return np.asarray(np.abs(self.sense * size / A + (1.0 - C / A) * spin))
 
     def _look_back(self, found: Stretch, expected: Array, pace: Array) -> None:
@@ -152,19 +165,18 @@ class SunClock:
             cases = np.flatnonzero(found.since < over.since)
             if not len(cases):
                 return
-            bodies = self.bodies.some(cases)
-            start = stretch.some(cases).moved(bodies, np.minimum(expected, over.since)[cases])
-            again = self._root(bodies, start, pace[cases], self.sun[:, cases])
-            for whole, part in zip(found[:3], again[:3], strict=True):
+            start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
+            again = self._root(start, pace[cases], self.sun[:, cases])
+            for whole, part in zip(found[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
-    def _root(self, bodies: Bodies, start: Stretch, pace: Array, sun: Array) -> Stretch:
+    def _root(self, start: Stretch, pace: Array, sun: Array) -> Stretch:
         """The motion as the Sun passes the sensor, at the moment next to that of ``start``: by Newton's method."""
         here = start
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)
             # Where the Sun is near the axis its azimuth may stand still for a moment: then by the mean rate.
-            here = here.moved(bodies, here.since + off / np.where(rate > 0.1 * pace, rate, pace))
+            here = here.moved(here.since + off / np.where(rate > 0.1 * pace, rate, pace))
             if np.all(np.abs(off) < CIRCLE * EXACT):
                 break
         return here

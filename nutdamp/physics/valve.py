@@ -50,6 +50,47 @@ class Thrust(NamedTuple):
 NOTHING = Thrust(0.0, 0.0, ())
 
 
+class Opened(NamedTuple):
+    """Thrust that rises, stays at a ``level`` and falls between four ``corners``, s: numbers, or arrays of cases."""
+
+    corners: tuple[Any, Any, Any, Any]
+    level: Any
+
+    @property
+    def pieces(self) -> tuple[tuple[Any, Any, Any, Any], ...]:
+        """Of rise, full thrust and fall the begin and the length, s, the mean level, and its lean to either side."""
+        first, second, third, last = self.corners
+        half = 0.5 * self.level
+        return (
+            (first, second - first, half, 1.0),
+            (second, third - second, self.level, 0.0),
+            (third, last - third, half, -1.0),
+        )
+
+    def within(self, middle: Any, time: Any) -> Any:
+        """Level at ``time`` s, an edge of a stretch about ``middle`` s without a corner in it."""
+        first, second, third, last = self.corners
+        rising = self.level * (time - first) / np.where(second == first, 1.0, second - first)
+        falling = self.level * (last - time) / np.where(last == third, 1.0, last - third)
+        inside = np.where(middle < second, rising, np.where(middle > third, falling, self.level))
+        return np.where((middle <= first) | (middle >= last), 0.0, inside)
+
+    @property
+    def acts(self) -> tuple[Any, Any, Any]:
+        """Effective on-time, centroid and spread (of the rectangle with the same second moment), s."""
+        first, second, third, last = self.corners
+        pieces = (  # area, centroid, variance
+            (0.5 * self.level * (second - first), (first + 2.0 * second) / 3.0, (second - first) ** 2 / 18.0),
+            (self.level * (third - second), 0.5 * (second + third), (third - second) ** 2 / 12.0),
+            (0.5 * self.level * (last - third), (2.0 * third + last) / 3.0, (last - third) ** 2 / 18.0),
+        )
+        total = sum(area for area, _, _ in pieces)
+        whole = np.where(total == 0.0, 1.0, total)
+        centroid = sum(area * middle for area, middle, _ in pieces) / whole
+        variance = sum(area * (own + (middle - centroid) ** 2) for area, middle, own in pieces) / whole
+        return total, np.where(total == 0.0, first, centroid), np.sqrt(12.0 * variance)
+
+
 class Valve(Protocol):
     """What leads from commands to thrust. Times of commands are on-times as they are loaded."""
 
@@ -126,26 +167,15 @@ class Trapezoid:
                 begin += length
         return Thrust(total, self.open_delay + moment / total, tuple(ramps))
 
-    def delayed(self, on_time: float, opens: Any, closes: Any) -> tuple[Any, Any]:
-        """Effective on-time (s) of a command where the delays are longer by ``opens`` and ``closes`` s, elementwise.
-
-        And by how much, s, the centroid of the thrust is later; that of a valve that does not open stays.
-        """
+    def opened(self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any) -> Opened:
+        """What a command gives where the four times are longer by so much, s, elementwise."""
         command = self._command(on_time) if self.effective else on_time
-        held = command + self.close_delay - self.open_delay
-        (planned, before), (given, after) = self._given(held), self._given(held + closes - opens)
-        return given, np.where((planned > 0.0) & (np.real(given) > 0.0), opens + after - before, 0.0)
-
-    def _given(self, opened: Any) -> tuple[Any, Any]:
-        """Effective on-time and centroid, s after the first thrust, which begins to fall after ``opened`` s."""
-        length, rise, fall = np.real(opened), self.rise_time, self.fall_time
-        rising, flat = np.where(length < rise, opened, rise), np.where(length < rise, 0.0, opened - rise)
-        level = rising / rise if rise > 0.0 else 1.0
-        areas = 0.5 * level * rising, flat, 0.5 * level * level * fall
-        total = np.where(length > 0.0, areas[0] + areas[1] + areas[2], 0.0)
-        moment = areas[0] * 2.0 * rising / 3.0 + flat * (rising + 0.5 * flat)
-        moment = moment + areas[2] * (opened + level * fall / 3.0)
-        return total, moment / np.where(total == 0.0, 1.0, total)
+        opens, rise, fall = self.open_delay + open_delay, self.rise_time + rise_time, self.fall_time + fall_time
+        held = command + self.close_delay + close_delay - opens
+        held = np.where(np.real(held) > 0.0, held, 0.0)
+        level = np.where(np.real(held) < np.real(rise), held / np.where(rise == 0.0, 1.0, rise), 1.0)
+        level = np.where(held == 0.0, 0.0, level)
+        return Opened((opens, opens + level * rise, opens + held, opens + held + level * fall), level)
 
     def on_time_for(self, effective: float) -> float:
         """On-time (s) that acts like full thrust for ``effective`` s."""
@@ -214,6 +244,17 @@ class Measured:
     def on_time_for(self, effective: float) -> float:
         """On-time (s) that acts like full thrust for ``effective`` s."""
         return self._between(1, effective, 0)
+
+    def opened(self, on_time: float, factor: Any) -> Opened:
+        """What a command gives where all impulses of the table are ``factor`` times as large, elementwise.
+
+        It does not begin before the command does.
+        """
+        effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
+        begin = centroid - 0.5 * effective * factor
+        begin = np.where(np.real(begin) > 0.0, begin, 0.0)
+        end = begin + effective * factor
+        return Opened((begin, begin, end, end), 1.0)
 
     def _between(self, known: int, value: float, sought: int) -> float:
         """The value of the column ``sought`` where the column ``known`` has ``value``."""

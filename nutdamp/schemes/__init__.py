@@ -92,7 +92,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
             lambda body: schedule(name, body, on_plain),
             _Correction(scheme, on_plain),
         )
-    model = model_of(spacecraft)
+    model = model_of(spacecraft, turning=chosen.equal)
 
     def planned(body: Spacecraft) -> Schedule:
         return cast("Schedule", _loaded(scheme).schedule(body, chosen))
@@ -195,6 +195,11 @@ class _Correction:
     def momentum(self) -> bool:
         """Whether H too is to end where it should."""
         return self.scheme.points and not self.options.frees_axis
+
+    @property
+    def equal(self) -> bool:
+        """Whether the pulses are planned to be equal."""
+        return self.options.equal
 
     def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = 4) -> Schedule:
         """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""

@@ -10,7 +10,8 @@ import pytest
 from builders import channel, spinner
 from scipy.spatial.transform import Rotation
 
-from nutdamp.dispersion.cases import Model, rotated, tilt_axes
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.elementwise import rotated, tilt_axes
 from nutdamp.dispersion.inputs import list_inputs
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse

@@ -28,6 +28,8 @@ from nutdamp.units import KINDS, LARGEST, parse, pattern, shown
         ("8 N m", "torque", 8.0),
         ("8 mN m", "torque", 0.008),
         ("120 kg m^2", "inertia", 120.0),
+        ("0.4 kg m^2/kg", "shed", 0.4),
+        ("0.4 m²", "shed", 0.4),
         ("0.5 rad", "angle", 0.5),
         ("5 mrad", "angle", 0.005),
         ("180 deg", "angle", math.pi),
@@ -47,7 +49,7 @@ def test_every_unit_of_the_table(text: str, kind: str, value: float) -> None:
 
 def test_the_table_holds_nothing_else() -> None:
     units = {unit for kind in KINDS.values() for unit in kind.factors}
-    assert len(units) == 30
+    assert len(units) == 32
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.kernel import ClosedForm
 from nutdamp.flight import by_impulses, flown
 from nutdamp.limits import breaches, effective_on_times
-from nutdamp.physics.feed import Cold
+from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule, on_command
@@ -239,3 +241,30 @@ def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     made = planning.plan(through(late, body), "optimal")
     assert made.pulses
     assert all(pulse.magnitude > 0.0 for pulse in made.pulses)
+
+
+@pytest.mark.parametrize("moments", [(123.0, 117.0, 80.0), (130.0, 110.0, 80.0), (95.0, 105.0, 150.0)])
+@pytest.mark.parametrize(("degrees", "on_time"), [(0.0, 0.03), (0.0, 0.04), (0.05, 0.03)])
+def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
+    moments: tuple[float, float, float], degrees: float, on_time: float
+) -> None:
+    channels = short_pulses().channels
+    body = aimed(spinner(spin=math.pi, degrees=degrees, moments=moments, channels=channels), 1.0, 40.0)
+    body = replace(body, limits=Limits(horizon=200.0))
+    found = planning.plan(body, "rhumb-line", RhumbLineOptions(on_time=on_time))
+    assert found.feasible, infeasibility(found)
+    assert found.flown is not None
+    assert max(found.flown.nutation, found.flown.axis_error) < MICRODEGREE
+    assert [pulse.on_time for pulse in found.pulses.pulses[-15:]] == pytest.approx([on_time] * 15)  # the train
+
+
+@pytest.mark.parametrize("feed", [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}], ids=["cold", "tank"])
+def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str, Any]) -> None:
+    body = aimed(short_pulses(0.0), 1.0, 40.0)
+    found = planning.plan(replace(body, **feed), "rhumb-line")
+    lengths = [pulse.loaded[1] for pulse in found.pulses]
+    (note,) = (one for one in found.pulses.notes if one.startswith("equal in impulse"))
+    said = [float(one) for one in re.findall(r"([0-9.]+) s", note)]
+    assert said == pytest.approx([min(lengths), max(lengths)], rel=0.01)
+    assert max(lengths) > 1.1 * min(lengths)
+    assert not any("equal in impulse" in one for one in planning.plan(body, "rhumb-line").pulses.notes)

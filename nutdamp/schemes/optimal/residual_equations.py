@@ -116,7 +116,7 @@ def misses(flight: Flight, equations: Equations) -> Vector:
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back
-    momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.moments))
+    momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.last_moments))
     final = end.spin if body.goal.spin is None else body.goal.spin
     shift = square_to_target(body) @ momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]

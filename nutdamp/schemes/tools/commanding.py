@@ -8,7 +8,7 @@ and blowdown included; what the shape of the thrust changes besides is corrected
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Protocol
 
@@ -16,11 +16,12 @@ import numpy as np
 
 from nutdamp import work
 from nutdamp.errors import Infeasible, TooShort
+from nutdamp.lightening import lightened, shed
 from nutdamp.limits import commandable, effective_on_time, effective_on_times, keeps_limits, shortest_on_time
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.least_squares import misses
-from nutdamp.spacecraft import Channel, Limits, Spacecraft
+from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft
 from nutdamp.supply import Supply, supplied
 
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
@@ -35,18 +36,20 @@ ROOM = 0.02
 NEARLY, EXACT = 1.1, 1e-10
 """Times what the plan leaves on the plain body, and rad, that commands may leave without another plan."""
 
-PLANS = 4
+PLANS = 6
 """Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
 
 TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
 
-def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0) -> Spacecraft:
+def plain(
+    spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
+) -> Spacecraft:
     """The body that schemes plan for: rectangles of full thrust at any time, that the channels can really give.
 
     Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
-    ``room`` s longer at either end.
+    ``room`` s longer at either end. Its moments are those with so many kg ``used``.
     """
     lead, lag = (reach + room for reach in _reaches(spacecraft))
     limits = spacecraft.limits
@@ -55,6 +58,7 @@ def plain(spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, 
         channels=tuple(_plain(spacecraft, channel, weakest, strongest) for channel in spacecraft.channels),
         cold=None,
         tank=None,
+        inertia=lightened(spacecraft, used),
         limits=Limits(
             horizon=spacecraft.horizon - lag,
             earliest=limits.earliest + lead,
@@ -102,6 +106,11 @@ class Correct(Protocol):
         """Whether more than the nutation counts."""
         ...
 
+    @property
+    def equal(self) -> bool:
+        """Whether the pulses are planned to be equal."""
+        ...
+
     def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:
         """The schedule with no more than the last ``free`` pulses moved."""
         ...
@@ -109,11 +118,11 @@ class Correct(Protocol):
 
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
     """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
-    weakest, strongest, room = 1.0, 1.0, 0.0
+    weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     made: Schedule | None = None
     for _ in range(PLANS):
-        body = plain(spacecraft, weakest, strongest, room)
+        body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             made = plan(body)
         except TooShort as short:
@@ -124,11 +133,14 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
             if made is None:
                 raise Infeasible(f"{reason}{EFFECTIVE}") from None
             break
-        too_weak, too_strong, longer = _outside(spacecraft, made)
+        too_weak, too_strong, longer = _outside(spacecraft, made, body.inertia, correct)
         if too_weak or too_strong:
             weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
             continue
-        found = as_commands(spacecraft, made, correct)
+        if used == 0.0 and shed(spacecraft) is not None and made.propellant:
+            used = made.propellant  # once more with the moments half-way
+            continue
+        found = as_commands(spacecraft, made, correct, body.inertia)
         kept, left = keeps_limits(spacecraft, found.pulses), _left(spacecraft, found, correct)
         tried.append((not kept, left, found))
         rounded = spacecraft.limits.tick is not None
@@ -139,7 +151,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
         room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in made))
     assert made is not None
-    return min(tried, key=lambda one: one[:2])[2] if tried else as_commands(spacecraft, made, correct)
+    return min(tried, key=lambda one: one[:2])[2] if tried else as_commands(spacecraft, made, correct, body.inertia)
 
 
 def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
@@ -148,12 +160,16 @@ def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
     return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
 
-def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
+def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inertia: Inertia | None = None) -> Schedule:
     """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
 
-    Commands that give no thrust are left out. Raises Infeasible where the propellant does not last.
+    ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
+    Infeasible where the propellant does not last.
     """
-    first = _firing(replace(made.without_proof, pulses=_translated(spacecraft, made)))
+    translated = _translated(spacecraft, made, inertia, correct)
+    first = _firing(replace(made.without_proof, pulses=translated))
+    if correct.equal and translated:
+        first = replace(first, notes=(*first.notes, *_unequal(made, translated)))
     tank = spacecraft.tank
     if tank is not None and first.pulses:
         full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(first.propellant or 0.0)))
@@ -164,18 +180,42 @@ def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Sch
     return _firing(_on_ticks(spacecraft, first, correct))
 
 
+def _unequal(made: Schedule, translated: tuple[Pulse, ...]) -> Iterator[str]:
+    """What equal pulses of a plan are as commands where those differ, in words."""
+    last = made.pulses[-1].on_time
+    alike = [one.loaded[1] for plain_, one in zip(made, translated, strict=True) if plain_.on_time == last]
+    shortest, longest = f"{min(alike):.4g}", f"{max(alike):.4g}"
+    if shortest != longest:
+        yield (
+            f"equal in impulse, and so commands of {shortest} s to {longest} s: cold nozzles or falling pressure make "
+            "some of the pulses weaker; a requested --on-time is that at full thrust"
+        )
+
+
 def _firing(made: Schedule) -> Schedule:
     """The schedule without pulses of no impulse."""
     return replace(made, pulses=tuple(pulse for pulse in made if pulse.magnitude > 0.0))
 
 
-def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = False) -> tuple[Pulse, ...]:
+def _translated(
+    spacecraft: Spacecraft, made: Schedule, inertia: Inertia | None, correct: Correct, *, unbounded: bool = False
+) -> tuple[Pulse, ...]:
     """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
 
-    Raises Infeasible where the propellant does not last.
+    Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where the propellant does
+    not last.
     """
     supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
-    for pulse in made:
+    planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
+    for pulse_ in made:
+        here, pulse = lightened(spacecraft, supply.since), pulse_
+        if here.moments != planned_.moments:
+            slower = 1.0 if correct.momentum or here.body_rate == 0.0 else planned_.body_rate / here.body_rate
+            late += (slower - 1.0) * (pulse_.t - before)
+            size = here.C / planned_.C if correct.momentum else here.A / planned_.A
+            pulse = replace(pulse_.moved(late), on_time=size * pulse_.on_time, impulse=size * pulse_.impulse)
+        before = pulse_.t
         channel = channels.get(pulse.channel)
         if channel is None:
             pulses.append(supply.fire(pulse, None))
@@ -191,7 +231,9 @@ def _translated(spacecraft: Spacecraft, made: Schedule, *, unbounded: bool = Fal
     return tuple(pulses)
 
 
-def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[float], float]:
+def _outside(
+    spacecraft: Spacecraft, made: Schedule, inertia: Inertia, correct: Correct
+) -> tuple[list[float], list[float], float]:
     """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
 
     And by how much, s, a pulse becomes longer at either end.
@@ -200,13 +242,15 @@ def _outside(spacecraft: Spacecraft, made: Schedule) -> tuple[list[float], list[
     """
     channels = {one.name: one for one in spacecraft.channels}
     weak, strong, longer = [], [], 0.0
-    for planned_, pulse in zip(made, _translated(spacecraft, made, unbounded=True), strict=True):
+    for planned_, pulse in zip(made, _translated(spacecraft, made, inertia, correct, unbounded=True), strict=True):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
         channel = channels.get(pulse.channel)
         if channel is None or pulse.torque is None:
             continue
         least, most = effective_on_times(channel)
         level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
+        if shed(spacecraft) is not None:
+            level = planned_.on_time / pulse.on_time
         if pulse.on_time > most * (1.0 + ROUNDING):
             weak.append(level)
         if pulse.on_time < least * (1.0 - ROUNDING):

@@ -85,7 +85,7 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
 def _missed(flight_: flight.Flight, *, spin: bool = False) -> Vector:
     """`misses` of a flight; ``spin`` adds a fifth, by how much of itself the final spin of the goal is missed."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
-    moments = np.asarray(flight_.moments)
+    moments = np.asarray(flight_.last_moments)
     body = flight_.settled.rates * moments
     after = attitude.rotate(flight_.settled.quaternion, body)
     steady = steady_omega(spacecraft, schedule.end)

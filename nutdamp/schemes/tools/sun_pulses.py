@@ -12,9 +12,10 @@ from nutdamp.commands import Block, SunSensor
 from nutdamp.dynamics import make_dynamics
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
+from nutdamp.lightening import shed
 from nutdamp.physics import attitude
 from nutdamp.physics.rigid_cases import Bodies
-from nutdamp.physics.sun_clock import Stretch, SunClock
+from nutdamp.physics.sun_clock import Push, Stretch, SunClock
 from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.supply import Supply
@@ -104,8 +105,17 @@ def sun_clock(spacecraft: Spacecraft) -> SunClock:
         raise Infeasible("there is no Sun pulse; the file needs sun and sun_sensor")
     dynamics, start = make_dynamics(spacecraft), spacecraft.initial
     bodies = Bodies(np.array(dynamics.moments)[:, None], dynamics.constant, dynamics.forcing)
-    state = Stretch(np.zeros(1), start.rates[:, None], start.quaternion[:, None])
-    return SunClock(bodies, state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
+    state = Stretch(bodies, np.zeros(1), start.rates[:, None], start.quaternion[:, None])
+    return SunClock(state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
+
+
+def pushes(pulse: Pulse) -> list[Push]:
+    """The torques of a pulse whose command begins at 0 s."""
+    torque = np.zeros(3) if pulse.torque is None else pulse.torque
+    if pulse.command is None:
+        return [Push(0.0, pulse.on_time, torque[:, None], torque[:, None])]
+    ramps = pulse.command.ramps
+    return [Push(one.begin, one.end, torque[:, None] * one.first, torque[:, None] * one.last) for one in ramps]
 
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
@@ -123,7 +133,7 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
     channels = {channel.name: channel for channel in spacecraft.channels}
     clock, sensor, errors = sun_clock(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter = 0.0 if seed is None or sensor is None else sensor.jitter
-    supply, pulses = Supply(spacecraft), list[Pulse]()
+    supply, pulses, per_kg = Supply(spacecraft), list[Pulse](), shed(spacecraft)
     for block in blocks:
         channel = channels.get(block.channel)
         if channel is None:
@@ -136,9 +146,8 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
             if due < over - 1e-9:
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
             given = supply.fire(on_command(channel, 0.0, block.width), channel)
-            torque = channel.torque if given.torque is None else given.torque
-            ramps = None if given.command is None else given.command.ramps
-            start = float(clock.fire(found, delay, block.width, torque[:, None], ramps)[0])
+            sheds = None if per_kg is None else (per_kg * (given.propellant or 0.0))[:, None]
+            start = float(clock.fire(found, delay, block.width, pushes(given), sheds)[0])
             pulses.append(given.moved(start))
     supply.expect_to_last()
     return Schedule(tuple(pulses), blocks=tuple(blocks))

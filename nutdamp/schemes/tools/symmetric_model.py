@@ -60,8 +60,12 @@ class SymmetricModel:
         return steerable_pulse(torquer, t, angle, on_time=on_time)
 
 
-def model_of(spacecraft: Spacecraft) -> SymmetricModel:
-    """The model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself."""
+def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:
+    """The model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself.
+
+    Its torques change ω as the true ones do; ``turning``: they turn H as the true ones do, and ω at t = 0 is as much
+    larger or smaller on average, as the circle may be of any size.
+    """
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
     if inertia.symmetric:
@@ -74,11 +78,12 @@ def model_of(spacecraft: Spacecraft) -> SymmetricModel:
     circle = (first * (first - C) / (second * (second - C))) ** 0.25
     scale = np.array([circle, 1.0 / circle])
     stretch = scale * A / np.array([first, second])  # for torques and impulses
+    size = float(np.mean(stretch)) if turning else 1.0
     body = replace(
         undisturbed,
         inertia=Inertia((A, A, C), inertia.axes),
-        omega0=np.array([*(scale * undisturbed.omega0[:2]), undisturbed.omega0[2]]),
-        channels=tuple(_stretched(channel, stretch) for channel in undisturbed.channels),
+        omega0=np.array([*(scale * undisturbed.omega0[:2] / size), undisturbed.omega0[2]]),
+        channels=tuple(_stretched(channel, stretch if not turning else np.ones(2)) for channel in undisturbed.channels),
         steerable=_stretched_torquer(undisturbed.steerable, stretch),
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
