@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import Draws
+from nutdamp.dispersion.fed import tank_of
 from nutdamp.dispersion.inputs import SCHEDULE_IDLE, Input, Inputs, list_inputs, of_sensor
 from nutdamp.loop.fleet import Case
 from nutdamp.loop.law import Law
@@ -23,6 +24,9 @@ from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Attitude, Channel, Inertia, Spacecraft, Thruster, Vector
 from nutdamp.tolerances import Tolerance
+
+TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
+"""Numbers of a valve."""
 
 OF_FIRINGS = ("thrust_per_pulse", "timing")
 """Tolerances that each firing draws anew."""
@@ -114,8 +118,10 @@ class LoopModel:
     def cases(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
         """The cases of a study that have these ``numbers``, from 0, with their ``draws``, (n,) or one for all."""
         count = len(numbers)
+        body = self.law.spacecraft
+        draws = _at_pressure(body, draws)
         whole = {name: np.broadcast_to(draw, count) for name, draw in draws.items()}
-        body, model = self.law.spacecraft, self._body.cases(draws)
+        model = self._body.cases(draws)
         moments = np.array([np.broadcast_to(one, count) for one in model.moments]).T.tolist()
         rates = np.array([np.broadcast_to(one, count) for one in model.omega0]).T
         tilts = np.array([np.broadcast_to(one, count) for one in model.tilt]).T
@@ -135,6 +141,10 @@ class LoopModel:
             )
             if "cold" in draw and body.cold is not None:
                 truth = replace(truth, cold=replace(body.cold, first=max(body.cold.first + draw["cold"], 0.0)))
+            if "cold_pulses" in draw and truth.cold is not None:
+                truth = replace(truth, cold=replace(truth.cold, pulses=truth.cold.pulses + draw["cold_pulses"]))
+            if any(name.startswith("tank ") for name in draw):
+                truth = replace(truth, tank=tank_of(body, draw))
             off = Off(key, *self.scattered, draw.get("timing offset", 0.0))
             scatter = None if off == Off(key, None, None) else off
             found.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
@@ -170,8 +180,18 @@ class LoopModel:
         return tuple(found)
 
 
-OF_THRUSTERS = ("thrust", "direction", "position", "open_delay", "close_delay", "impulse_bit")
+OF_THRUSTERS = ("thrust", "direction", "position", *TIMES, "impulse_bit")
 """First words of the inputs that make a thruster another."""
+
+
+def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
+    """The draws with the thrust of another tank, as the file gives it at its own pressure, in that of the thrusters."""
+    tank = tank_of(body, draws)
+    if body.tank is None or tank is None or not {"tank pressure", "tank exponent"} & set(draws):
+        return draws
+    higher = (tank.pressure / body.tank.pressure) ** tank.exponent
+    names = {f"thrust {one.name}" for channel in body.channels for one in channel.thrusters}
+    return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
 
 
 def _thrust(thruster: Thruster, draw: dict[str, float]) -> dict[str, Any]:
@@ -195,8 +215,7 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
         factor = 1.0 + off("impulse_bit")
         return Measured(tuple((command, factor * given, centroid) for command, given, centroid in valve.rows))
     assert isinstance(valve, Trapezoid)
-    opens, closes = (max(getattr(valve, key) + off(key), 0.0) for key in ("open_delay", "close_delay"))
-    return replace(valve, open_delay=opens, close_delay=closes)
+    return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in TIMES})
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
