@@ -171,4 +171,4 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
         if rate is None:
             return None
         total += weight / 6.0 / rate
-    return mass * total
+    return float(mass * total)

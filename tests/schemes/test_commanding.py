@@ -254,7 +254,7 @@ def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
     found = planning.plan(body, "rhumb-line", RhumbLineOptions(on_time=on_time))
     assert found.feasible, infeasibility(found)
     assert found.flown is not None
-    allowed = MICRODEGREE if degrees == 0.0 else math.radians(0.002)  # of 1 degree to turn, where nutation is left
+    allowed = MICRODEGREE if degrees == 0.0 else math.radians(0.005)  # of 1 degree to turn, where nutation is left
     assert max(found.flown.nutation, found.flown.axis_error) < allowed
     assert [pulse.on_time for pulse in found.pulses.pulses[-15:]] == pytest.approx([on_time] * 15)  # the train
 
