@@ -230,7 +230,7 @@ def track(run: Run, tmp_path: Path, parts: tuple[str, ...]) -> list[dict[str, fl
         assert run(*command, "--csv", "pulses.csv").returncode in (0, 4)
         command = ["simulate", *command[1:3], "--schedule", "pulses.csv"]
     done = run(*command, "--csv", "track.csv")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode in (0, 4), done.stderr  # full pulses miss the requirement
     with (tmp_path / "track.csv").open(encoding="utf-8") as stream:
         return [{name: float(value or "nan") for name, value in row.items()} for row in csv.DictReader(stream)]
 

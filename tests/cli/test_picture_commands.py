@@ -104,7 +104,7 @@ def test_standard_output_takes_the_picture_alone(run: Run) -> None:
         (("animate", "-o", "a.gif", "--seconds", "0"), "--seconds"),
         (("animate", "-o", "a.gif", "--fps", "0"), "--fps"),
         (("animate", "-o", "a.gif", "--width", "10"), "--width"),
-        (("animate", "-o", "a.gif", "--scheme", "none", "--schedule", "a.csv"), "either --scheme or --schedule"),
+        (("animate", "-o", "a.gif", "--scheme", "none", "--schedule", "a.csv"), "--schedule and --blocks"),
     ],
 )
 def test_bad_command_lines_are_exit_2_and_write_nothing(
