@@ -10,7 +10,8 @@ def _line(kind: Kind) -> str:
     """The SI unit first, then the others and what they are in it."""
     if not kind.factors:
         return "no unit"
-    others = [f"{unit} = {factor:.6g} {kind.si}".rstrip() for unit, factor in kind.factors.items() if factor != 1.0]
+    named = ((unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}") for unit, factor in kind.factors.items())
+    others = [f"{unit}{worth}".rstrip() for unit, worth in named if unit != kind.si]
     return "; ".join([kind.si, *others] if kind.si else others)
 
 

@@ -108,14 +108,14 @@ def test_an_epoch_that_only_messages_cannot_hold_is_refused_with_its_place(run: 
     (tmp_path / "old.yaml").write_text(DATED.replace("2026", "1960"))
     done = run("export", "old.yaml", "--format", "aem", "--scheme", "two-pulse")
     assert done.returncode == 2
-    assert done.stderr.startswith("old.yaml:5:19: attitude.epoch: '1960-03-01T12:00:00Z' lies before 1972")
+    assert done.stderr.startswith("old.yaml:5:19: attitude.epoch: '1960-03-01T12:00:00Z' is before 1972")
     # What no file says has no place in one.
     for path, stdin in (("-", DATED.replace("2026", "1960")), ("old.yaml", None)):
         epoch = "1961-03-01T12:00:00Z" if stdin is None else "1960-03-01T12:00:00Z"
         setting = () if stdin is not None else ("--set", f"attitude.epoch={epoch}")
         done = run("export", path, "--format", "aem", "--scheme", "two-pulse", *setting, stdin=stdin)
         assert done.returncode == 2
-        assert done.stderr.startswith(f"nutdamp: attitude.epoch: '{epoch}' lies before 1972")
+        assert done.stderr.startswith(f"nutdamp: attitude.epoch: '{epoch}' is before 1972")
 
 
 def test_formats_without_an_epoch_need_none(run: Run) -> None:
