@@ -22,13 +22,7 @@ from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
-from nutdamp.dispersion.statistics import (
-    EXACT_CASES,
-    Distribution,
-    Exact,
-    Sketch,
-    Worst,
-)
+from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
 from nutdamp.physics import rigid_cases
@@ -187,7 +181,6 @@ class Results:
     values: Array | None = None
     sketches: list[Sketch] | None = None
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
-
     broken: NDArray[np.int64] = field(init=False)
     aspects: Array = field(init=False)
 
@@ -195,10 +188,9 @@ class Results:
         cones = len(self.study.model.spacecraft.keep)
         self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
         if self.values is None and self.sketches is None:
-            if self.requested <= EXACT_CASES:
-                self.values = np.empty((len(OUTPUTS), self.requested))
-            else:
-                self.sketches = [Sketch() for _ in OUTPUTS]
+            exact = self.requested <= EXACT_CASES
+            self.values = np.empty((len(OUTPUTS), self.requested)) if exact else None
+            self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
 
     @property
     def exact(self) -> bool:
@@ -266,16 +258,8 @@ class Results:
         """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
         if requested < self.done:
             raise BadRequest(f"{self.done} cases are done already: expected at least as many, or no --resume")
-        more = Results(
-            self.study,
-            requested,
-            self.done,
-            self.redrawn,
-            self.met,
-            self.worst,
-            sketches=self.sketches,
-            early=self.early,
-        )
+        done = self.done, self.redrawn, self.met, self.worst
+        more = Results(self.study, requested, *done, sketches=self.sketches, early=self.early)
         more.broken, more.aspects = self.broken, self.aspects
         if self.values is not None and more.values is not None:
             more.values[:, : self.done] = self.values[:, : self.done]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any
 
 from nutdamp.files.sections import Field, Length, Rule, Section
@@ -298,50 +299,25 @@ def dispersions(
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
 
-    def one(key: str) -> Tolerance | None:
-        entry: ToleranceSection | None = getattr(section, key)
-        return None if entry is None else entry.tolerance(key)
-
-    def each(key: str) -> dict[str, Tolerance]:
-        entries: dict[str, ToleranceSection] = getattr(section, key) or {}
-        found = {name: entry.tolerance(key) for name, entry in entries.items()}
-        return dict.fromkeys(thrusts, found[ALL]) if ALL in found else found
-
     def fraction(name: str, tolerance: Tolerance) -> Tolerance:
         thrust = thrusts[name]
         if tolerance.relative or thrust is None:
             return tolerance
         return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
 
-    rates = [None if entry is None else entry.tolerance("omega0") for entry in section.omega0 or (None, None, None)]
-    return Dispersions(
-        A=one("A"),
-        C=one("C"),
-        omega0=(rates[0], rates[1], rates[2]),
-        thrust={name: fraction(name, tolerance) for name, tolerance in each("thrust").items()},
-        thrust_per_pulse=one("thrust_per_pulse"),
-        thrust_direction=each("thrust_direction"),
-        position=each("position"),
-        timing=one("timing"),
-        timing_offset=one("timing_offset"),
-        attitude=one("attitude"),
-        open_delay=each("open_delay"),
-        close_delay=each("close_delay"),
-        rise_time=each("rise_time"),
-        fall_time=each("fall_time"),
-        impulse_bit=each("impulse_bit"),
-        cold=one("cold"),
-        sensor_bias=one("sensor_bias"),
-        sensor_scale=one("sensor_scale"),
-        sensor_noise=one("sensor_noise"),
-        sensor_delay=one("sensor_delay"),
-        cold_pulses=one("cold_pulses"),
-        tank_propellant=one("tank_propellant"),
-        tank_pressure=one("tank_pressure"),
-        tank_final_pressure=one("tank_final_pressure"),
-        tank_exponent=one("tank_exponent"),
-        inertia_per_kg=one("inertia_per_kg"),
-    )
+    found: dict[str, Any] = {}
+    for key in (one.name for one in fields(Dispersions)):
+        entry = getattr(section, key)
+        if isinstance(entry, ToleranceSection):
+            found[key] = entry.tolerance(key)
+        elif isinstance(entry, list | tuple):  # by axis
+            found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)
+        elif entry is not None:  # by thruster
+            named = {name: one.tolerance(key) for name, one in entry.items()}
+            found[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
+    if "thrust" in found:
+        found["thrust"] = {name: fraction(name, tolerance) for name, tolerance in found["thrust"].items()}
+    return Dispersions(**found)
 
 
 def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:

@@ -17,7 +17,8 @@ from nutdamp.dispersion.study import Study
 from nutdamp.errors import CannotWrite
 from nutdamp.files.output import STDOUT, csv_text
 
-SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "m": "m", "s": "s", "": "factor"}
+SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "": "factor"}
+"""Endings of headings for units; those not in it are written as they are."""
 OUTPUT_COLUMNS = ("nutation_deg", "momentum_shift_deg", "axis_error_deg", "spin_change_rad_s", "propellant_kg")
 """Columns of `OUTPUTS`, in their order."""
 
@@ -27,7 +28,7 @@ SHORTEST = 12
 
 def column(entry: Input) -> str:
     """Heading of an input: its name with the unit as suffix."""
-    return f"{entry.name.replace(' ', '_')}_{SUFFIXES[entry.unit]}"
+    return f"{entry.name.replace(' ', '_')}_{SUFFIXES.get(entry.unit, entry.unit)}"
 
 
 class SamplesWriter:

@@ -161,6 +161,9 @@ def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
         worst = int(np.argmax(rows / moments))
         most = f"expected less than {moments[worst] / propellant:.4g} kg m^2/kg of the moment {moments[worst]:g} kg m^2"
         yield Finding(path, f"leaves {values} kg m^2 once {propellant:g} kg are used, all must be above 0; {most}")
+    elif empty[2] == middle and least < middle < largest:
+        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the moment about axis 3 is the middle one"
+        yield Finding(path, f"{problem}, about which a spin is unstable; expected the largest or the least")
     elif largest > (least + middle) * (1.0 + 1e-9):
         problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the largest exceeds the sum of the others"
         yield Finding(path, f"{problem}, which no body has; expected less off the smaller ones, or more off it")

@@ -48,6 +48,12 @@ class Falling(NamedTuple):
     rate: Array
     growth: Array
 
+    def after(self, moments: Array, gone: float) -> tuple[tuple[float, float, float], Array, Falling]:
+        """``moments`` (3,) after ``gone`` s of it, the old ones over these, and how they fall from then on."""
+        light = moments + gone * (self.rate + 0.5 * gone * self.growth)
+        further = Falling(self.rate + gone * self.growth, self.growth)
+        return (light[0], light[1], light[2]), moments / light, further
+
 
 class Forcing(NamedTuple):
     """What acts on a body besides a constant torque.
@@ -129,15 +135,12 @@ def integrate(
             raise _too_long(now, end, pace * left)
         unit = 1.0 / pace if pace > 0.0 else left
         state = np.concatenate([rates, quaternion])
-        here = acceleration if jerk is None else acceleration + jerk * gone
-        if falling is None:
-            series = _series(moments, here, forcing, floor, now, state, unit, jerk)
-        else:
-            light = inertia + gone * (falling.rate + 0.5 * gone * falling.growth)
-            changed, scaled_ = inertia / light, (light[0], light[1], light[2])
-            further = Falling(falling.rate + gone * falling.growth, falling.growth)
-            bent = None if jerk is None else jerk * changed
-            series = _series(scaled_, here * changed, forcing, floor, now, state, unit, bent, further)
+        here, bent = acceleration if jerk is None else acceleration + jerk * gone, jerk
+        body, further = moments, falling
+        if falling is not None:
+            body, changed, further = falling.after(inertia, gone)
+            here, bent = here * changed, None if bent is None else bent * changed
+        series = _series(body, here, forcing, floor, now, state, unit, bent, further)
         step = min(_reach(series, unit) * unit, left)
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left

@@ -75,11 +75,9 @@ class Pulses:
 
     def some(self, cases: Any) -> Pulses:
         """Those of ``cases`` (an index of arrays)."""
-        on_times, leans = (
-            one if one is None or one.ndim == 1 else one[:, cases] for one in (self.on_times, self.leans)
-        )
+        on_times = self.on_times if self.on_times.ndim == 1 else self.on_times[:, cases]
+        leans = self.leans if self.leans is None or self.leans.ndim == 1 else self.leans[:, cases]
         sheds = None if self.sheds is None else self.sheds[:, :, cases]
-        assert on_times is not None
         return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
 
     @property
@@ -123,7 +121,6 @@ class Watch(Protocol):
 
     def some(self, cases: Any) -> Watch:
         """That of some of the cases (an index of arrays)."""
-        ...
 
     def motion(
         self,
@@ -136,7 +133,6 @@ class Watch(Protocol):
         slope: Array | None = None,
     ) -> None:
         """The motion that `advance` is about to make with the same arguments."""
-        ...
 
 
 def fly(
@@ -148,10 +144,9 @@ def fly(
     for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
     for motions over more than `rigid.LONGEST` rad.
     """
-    count = rates.shape[1]
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
-    for begin in range(0, count, BLOCK):
-        cases = slice(begin, min(begin + BLOCK, count))
+    for begin in range(0, rates.shape[1], BLOCK):
+        cases = slice(begin, begin + BLOCK)
         seen = None if watch is None else watch.some(cases)
         _fly_block(bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases), seen)
     return rates, quaternion
@@ -344,8 +339,7 @@ def _integrate(
     strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
     pace = np.sqrt(np.sum(rates * rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
-    span = float(np.max(pace * duration))
-    _expect_short(span)
+    _expect_short(span := float(np.max(pace * duration)))
     steps = max(1, math.ceil(span / STRIDE))
     for number in range(steps):
         gone = duration * (number / steps)

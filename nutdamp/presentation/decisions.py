@@ -31,7 +31,9 @@ COUNT = "cases that comply"
 def verdict(decision: Decision) -> str:
     """Whether the requirement is met, in words that leave no doubt for what."""
     broken, end = list(map(strays, decision.strays)), _at_end(decision)
-    return f"NOT met: {' and '.join(broken)}; otherwise {end}" if broken else end
+    # Cases that break a cone do not comply: what is said of them is not of the end alone.
+    beside = "" if decision.cases is not None and decision.cases.complying is not None else "otherwise "
+    return f"NOT met: {' and '.join(broken)}; {beside}{end}" if broken else end
 
 
 def _at_end(decision: Decision) -> str:

@@ -147,7 +147,8 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
         builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
         if train.here.limits.tick is not None and builder.left > 0.5 * before:
             break  # what is left is the rounding of starts
-    return builder.schedule(_note(builder, train, count)), builder.left
+    notes = (_note(builder, train, count),) if builder.pulses else ()
+    return builder.schedule(*notes), builder.left
 
 
 def _note(builder: FlownBuilder, train: Train, count: int) -> str:

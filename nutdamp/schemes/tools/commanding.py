@@ -140,7 +140,12 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         if used == 0.0 and shed(spacecraft) is not None and made.propellant:
             used = made.propellant  # once more with the moments half-way
             continue
-        found = as_commands(spacecraft, made, correct, body.inertia)
+        try:
+            found = as_commands(spacecraft, made, correct, body.inertia)
+        except Infeasible:
+            if not tried:
+                raise
+            break
         kept, left = keeps_limits(spacecraft, found.pulses), _left(spacecraft, found, correct)
         tried.append((not kept, left, found))
         rounded = spacecraft.limits.tick is not None
@@ -166,24 +171,34 @@ def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inerti
     ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
     Infeasible where the propellant does not last.
     """
-    translated = _translated(spacecraft, made, inertia, correct)
-    first = _firing(replace(made.without_proof, pulses=translated))
-    if correct.equal and translated:
-        first = replace(first, notes=(*first.notes, *_unequal(made, translated)))
-    tank = spacecraft.tank
-    if tank is not None and first.pulses:
-        full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(first.propellant or 0.0)))
-        if full != left:
-            first = replace(first, notes=(*first.notes, f"tank pressure falls from {full} to {left} bar"))
+    first = _firing(replace(made.without_proof, pulses=_translated(spacecraft, made, inertia, correct)))
     if spacecraft.limits.tick is None or not first.pulses:
-        return _firing(correct(spacecraft, first, TAIL))
-    return _firing(_on_ticks(spacecraft, first, correct))
+        found = _firing(correct(spacecraft, first, TAIL))
+    else:
+        found = _firing(_on_ticks(spacecraft, first, correct))
+    if found.pulses:
+        supply = Supply(spacecraft)
+        supply.count(found)
+        supply.expect_to_last()
+    return replace(found, notes=(*found.notes, *_weakened(spacecraft, made, found, correct)))
 
 
-def _unequal(made: Schedule, translated: tuple[Pulse, ...]) -> Iterator[str]:
+def _weakened(spacecraft: Spacecraft, made: Schedule, found: Schedule, correct: Correct) -> Iterator[str]:
+    """What falling pressure and cold nozzles make of the schedule ``made``, in words."""
+    if correct.equal and found.pulses:
+        yield from _unequal(made, found)
+    tank = spacecraft.tank
+    if tank is not None and found.pulses:
+        full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(found.propellant or 0.0)))
+        if full != left:
+            yield f"tank pressure falls from {full} to {left} bar"
+
+
+def _unequal(made: Schedule, found: Schedule) -> Iterator[str]:
     """What equal pulses of a plan are as commands where those differ, in words."""
     last = made.pulses[-1].on_time
-    alike = [one.loaded[1] for plain_, one in zip(made, translated, strict=True) if plain_.on_time == last]
+    equal = sum(one.on_time == last for one in made)
+    alike = [one.loaded[1] for one in found.pulses[-equal:]]
     shortest, longest = f"{min(alike):.4g}", f"{max(alike):.4g}"
     if shortest != longest:
         yield (
