@@ -54,8 +54,8 @@ def command(
 ) -> None:
     """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
 
-    A channel wired backwards, a reversed sensor and firings that come too late are found and named before they feed
-    the nutation for more than a period: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
+    A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
+    firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     drawn = mapped is not None and Path(mapped).suffix.lower() not in ("", ".csv")
     if drawn:

@@ -20,8 +20,10 @@ DAY = 86400.0
 YEAR = 365.25 * DAY
 """s."""
 
-STAGES = ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0))
-"""Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule."""
+STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
+"""Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.
+
+So many, as the rate is uneven: how well the last pulse of a cycle fits differs with the thrust."""
 
 
 class Thresholds(NamedTuple):
@@ -170,5 +172,5 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
         rate = Map(body, loop, used=share * mass, seed=seed).cycle().propellant
         if rate is None:
             return None
-        total += weight / 6.0 / rate
+        total += weight / rate
     return float(mass * total)

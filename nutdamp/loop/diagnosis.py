@@ -107,12 +107,25 @@ class Diagnosis:
         ``now`` s is when it is judged. ``doubt``: sigma of ``before`` and of ``after``, and by how much each may be off
         in any case.
         """
+        cause = self._cause(channel, now, before, after, expected, doubt)
         first, second, offset = doubt
         self.sizes.append(abs(before.z))
         self.fed += abs(after.z) - abs(before.z)
         self.variance += first * first + second * second
-        if len(self.sizes) > 1 and self.fed > FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset:
+        often = len(self.sizes) > 1
+        if (
+            cause is None
+            and often
+            and self.fed > FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset
+        ):
             return Stop.FED, channel
+        return cause
+
+    def _cause(
+        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
+    ) -> tuple[Stop, str] | None:
+        """What the effects of firings show to be wrong, with the channel to name; None where nothing or not yet."""
+        first, second, offset = doubt
         effect = self.effects.setdefault(channel, Effect())
         effect.add(after.z - before.z, expected, math.hypot(first, second), 2.0 * offset)
         if not effect.known:

@@ -89,8 +89,8 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
         scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
         yield f"{scale} is a reversed sensor: every firing feeds the nutation"
     elif turned:
-        how = "is" if len(turned) == 1 else "are"
-        yield f"loop: {' and '.join(turned)} {how} wired backwards against the sensor, and feed the nutation"
+        how, feed = ("is", "feeds") if len(turned) == 1 else ("are", "feed")
+        yield f"loop: {' and '.join(turned)} {how} wired backwards against the sensor, and {feed} the nutation"
     late = feeding(spacecraft, loop)
     if late is not None:
         yield too_late(late)
@@ -100,7 +100,14 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
             f"loop.start is below {degrees(band.step)}, which the smallest pulse takes away: such a firing leaves "
             "up to as much as it found; a start above it needs less propellant"
         )
-    if band.noise > loop.stop > 0.0:
+    if 0.5 * band.step > loop.stop > 0.0:
+        yield (
+            f"half of {degrees(band.step)}, which the smallest pulse takes away, is above loop.stop: a firing may "
+            "leave more than stop that no pulse lowers, and the loop then never pauses"
+        )
+    if band.noise > loop.start:
+        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.start: they set off firings"
+    elif band.noise > loop.stop > 0.0:
         yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.stop"
 
 
