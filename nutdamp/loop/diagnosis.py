@@ -112,14 +112,8 @@ class Diagnosis:
         self.sizes.append(abs(before.z))
         self.fed += abs(after.z) - abs(before.z)
         self.variance += first * first + second * second
-        often = len(self.sizes) > 1
-        if (
-            cause is None
-            and often
-            and self.fed > FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset
-        ):
-            return Stop.FED, channel
-        return cause
+        most = FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset
+        return (Stop.FED, channel) if cause is None and len(self.sizes) > 1 and self.fed > most else cause
 
     def _cause(
         self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
