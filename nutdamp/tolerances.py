@@ -40,7 +40,8 @@ class Dispersions:
     far the factor of a first cold pulse is off, ``cold_pulses`` how far their number; ``tank_…`` are those of the tank
     (kg, Pa, a bare number), ``inertia_per_kg`` a relative one of all its moments alike. ``sensor_bias`` (rad/s or
     m/s²) and the relative ``sensor_scale`` are of each gyro, or of the accelerometer, of a loop, the relative
-    ``sensor_noise`` and ``sensor_delay`` s of all its samples.
+    ``sensor_noise`` and ``sensor_delay`` s of all its samples. ``correlation``: pairs of inputs, by the names of
+    `nutdamp.dispersion.inputs`, that vary together, see `nutdamp.dispersion.correlation`.
     """
 
     A: Tolerance | None = None
@@ -69,3 +70,4 @@ class Dispersions:
     tank_final_pressure: Tolerance | None = None
     tank_exponent: Tolerance | None = None
     inertia_per_kg: Tolerance | None = None
+    correlation: tuple[tuple[str, str, float], ...] = ()

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dispersion.correlation import Group, groups_of
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.elementwise import (
     Cases,
@@ -137,6 +138,12 @@ class Model:
         object.__setattr__(self, "inputs", list_inputs(body, self.schedule))
         object.__setattr__(self, "_members", members)
         object.__setattr__(self, "_actuations", tuple(map(self._actuation, self.schedule)))
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Inputs that are correlated; raises BadRequest where that cannot be."""
+        requested = self.spacecraft.dispersions
+        return () if requested is None else groups_of(requested.correlation)
 
     @cached_property
     def on_times(self) -> tuple[float, ...]:

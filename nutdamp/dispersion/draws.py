@@ -2,17 +2,19 @@
 
 Cases come in fixed blocks of `BLOCK`. Every input has a stream of its own in every block: the counter-based Philox
 generator with the seed and the input's name in the key, the block in the counter. So case 1234 is the same in a study
-of any size, and a tolerance that is tightened or dropped leaves the draws of all others as they were.
+of any size, and a tolerance that is tightened or dropped leaves the draws of all others as they were. Inputs that are
+correlated are mixed of the streams of their group.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.dispersion.correlation import Group, value_of
 from nutdamp.dispersion.inputs import Input
 from nutdamp.errors import Unsuitable
 
@@ -30,13 +32,27 @@ MOST_ATTEMPTS = 1_000
 class Source:
     """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
 
-    ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all).
+    ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
+    are correlated, those too that are not drawn: which others are makes no difference to a draw.
     """
 
-    def __init__(self, inputs: Sequence[Input], seed: int, physical: Callable[[Draws], NDArray[np.bool_] | bool]):
+    def __init__(
+        self,
+        inputs: Sequence[Input],
+        seed: int,
+        physical: Callable[[Draws], NDArray[np.bool_] | bool],
+        groups: Iterable[Group] = (),
+    ):
         self._random = [entry for entry in inputs if entry.kind != "bias"]
         self._fixed = {entry.name: entry.size for entry in inputs if entry.kind == "bias"}
-        self._keys = [np.array([seed, _number(entry.name)], dtype=np.uint64) for entry in self._random]
+        self._rows = {entry.name: row for row, entry in enumerate(self._random)}
+        self._groups = [group for group in groups if any(name in self._rows for name in group.names)]
+        grouped = {name for group in self._groups for name in group.names}
+        self._alone = [entry for entry in self._random if entry.name not in grouped]
+        self._keys = {
+            name: np.array([seed, _number(name)], dtype=np.uint64)
+            for name in dict.fromkeys([*self._rows, *sorted(grouped)])
+        }
         self._bits = np.random.Philox(key=0)
         self._generator = np.random.Generator(self._bits)
         self._table = np.empty((len(self._random), BLOCK))
@@ -70,27 +86,38 @@ class Source:
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
         """Deviations of one block into ``table`` (inputs, cases); each ``attempt`` has a stream of its own."""
-        for entry, key, row in zip(self._random, self._keys, table, strict=True):
-            self._bits.state = {
-                "bit_generator": "Philox",
-                "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": key},
-                "buffer": np.zeros(4, dtype=np.uint64),
-                "buffer_pos": 4,  # empty: begin with the counter
-                "has_uint32": 0,
-                "uinteger": 0,
-            }
+        for entry in self._alone:
+            row, generator = table[self._rows[entry.name]], self._stream(entry.name, block, attempt)
             if entry.kind == "normal":
-                self._generator.standard_normal(out=row)
+                generator.standard_normal(out=row)
                 row *= entry.size
             else:
-                self._generator.random(out=row)
+                generator.random(out=row)
                 if entry.kind == "triangular":
-                    row += self._generator.random(len(row))
+                    row += generator.random(len(row))
                     row -= 1.0
                 else:
                     row *= 2.0
                     row -= 1.0
                 row *= entry.size
+        for group in self._groups:
+            count = (table.shape[1],)
+            normals = [self._stream(name, block, attempt).standard_normal(count) for name in group.names]
+            for name, normal in zip(group.names, group.mixed(normals), strict=True):
+                if name in self._rows:
+                    table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
+
+    def _stream(self, name: str, block: int, attempt: int) -> np.random.Generator:
+        """The generator, at the begin of what one input draws."""
+        self._bits.state = {
+            "bit_generator": "Philox",
+            "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": self._keys[name]},
+            "buffer": np.zeros(4, dtype=np.uint64),
+            "buffer_pos": 4,  # empty: begin with the counter
+            "has_uint32": 0,
+            "uinteger": 0,
+        }
+        return self._generator
 
 
 def _bad_rows(good: NDArray[np.bool_] | bool, count: int) -> NDArray[np.intp]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.correlation import mixing
 from nutdamp.dispersion.inputs import Input
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
@@ -39,11 +40,13 @@ class FirstOrder:
     """The outcome to first order about nominal values (and biases).
 
     ``jacobian`` (10, d): derivative of each row of `nutdamp.dispersion.outputs.vectors` by each drawn input, in its
-    unit; ``sigmas`` (d,) standard deviations of the inputs.
+    unit; ``sigmas`` (d,) standard deviations of the inputs. ``mixing`` (d, d), times its transpose, is their
+    correlation; None where they are independent.
     """
 
     inputs: tuple[Input, ...]
     jacobian: Array
+    mixing: Array | None = None
 
     @property
     def sigmas(self) -> Array:
@@ -52,8 +55,13 @@ class FirstOrder:
 
     def covariance(self, output: str) -> Array:
         """Covariance of the vector behind ``output``."""
-        scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
+        scaled = self.independent(output)
         return np.asarray(scaled @ scaled.T)
+
+    def independent(self, output: str) -> Array:
+        """What one sigma of each input adds to that vector, (m, d); of correlated ones beyond those before it."""
+        scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
+        return scaled if self.mixing is None else np.asarray(scaled @ self.mixing)
 
     def sigma(self, output: str) -> float:
         """Root mean square of that vector about its mean, rad (rad/s, kg)."""
@@ -65,8 +73,11 @@ class FirstOrder:
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
     def shares(self, output: str) -> Array:
-        """Share of each input in the variance of ``output``, (d,); all zero where nothing varies."""
-        squares = ((self.jacobian * self.sigmas)[VECTORS[output]] ** 2).sum(axis=0)
+        """Share of each input in the variance of ``output``, (d,); all zero where nothing varies.
+
+        Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
+        """
+        squares = (self.independent(output) ** 2).sum(axis=0)
         total = squares.sum()
         return np.asarray(squares / total if total > 0.0 else squares)
 
@@ -83,7 +94,7 @@ def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> First
     out = np.empty((ROWS, 2 * len(inputs)))
     if inputs:
         vectors(model, fly(model.cases(draws)), out)
-    return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps)
+    return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
 
 
 def first_order(model: Model) -> FirstOrder:
@@ -99,7 +110,11 @@ def first_order(model: Model) -> FirstOrder:
         out = np.empty((ROWS, len(inputs)), dtype=complex)
         vectors(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
         jacobian = out.imag / steps
-    return FirstOrder(inputs, jacobian)
+    return FirstOrder(inputs, jacobian, _mixing(model))
+
+
+def _mixing(model: Model) -> Array | None:
+    return mixing(model.inputs.drawn, model.groups) if model.groups else None
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

@@ -18,6 +18,7 @@ from nutdamp import compliance, flight
 from nutdamp.compliance import Left
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
@@ -97,7 +98,7 @@ class Study:
 
     def source(self) -> Source:
         """Draws for one thread."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical)
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
@@ -143,16 +144,10 @@ class Study:
     def fingerprint(self) -> str:
         """Tells whether kept results belong to this study: everything that the numbers depend on, but their count."""
         body, schedule = self.model.spacecraft, self.model.schedule
-        parts: list[Any] = [
-            self.seed,
-            self.flown,
-            body.inertia.moments,
-            body.inertia.axes,
-            body.omega0,
-            body.dispersions,
-        ]
-        parts += [body.requirement, body.goal.spin, body.disturbances, body.dissipation, body.channels, body.steerable]
-        parts += [self.model.target, [(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule]]
+        parts: list[Any] = [self.seed, self.flown, body.inertia.moments, body.inertia.axes, body.omega0]
+        parts += [body.dispersions, body.requirement, body.goal.spin, body.disturbances, body.dissipation]
+        parts += [body.channels, body.steerable, self.model.target]
+        parts.append([(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule])
         if body.keep:
             parts += [(one.direction, one.least, one.most) for one in body.keep]
         if schedule.blocks:  # each case fires them from its own Sun pulses
@@ -231,15 +226,16 @@ class Results:
 
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
-        """`sampled_shares` of the first cases; call it when all is done."""
+        """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call it at the end."""
         count = min(self.done, EARLY)
-        source, random = self.study.source(), [e.name for e in self.study.model.inputs.drawn if e.kind != "bias"]
-        rows: dict[str, list[Array]] = {name: [] for name in random}
+        model, source = self.study.model, self.study.source()
+        rows: dict[str, list[Array]] = {entry.name: [] for entry in model.inputs.drawn if entry.kind != "bias"}
         for block in range(math.ceil(count / BLOCK)):
             draws, _ = source.block(block)
-            for name in random:
-                rows[name].append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
-        return sampled_shares({name: np.concatenate(parts) for name, parts in rows.items()}, self.early[:, :count])
+            for name, parts in rows.items():
+                parts.append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
+        drawn = {name: np.concatenate(parts) for name, parts in rows.items()}
+        return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
 
     def take(self, first: int, values: Array, severity: Array, aspects: Array) -> None:
         """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones."""

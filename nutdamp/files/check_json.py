@@ -190,4 +190,10 @@ def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
     from nutdamp.dispersion.inputs import reachable  # few files have dispersions
 
     inputs, unused = reachable(spacecraft)
-    return {"inputs": [entry._asdict() for entry in inputs], "unused": {entry.name: entry.reason for entry in unused}}
+    from nutdamp.files.dispersion_json import correlation_json
+
+    return {
+        "inputs": [entry._asdict() for entry in inputs],
+        "unused": {entry.name: entry.reason for entry in unused},
+        **correlation_json(spacecraft),
+    }

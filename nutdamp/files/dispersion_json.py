@@ -12,6 +12,7 @@ from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
+from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
     from nutdamp.loop.study import LoopResults
@@ -23,7 +24,8 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
     """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
 
     ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is what one
-    sigma of an input alone (or all of a bias) does to the nutation. ``final`` is the end of the nominal case.
+    sigma of an input alone (or all of a bias) does to the nutation. Of inputs in ``correlation`` each share is what it
+    adds to those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
     """
     study = results.study
     return {
@@ -45,6 +47,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "requirement": requirement_of(results),
         **_cones(results),
         "shares": _shares(results),
+        **correlation_json(study.model.spacecraft),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
         "worst": [
@@ -81,6 +84,12 @@ def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
         "probability": results.probability,
         "met": results.meets_requirement,
     }
+
+
+def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
+    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
 
 
 def _cones(results: Results) -> dict[str, Any]:

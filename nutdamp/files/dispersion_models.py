@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any
 
+from nutdamp.files.fields import Quantity
 from nutdamp.files.sections import Field, Length, Rule, Section
 from nutdamp.tolerances import KINDS, Dispersions, Tolerance
 from nutdamp.units import parse, pattern
@@ -282,6 +283,12 @@ class DispersionsSection(Section):
         description="Of what each kg that is used takes off the moments of inertia, of all alike, in %.",
         examples=[{"normal": "10 %"}],
     )
+    correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
+        default=[],
+        description="Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
+        " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
+        examples=[[["A", "C", 0.99]]],
+    )
 
 
 def dispersions(
@@ -308,7 +315,9 @@ def dispersions(
     found: dict[str, Any] = {}
     for key in (one.name for one in fields(Dispersions)):
         entry = getattr(section, key)
-        if isinstance(entry, ToleranceSection):
+        if key == "correlation":
+            found[key] = tuple((one, other, size) for one, other, size in entry)
+        elif isinstance(entry, ToleranceSection):
             found[key] = entry.tolerance(key)
         elif isinstance(entry, list | tuple):  # by axis
             found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)

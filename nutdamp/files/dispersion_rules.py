@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp.files.correlation_rules import correlation_findings
 from nutdamp.files.dispersion_models import (
     BY_THRUSTER,
     QUANTITIES,
@@ -60,6 +61,7 @@ def dispersion_findings(root: Node) -> Iterator[Finding]:
     yield from _shifted_moments(facts)
     yield from _of_sensor(facts)
     yield from _below_zero(facts)
+    yield from correlation_findings(facts, _entries(facts), thrusts(facts))
 
 
 def _below_zero(facts: Facts) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import CONFIDENCE
-from nutdamp.files.dispersion_json import PERCENTS, requirement_of
+from nutdamp.files.dispersion_json import PERCENTS, correlation_json, requirement_of
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.files.samples_csv import column
@@ -58,6 +58,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
             for name, output in zip(COLUMNS, OUTPUTS, strict=True)
             if output in ("settled", "nutation", "propellant")
         },
+        **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
         "worst": [

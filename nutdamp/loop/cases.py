@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.correlation import Group
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.fed import tank_of
 from nutdamp.dispersion.inputs import SCHEDULE_IDLE, Input, Inputs, list_inputs, of_sensor
@@ -92,6 +93,11 @@ class LoopModel:
     def spacecraft(self) -> Spacecraft:
         """The spacecraft as the law knows it."""
         return self.law.spacecraft
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Inputs that are correlated."""
+        return self._body.groups
 
     @property
     def target(self) -> Vector:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nutdamp import compliance
 from nutdamp.compliance import Left
 from nutdamp.dispersion.binomial import binomial_interval
+from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.elementwise import rotated
 from nutdamp.dispersion.kernel import carried
@@ -96,7 +97,7 @@ class LoopStudy:
 
     def source(self) -> Source:
         """The draws."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical)
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case, by input."""
@@ -280,14 +281,15 @@ class LoopResults:
     def shares(self, output: str) -> dict[str, float]:
         """Share of each input in the variance of an output over the cases that settle: its squared correlation.
 
-        What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies.
+        What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies. Of
+        inputs that are correlated each has what it adds to those before it.
         """
         rows = np.flatnonzero(~self.lost & ~np.isnan(self.values[OUTPUTS.index(output), : self.done]))
         inputs = [entry for entry in self.study.model.inputs.drawn if entry.sigma > 0.0]
         values = self.values[OUTPUTS.index(output)][rows]
         if len(rows) < FEW or np.ptp(values) <= 1e-12 * np.abs(values).max():
             return {}
-        drawn = self.study.draws_from(0, self.done)
+        drawn = independent(self.study.draws_from(0, self.done), inputs, self.study.model.groups)
         chance = 1.0 / (len(rows) - 1)
         squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
         return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}

@@ -222,6 +222,10 @@ def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
     for (tolerance, kind, size), names in alike.items():
         table.add_row(tolerance, kind, size, ", ".join(names))
     yield table
+    given = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    pairs = [f"{in_words(one)} and {in_words(other)} {size:g}" for one, other, size in given]
+    if pairs:
+        yield Text(f"Correlated: {', '.join(pairs)}.")
     if unused:
         yield Text()
         yield Text("Dispersions without effect on anything that fires", style="bold")

@@ -16,8 +16,10 @@ from nutdamp.aspect import aspects
 from nutdamp.compliance import Part
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import cases_to_show
+from nutdamp.dispersion.correlation import together
 from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.sensitivity import FirstOrder
 from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.flight import Flight
@@ -136,8 +138,9 @@ def _cones(results: Results) -> Iterator[RenderableType]:
 class BudgetRow(NamedTuple):
     """A line of the tolerance budget: one input, or those that are left together.
 
-    ``size``: one sigma or the bias as text; ``effects``: what it alone does to the two `_budgeted` outputs, rad;
-    ``inputs``: rows of the drawn inputs; ``bias``: nothing of it varies.
+    ``size``: one sigma or the bias as text; ``effects``: what it alone does to the two `_budgeted` outputs, rad, or the
+    root mean square of what correlated inputs do together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
+    it varies.
     """
 
     name: str
@@ -153,18 +156,34 @@ def budget_rows(study: Study) -> list[BudgetRow]:
     if not any(entry.sigma for entry in inputs):
         return []
     outputs = [output for output, _ in _budgeted(study)]
-    effects = np.array([first.effects(output) for output in outputs])
+    units = together(inputs, study.model.groups)
+    effects = np.array([[_effect(first, output, rows) for rows in units] for output in outputs])
     scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
     order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
     named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
-    groups = [(in_words(inputs[row].name), size_text(inputs[row]), [row]) for row in named]
+    groups = [(*_named([inputs[row] for row in units[at]]), [at]) for at in named]
     if named != order:
-        groups.append((f"{len(order) - len(named)} others", "", order[len(named) :]))
+        others = order[len(named) :]
+        groups.append((f"{sum(len(units[at]) for at in others)} others", "", others))
     rows = []
     for name, size, members in groups:
         nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
-        rows.append(BudgetRow(name, size, (nutation, aim), members, not any(inputs[row].sigma for row in members)))
+        of = [row for at in members for row in units[at]]
+        rows.append(BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of)))
     return rows
+
+
+def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
+    """What an input does alone, or what correlated ones do together (root mean square)."""
+    if len(rows) == 1:
+        return float(first.effects(output)[rows[0]])
+    return float(np.linalg.norm(first.independent(output)[:, rows]))
+
+
+def _named(entries: list[Input]) -> tuple[str, str]:
+    """Name and size of an input, or of correlated ones."""
+    name, size = (", ".join(map(text, entries)) for text in (lambda one: in_words(one.name), size_text))
+    return (f"{name} (correlated)" if len(entries) > 1 else name), size
 
 
 def _budget(results: Results) -> list[RenderableType]:
@@ -183,7 +202,8 @@ def _budget(results: Results) -> list[RenderableType]:
             seen = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
             both = ("bias", "") if row.bias else (_share(float(shares[output][row.inputs].sum())), _share(seen))
             cells += [f"{math.degrees(effect):.3g}", *both]
-        table.add_row(Text(row.name, style="dim"), row.size, *cells)
+        name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
+        table.add_row(Text(name, style="dim"), size, *cells)
     remainder = [
         1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
         for output, _ in budgeted
@@ -197,6 +217,8 @@ def _budget(results: Results) -> list[RenderableType]:
         f"variance: linear by {how}, cases as the first {count:,} cases show it (first-order Sobol "
         "index)."
     )
+    if study.model.groups:
+        note += " Correlated inputs vary together, and their effect is the root mean square of what they do together."
     return [Text("Tolerance budget", style="bold"), table, Text(note, style="dim"), *_dominating(results)]
 
 
@@ -206,11 +228,14 @@ def _dominating(results: Results) -> list[RenderableType]:
     lines: list[RenderableType] = []
     for output, name in _budgeted(results.study):
         sums: dict[str, float] = {}
-        for entry, share in zip(first.inputs, first.shares(output).tolist(), strict=True):
-            sums[entry.tolerance] = sums.get(entry.tolerance, 0.0) + share
+        shares = first.shares(output)
+        for rows in together(first.inputs, results.study.model.groups):
+            entries = [first.inputs[row] for row in rows]
+            key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
+            sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
         ranked = sorted(sums.items(), key=lambda one: -one[1])
-        leading = [f"{in_words(key)} ({_percent(share)})" for key, share in ranked if share >= 0.1]
-        leading = leading or [in_words(ranked[0][0])]
+        leading = [f"{key} ({_percent(share)})" for key, share in ranked if share >= 0.1]
+        leading = leading or [ranked[0][0]]
         verb = "dominates" if len(leading) == 1 else "dominate"
         named = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
         if any(sums.values()):

@@ -128,7 +128,10 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
     yield Text()
     yield Text("What it depends on", style="bold")
     yield table
-    yield Text("Squared correlation over the cases that fall quiet; the rest is noise and what is not linear.", "dim")
+    note = "Squared correlation over the cases that fall quiet; the rest is noise and what is not linear."
+    if results.study.model.groups:
+        note += " Of correlated inputs each has what it adds to those before it in the file's correlation."
+    yield Text(note, "dim")
 
 
 def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:

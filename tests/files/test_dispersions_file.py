@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from broken import BASE
 from numpy.testing import assert_allclose
 
+from nutdamp.dispersion.inputs import reachable
 from nutdamp.errors import FaultyFile
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.spacecraft import Spacecraft
@@ -131,3 +133,35 @@ def test_offsets_of_a_tensor_that_leave_no_body() -> None:
     text = "name: S\ninertia: {tensor: [[120, 0, 0], [0, 100, 0], [0, 0, 30]]}\nomega0: [0, 0.1, 3]\n"
     with pytest.raises(FaultyFile, match=r"dispersions\.A\.bias: .* not physically possible"):
         read_spacecraft(f"{text}dispersions: {{A: {{bias: 60 %}}}}\n", "f.yaml")
+
+
+EVERYTHING = """\
+{A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.01}, thrust: {normal: 1 %}, thrust_per_pulse: {normal: 1 %},
+ thrust_direction: {normal: 1 deg}, position: {normal: 1 mm}, timing: {normal: 1 ms}, timing_offset: {normal: 1 ms},
+ attitude: {normal: 1 deg}, open_delay: {normal: 1 ms}, cold: {normal: 1 %}, cold_pulses: {normal: 1 %},
+ tank_propellant: {normal: 1 %}, tank_final_pressure: {normal: 1 %}, inertia_per_kg: {normal: 1 %},
+ sensor_bias: {normal: 0.01 SENSED}, sensor_scale: {normal: 1 %}, sensor_noise: {normal: 1 %}, PAIRS}
+"""
+CRAFT = """\
+thrusters:
+  - {name: T1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N, isp: 220 s, min_on_time: 20 ms}
+  - {name: T 2, position: [0, -0.3, 0.8], direction: [0, 1, 0], force: 10 N, isp: 220 s, min_on_time: 20 ms}
+valve: {open_delay: 20 ms, close_delay: 20 ms}
+cold: {first: 90 %, pulses: 4}
+tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, inertia_per_kg: {A: 0.1 m^2, C: 0.1 m^2}}
+loop: {sensor: {kind: KIND, rate: 10 Hz, noise: 0.01 SENSED}, start: 0.5 deg}
+"""
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("gyro", "deg/s"), ("accelerometer, position: [1, 0, 0]", "m/s^2")])
+def test_whatever_any_schedule_or_loop_draws_once_may_be_correlated(kind: str, unit: str) -> None:
+    """The file names inputs as the study does, each beside the next."""
+    craft, tolerances = (text.replace("KIND", kind).replace("SENSED", unit) for text in (CRAFT, EVERYTHING))
+    alone = read(tolerances.replace(", PAIRS", ""), craft)
+    names = [one.name for one in reachable(alone).drawn if not one.name.endswith("of each pulse")]
+    assert len(names) > 25
+    pairs = [(first, second, 0.1) for first, second in pairwise(names)]
+    text = f"correlation: [{', '.join(f'[{one}, {other}, {size}]' for one, other, size in pairs)}]"
+    found = read(tolerances.replace("PAIRS", text), craft).dispersions
+    assert found is not None
+    assert found.correlation == tuple(pairs)

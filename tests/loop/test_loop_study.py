@@ -254,6 +254,18 @@ def check_dead_band(name: str, law: dict[str, object], count: int) -> None:
     assert results.study.band == dead_band(body, loop)
 
 
+def test_what_a_loop_draws_is_correlated_as_the_file_says() -> None:
+    scaled = replace(ALL, sensor_scale=relative(0.05, "uniform"))
+    pairs = (("A", "C", 0.9), ("sensor scale 1", "sensor scale 2", 0.7))
+    draws = loop_study(craft(dispersions=replace(scaled, correlation=pairs))).draws_from(0, 4_000)
+    assert np.corrcoef(draws["A"], draws["C"])[0, 1] == pytest.approx(0.9, abs=0.02)
+    found = np.corrcoef(draws["sensor scale 1"], draws["sensor scale 2"])[0, 1]
+    assert found == pytest.approx(6.0 / math.pi * math.asin(0.35), abs=0.03)
+    plain = loop_study(craft(dispersions=scaled)).draws_from(0, 4_000)
+    changed = [name for name in plain if not np.array_equal(plain[name], draws[name])]
+    assert changed == ["C", "sensor scale 1", "sensor scale 2"]
+
+
 @pytest.mark.parametrize("law", [{}, BANGS], ids=["proportional", "bang"])
 @pytest.mark.parametrize("name", NOISY)
 def test_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, object]) -> None:
