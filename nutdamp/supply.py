@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.errors import Infeasible
 from nutdamp.lightening import lightened
@@ -15,9 +17,10 @@ from nutdamp.spacecraft import BLOWDOWN, COLD, LIGHTER, VALVES, Channel, Spacecr
 
 
 class Supply:
-    """What has been fired so far: pulses by channel, and propellant, kg: one number, or an array of cases.
+    """What has been commanded so far: pulses by channel, and propellant, kg: one number, or an array of cases.
 
-    By default what was fired before t = 0.
+    By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts: with an empty
+    one nothing fires, and the last pulse before that only as far as the propellant goes.
     """
 
     def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
@@ -42,7 +45,8 @@ class Supply:
     @property
     def since(self) -> Any:
         """What of it has been used since t = 0, kg."""
-        return self.used if self.spacecraft.tank is None else self.used - self.spacecraft.tank.used
+        tank = self.spacecraft.tank
+        return self.used if tank is None else np.minimum(self.used, tank.propellant) - tank.used
 
     def level(self, channel: str) -> Any:
         """Thrust of the next pulse of ``channel``, over that of the file."""
@@ -53,8 +57,8 @@ class Supply:
     def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
         """The pulse as strong as it really is, taken into account for those after it."""
         if channel is None or pulse.torque is None or self.steady:
-            self.used += pulse.propellant or 0.0
-            return pulse
+            share = self.draw(pulse.propellant or 0.0)
+            return pulse if share == 1.0 else weakened(pulse, share)
         level, propellant = self.take(channel, pulse.on_time)
         torque, force = channel.torque * level, channel.force
         return replace(
@@ -65,8 +69,17 @@ class Supply:
             propellant=propellant,
         )
 
+    def draw(self, propellant: Any) -> Any:
+        """Draws so many kg; returns the share of them that there is."""
+        tank, before = self.spacecraft.tank, self.used
+        self.used = before + propellant
+        return 1.0 if tank is None else tank.share(before, propellant)
+
     def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
-        """Level of a pulse of effective ``on_time`` s and its propellant, kg or None; it counts for those after it."""
+        """Level of a pulse of effective ``on_time`` s and its propellant, kg or None; it counts for those after it.
+
+        No level once the tank is empty.
+        """
         level, tank = self.level(channel.name), self.spacecraft.tank
         isp = None if tank is None else tank.isp_after(self.used)
         flow: Any = channel.mass_flow
@@ -74,8 +87,8 @@ class Supply:
             flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
         propellant = None if flow is None else flow * on_time * level
         self.fired[channel.name] += 1
-        self.used = self.used + (0.0 if propellant is None else propellant)
-        return level, propellant
+        share = self.draw(0.0 if propellant is None else propellant)
+        return level * share, None if propellant is None else propellant * share
 
     def count(self, made: Iterable[Pulse]) -> None:
         """Take pulses into account that are as strong as they really are."""
@@ -95,6 +108,13 @@ class Supply:
         """Raise Infeasible where there is a `shortage`."""
         if self.shortage is not None:
             raise Infeasible(self.shortage)
+
+
+def weakened(pulse: Pulse, factor: float) -> Pulse:
+    """A pulse of so many times the thrust; backwards where that is negative."""
+    torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
+    used = None if pulse.propellant is None else abs(factor) * pulse.propellant
+    return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
 
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:

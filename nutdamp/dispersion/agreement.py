@@ -11,7 +11,8 @@ from nutdamp import compliance
 from nutdamp.compliance import Part
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.outputs import OUTPUTS
-from nutdamp.dispersion.study import STRIDE, Results, Study, run
+from nutdamp.dispersion.rounds import STRIDE
+from nutdamp.dispersion.study import Results, Study, run
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.outcome import Deviation, tolerated
 

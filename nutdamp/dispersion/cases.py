@@ -71,7 +71,7 @@ class DispersedCases:
     the rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its
     ``thrust`` where a valve is not as the file has it. ``tilt`` is the rotation vector (rad, about body axes 1 and 2)
     by which the attitude at t = 0 is off; ``spent`` the propellant of each pulse, kg, None where that of one is not
-    known; ``per_kg`` what each kg takes off the moments, m², None where they stay.
+    known; ``drained`` as in `fed.Fed`; ``per_kg`` what each kg takes off the moments, m², None where they stay.
     """
 
     moments: Triple
@@ -83,6 +83,7 @@ class DispersedCases:
     thrust: tuple[tuple[Thrusting, ...], ...]
     tilt: tuple[Cases, Cases]
     spent: tuple[Cases, ...] | None
+    drained: Cases = 0.0
     per_kg: Triple | None = None
 
     @property
@@ -220,7 +221,7 @@ class Model:
             flows.append(flow * factor)
             strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
             thrust.append(tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()))
-        levels, spent = supplied(self.spacecraft, self.schedule, draws, flows)
+        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
         per_kg = shed(self.spacecraft)
         return DispersedCases(
             moments=self._moments(draws),
@@ -238,6 +239,7 @@ class Model:
             ),
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
             spent=spent,
+            drained=drained,
             per_kg=None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0))),
         )
 

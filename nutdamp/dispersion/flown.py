@@ -43,7 +43,8 @@ class RealWidths:
         propellant = cases.propellant
         if self.model.schedule.blocks:
             settled, turned, _, seen, over = self._fired(cases, watch)
-            propellant = None if propellant is None else propellant * self._share(seen)
+            if cases.spent is not None:
+                propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
@@ -69,6 +70,7 @@ class RealWidths:
             propellant=propellant,
             nutation=None if np.array_equal(last[0], last[1]) else largest_nutation(last, momentum, sense),
             aspects=None if watch is None else watch.angles,
+            drained=cases.drained,
         )
 
     def timed(self, cases: DispersedCases) -> DispersedCases:
@@ -87,11 +89,6 @@ class RealWidths:
         count = number_of(cases)
         bodies = self._bodies(_whole(cases.moments, count))
         return sun_fired.fly(self.model, bodies, _whole(cases.omega0, count), _upright(count), cases, watch)
-
-    def _share(self, seen: NDArray[np.bool_]) -> Array:
-        """Share of the propellant that pulses (k, n) take of which only those ``seen`` are fired."""
-        taken = np.array([pulse.propellant for pulse in self.model.schedule], dtype=float)
-        return np.asarray(taken @ seen / taken.sum())
 
     def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> rigid_cases.Pulses:
         """The pulses by the ramps of their thrust, each as one of its own; as in `rigid_cases.Pulses`."""

@@ -45,6 +45,7 @@ class Ends:
     estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
     None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
     rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
+    ``drained`` as in `fed.Fed`.
     """
 
     momentum: Triple
@@ -56,6 +57,7 @@ class Ends:
     propellant: Cases | None
     nutation: Cases | None = None
     aspects: NDArray[np.float64] | None = None
+    drained: Cases = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +156,7 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
         spin=spin,
         spin_change=spin - cases.omega0[2],
         propellant=cases.propellant,
+        drained=cases.drained,
     )
 
 

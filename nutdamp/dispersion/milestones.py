@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from nutdamp.commands import Block
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.outputs import OUTPUTS, measure
-from nutdamp.dispersion.study import STRIDE, Study
+from nutdamp.dispersion.rounds import STRIDE
+from nutdamp.dispersion.study import Study
 from nutdamp.dispersion.sun_fired import sun_seen
 from nutdamp.schedule import Schedule
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,24 +20,18 @@ from nutdamp.dispersion.cases import DispersedCases, Model
 from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
 from nutdamp.dispersion.kernel import ClosedForm, Ends
-from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure, vectors
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure
+from nutdamp.dispersion.rounds import Round
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
-from nutdamp.physics import rigid_cases
 
 Array = NDArray[np.float64]
 Fly = Callable[[DispersedCases], Ends]
 
 CHUNK = 8_192
 """Cases that the kernel works on at once, so that they stay in the cache."""
-
-STRIDE = rigid_cases.BLOCK
-"""Cases that are always flown together, as real widths need it; chunks are multiples of it."""
-
-PORTION = 2 * STRIDE
-"""Cases that a thread takes at once where they are flown through real widths; blocks are multiples of it."""
 
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
@@ -105,11 +98,14 @@ class Study:
         draws, _ = self.source().block(case // BLOCK)
         return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
 
+    def ends_of(self, draws: Draws) -> Ends:
+        """How one case with these deviations ends; none: the estimate itself."""
+        return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))
+
     def outputs_of(self, draws: Draws) -> Array:
         """The outputs (5,) of one case with these deviations; none: of the estimate itself."""
         out = np.empty((len(OUTPUTS), 1))
-        cases = self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()})
-        measure(self.model, self.flies(cases), out)
+        measure(self.model, self.ends_of(draws), out)
         return out[:, 0]
 
     @property
@@ -121,13 +117,13 @@ class Study:
     def severity(self, values: Array, ends: Ends) -> Array:
         """How bad cases are, (n,), by `compliance.severity`, of the outputs (5, n) and ``ends`` of cases.
 
-        Where the axis breaks a cone on the way, no better than the share of its bound that is used up.
+        Where the axis breaks a cone on the way, or the tank runs empty, no better than the share of its bound, or of
+        the propellant, that is used up.
         """
         body, aim = self.model.spacecraft, OUTPUTS.index(compliance.aim(self.model.spacecraft).value)
         found = np.asarray(compliance.severity(body, Left(values[0], values[aim], ends.spin)))
-        if ends.aspects is None:
-            return found
-        worst = self.used(ends.aspects).max(axis=0)
+        shares = [*([] if ends.aspects is None else self.used(ends.aspects)), ends.drained]
+        worst = np.maximum.reduce(np.broadcast_arrays(*shares))
         return np.where(worst > 1.0, np.maximum(worst, found), found)
 
     def used(self, aspects: Array) -> Array:
@@ -137,7 +133,7 @@ class Study:
 
     def aspects_of(self, draws: Draws) -> Array | None:
         """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
-        found = self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()})).aspects
+        found = self.ends_of(draws).aspects
         return None if found is None else found[:, :, 0]
 
     @property
@@ -150,6 +146,8 @@ class Study:
         parts.append([(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule])
         if body.keep:
             parts += [(one.direction, one.least, one.most) for one in body.keep]
+        if body.cold is not None or body.tank is not None:
+            parts += [body.cold, body.tank]
         if schedule.blocks:  # each case fires them from its own Sun pulses
             parts += [schedule.blocks, body.sun, body.sun_sensor]
         if schedule.through_valves:
@@ -164,7 +162,7 @@ class Results:
 
     ``values`` (5, capacity) are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the
     outcome of the first cases. By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the
-    least and the largest angle in all cases.
+    least and the largest angle in all cases. ``emptied`` counts those whose tank runs empty.
     """
 
     study: Study
@@ -172,6 +170,7 @@ class Results:
     done: int = 0
     redrawn: int = 0
     met: int = 0
+    emptied: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     values: Array | None = None
     sketches: list[Sketch] | None = None
@@ -237,11 +236,18 @@ class Results:
         drawn = {name: np.concatenate(parts) for name, parts in rows.items()}
         return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
 
-    def take(self, first: int, values: Array, severity: Array, aspects: Array) -> None:
-        """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones."""
+    def take(
+        self, first: int, values: Array, severity: Array, aspects: Array, emptied: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones.
+
+        ``emptied`` (n,): whose tank runs empty; None for none.
+        """
         broken = self.study.used(aspects) > 1.0
         missed = (severity > 1.0) & bool(compliance.required(self.study.model.spacecraft))
-        self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed)))
+        emptied = np.zeros(len(severity), dtype=bool) if emptied is None else emptied
+        self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed | emptied)))
+        self.emptied += int(np.count_nonzero(emptied))
         self.broken += broken.sum(axis=1)
         self.aspects[:, 0] = np.minimum(self.aspects[:, 0], aspects[:, 0].min(axis=1))
         self.aspects[:, 1] = np.maximum(self.aspects[:, 1], aspects[:, 1].max(axis=1))
@@ -254,7 +260,7 @@ class Results:
         """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
         if requested < self.done:
             raise BadRequest(f"{self.done} cases are done already: expected at least as many, or no --resume")
-        done = self.done, self.redrawn, self.met, self.worst
+        done = self.done, self.redrawn, self.met, self.emptied, self.worst
         more = Results(self.study, requested, *done, sketches=self.sketches, early=self.early)
         more.broken, more.aspects = self.broken, self.aspects
         if self.values is not None and more.values is not None:
@@ -287,110 +293,15 @@ def run(
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)
         out = np.empty((len(OUTPUTS), last - first)) if results.values is None else results.values[:, first:last]
-        flights = _Round(results, first, last, out, chunk)
+        flights = Round(results, first, last, out, chunk)
         done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:
             break
         results.redrawn += redrawn
-        results.take(first, out[:, :done], flights.severity[:done], flights.aspects[:, :, :done])
+        results.take(
+            first, out[:, :done], flights.severity[:done], flights.aspects[:, :, :done], flights.emptied[:done]
+        )
         if collect is not None:
             collect(first, out[:, :done])
         watch(results.done)
     return results
-
-
-class _Round:
-    """Some cases of a study, flown by several threads that take one portion after the other.
-
-    A portion is a block of draws; where flying takes much longer than drawing a part of it, so that few cases too
-    are shared by the threads.
-    """
-
-    def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
-        self.results, self.first, self.last, self.out = results, first, last, out
-        self.severity = np.empty(last - first)
-        self.aspects = np.empty((len(results.broken), 2, last - first))
-        self.chunk = max(chunk // STRIDE, 1) * STRIDE
-        self.portion = PORTION if results.study.flown else BLOCK
-        self.portions = range(first // self.portion, math.ceil(last / self.portion))
-        self.taken = 0
-        self.finished = 0
-        self.redrawn = 0
-        self.failures: list[BaseException] = []
-        self.lock = threading.Lock()
-
-    def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
-        """How many cases were flown, always the first ones, and how many draws were made again."""
-        count = min(threads, len(self.portions))
-        workers = [threading.Thread(target=self._work, args=(stopped,)) for _ in range(count)]
-        for worker in workers:
-            worker.start()
-        try:
-            for worker in workers:
-                while worker.is_alive():
-                    worker.join(0.1)
-                    if worker.is_alive():
-                        watch(max(self._flown, self.first))
-        except BaseException:
-            self.taken = len(self.portions)  # nothing more is begun
-            for worker in workers:
-                worker.join()
-            raise
-        if self.failures:
-            raise self.failures[0]
-        return max(self._flown - self.first, 0), self.redrawn
-
-    @property
-    def _flown(self) -> int:
-        """Where the cases end that are flown; below ``first`` where none is."""
-        return min(self.last, (self.portions[0] + self.finished) * self.portion)
-
-    def _work(self, stopped: Callable[[], bool]) -> None:
-        try:
-            source = self.results.study.source()
-            drawn, block = None, -1
-            while not stopped():
-                with self.lock:
-                    if self.taken >= len(self.portions):
-                        return
-                    portion = self.portions[self.taken]
-                    self.taken += 1
-                begin = max(self.first, portion * self.portion)
-                end = min(self.last, (portion + 1) * self.portion)
-                if drawn is None or begin // BLOCK != block:
-                    block = begin // BLOCK
-                    drawn = source.block(block)
-                redrawn = self._fly(drawn, block * BLOCK, begin, end)
-                with self.lock:
-                    self.finished += 1
-                    self.redrawn += redrawn
-        except BaseException as failure:  # handed to the thread that waits
-            with self.lock:
-                self.failures.append(failure)
-                self.taken = len(self.portions)
-
-    def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
-        """Fly the cases from ``begin`` to ``end`` of the block that starts at ``start``; returns how often they were
-        drawn again.
-        """
-        study, early = self.results.study, self.results.early
-        draws, redrawn = drawn
-        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
-        for low in range(begin - begin % STRIDE, end, self.chunk):
-            high = min(low + self.chunk, end + -end % STRIDE)
-            rows = slice(low - start, high - start)
-            ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
-            columns = slice(max(low, begin), min(high, end))
-            inner = slice(columns.start - low, columns.stop - low)
-            outputs = np.empty((len(OUTPUTS), high - low))
-            measure(study.model, ends, outputs)
-            place = slice(columns.start - self.first, columns.stop - self.first)
-            self.out[:, place] = outputs[:, inner]
-            self.severity[place] = study.severity(outputs, ends)[inner]
-            if ends.aspects is not None:
-                self.aspects[:, :, place] = ends.aspects[:, :, inner]
-            if low < EARLY:
-                outcome = np.empty((ROWS, high - low))
-                vectors(study.model, ends, outcome)
-                early[:, columns] = outcome[:, inner]
-        return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))

@@ -46,6 +46,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         },
         "requirement": requirement_of(results),
         **_cones(results),
+        **({"tank_empty_fraction": results.emptied / results.done} if study.model.spacecraft.tank else {}),
         "shares": _shares(results),
         **correlation_json(study.model.spacecraft),
         "unused": [entry.name for entry in study.model.inputs.unused],

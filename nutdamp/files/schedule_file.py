@@ -82,7 +82,7 @@ class _Reader:
                 self._expect(line, self.commanded[line], fired)
             yield fired
         if supply.shortage is not None:
-            self.table.warn(pulses[-1][0], "tank", supply.shortage)
+            self.table.warn(pulses[-1][0], "tank", f"{supply.shortage}: the last pulses do not fire")
 
     def _instead(self, name: str) -> str:
         """The channel that a name not in the file may stand for, or all there are."""

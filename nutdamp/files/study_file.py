@@ -30,7 +30,7 @@ def save_results(path: str, results: Results) -> None:
     arrays: dict[str, Any] = {
         "made_by": np.array(_made_by()),
         "fingerprint": np.array(study.fingerprint),
-        "counts": np.array([done, results.redrawn, results.met], dtype=np.int64),
+        "counts": np.array([done, results.redrawn, results.met, results.emptied], dtype=np.int64),
         "worst_cases": results.worst.cases,
         "worst_severities": results.worst.severities,
         "early": results.early[:, : min(done, EARLY)],
@@ -90,10 +90,10 @@ def _made_by() -> str:
 
 def _check(arrays: dict[str, Any], cones: int) -> None:
     """Raises ValueError or KeyError for arrays of a study with so many ``cones`` that `save_results` does not write."""
-    done, redrawn, met = arrays["counts"].tolist()
+    done, redrawn, met, emptied = arrays["counts"].tolist()
     worst, early, outputs = min(done, KEPT_WORST), min(done, EARLY), len(OUTPUTS)
     forms: dict[str, tuple[type, tuple[int, ...]]] = {
-        "counts": (np.int64, (3,)),
+        "counts": (np.int64, (4,)),
         "worst_cases": (np.int64, (worst,)),
         "worst_severities": (np.float64, (worst,)),
         "early": (np.float64, (ROWS, early)),
@@ -108,20 +108,21 @@ def _check(arrays: dict[str, Any], cones: int) -> None:
         if arrays[name].dtype != kind or arrays[name].shape != shape:
             raise ValueError(f"{name} is {arrays[name].dtype} {arrays[name].shape}, expected {kind} {shape}")
     cases, counted = arrays["worst_cases"], arrays.get("sketches", np.full((1, 1), done))
-    possible = done > 0 and redrawn >= 0 and 0 <= met <= done and np.all((cases >= 0) & (cases < done))
+    possible = done > 0 and redrawn >= 0 and 0 <= met <= done - emptied <= done
+    possible = possible and np.all((cases >= 0) & (cases < done))
     possible = possible and np.all((arrays["broken"] >= 0) & (arrays["broken"] <= done))
     if not (possible and np.all(counted >= 0) and np.all(counted.sum(axis=1) == done)):
         raise ValueError("counts that no study has")
 
 
 def _results(study: Study, arrays: dict[str, Any]) -> Results:
-    done, redrawn, met = (int(count) for count in arrays["counts"])
+    done, redrawn, met, emptied = (int(count) for count in arrays["counts"])
     sketches = None
     if "sketches" in arrays:
         sketches = [Sketch() for _ in OUTPUTS]
         for sketch, counts, (least, most) in zip(sketches, arrays["sketches"], arrays["extremes"], strict=True):
             sketch.counts, sketch.minimum, sketch.maximum = counts, float(least), float(most)
-    results = Results(study, done, done, redrawn, met, values=arrays.get("values"), sketches=sketches)
+    results = Results(study, done, done, redrawn, met, emptied, values=arrays.get("values"), sketches=sketches)
     results.worst.cases, results.worst.severities = arrays["worst_cases"], arrays["worst_severities"]
     results.broken, results.aspects = arrays["broken"], arrays["aspects"]
     results.early[:, : arrays["early"].shape[1]] = arrays["early"]

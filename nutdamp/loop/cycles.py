@@ -130,7 +130,8 @@ class Map:
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1) -> None:
         limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
-        self.truth, self.used = replace(spacecraft, cold=None, limits=limits), used
+        tank = spacecraft.tank and spacecraft.tank.doubled  # so that none runs empty amid a cycle
+        self.truth, self.used = replace(spacecraft, cold=None, tank=tank, limits=limits), used
         self.law, self.spin = Law(self.truth, loop), spacecraft.spin
         self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
         self.seen = transfer(self.law, self.spin)
@@ -140,8 +141,7 @@ class Map:
         self.up = Odds(self.seen, self.start, self.law.growth, below=False)
         self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
         self.near = self._near()
-        reach = SIGMAS * self.seen.sigma + abs(self.seen.offset)
-        half = abs(0.5 * self.turn.imag)
+        reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
         acts = [abs(one.kick) * abs(math.sin(half * one.shortest)) / half for one in self.law.actuators]
         self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
         self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)

@@ -30,6 +30,7 @@ class Stop(Enum):
 
     END = "the end of the time"
     FULL = "limits.max_pulses"
+    EMPTY = "the tank is empty"
     SENSOR = "the sensor is reversed"
     CHANNEL = "a channel is wired backwards"
     UNCLEAR = "a channel is wired backwards, or the sensor is reversed"
@@ -39,7 +40,7 @@ class Stop(Enum):
 
     @property
     def fault(self) -> bool:
-        """Whether the loop was stopped before it could feed the nutation."""
+        """Whether the loop was stopped before it could feed the nutation, or has nothing left to fire."""
         return self not in (Stop.END, Stop.FULL)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from enum import Enum
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -21,7 +20,7 @@ from nutdamp.loop.watch import GRID, MOST, Found, Seen, Watch
 from nutdamp.loop_settings import ACCELEROMETER, Loop
 from nutdamp.schedule import Pulse, channel_pulse, on_command
 from nutdamp.spacecraft import Spacecraft, Vector
-from nutdamp.supply import Supply
+from nutdamp.supply import Supply, weakened
 
 MOST_FIRINGS = 10_000
 """Firings of one flight, at most."""
@@ -124,8 +123,10 @@ class Pilot:
                 raise Infeasible(f"more than {MOST_FIRINGS} firings by {made.start:.6g} s; an earlier end helps")
             return None
         made = self.supply.fire(made, channel)
+        if self.supply.shortage is not None:
+            self.ending = Stop.EMPTY, ""
         sense = -factor if channel.name in self.loop.reversed else factor
-        return made if sense == 1.0 else _scaled(made, sense)
+        return made if sense == 1.0 else weakened(made, sense)
 
     def take(self, pulse: Pulse, size: float, spin: float) -> None:
         """Notes a firing, with |z| and ω3 (rad/s) in truth as it begins, and what was seen before it."""
@@ -250,13 +251,6 @@ class Pilot:
         """By how much the sensor may show too much of |z|, rad/s."""
         estimator = Estimator(self.law, self.loop.sensor, 0.0)
         return estimator.offset + NO_NOISE * estimator.doubt(1)
-
-
-def _scaled(pulse: Pulse, factor: float) -> Pulse:
-    """A pulse of so many times the thrust; backwards where that is negative."""
-    torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
-    used = None if pulse.propellant is None else abs(factor) * pulse.propellant
-    return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,12 @@ class Tank:
     used: float = 0.0
     inertia_per_kg: tuple[float, float, float] | None = None
 
+    @property
+    def doubled(self) -> Tank:
+        """One with twice the propellant, in which the pressure falls as in this one, and on."""
+        low = self.pressure / (2.0 * self.pressure / self.final_pressure - 1.0)
+        return replace(self, propellant=2.0 * self.propellant, final_pressure=low)
+
     def pressure_after(self, used: Any) -> Any:
         """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it: one number or an array.
 
@@ -70,6 +76,17 @@ class Tank:
     def thrust_factor(self, used: Any) -> Any:
         """Thrust over that of a full tank."""
         return (self.pressure_after(used) / self.pressure) ** self.exponent
+
+    def share(self, used: Any, more: Any) -> Any:
+        """Share of a pulse that is fired which takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
+
+        A pulse during which the tank runs empty is as long as commanded, and that much weaker.
+        """
+        left, many = self.propellant - used, np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
+        if not many:
+            return 1.0 if more <= left or more == 0.0 else max(left, 0.0) / more
+        lasts = np.real(more) <= np.real(left)
+        return np.where(lasts, 1.0, np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more))
 
     def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""

@@ -41,6 +41,9 @@ SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "
 MOST_ROWS = 12
 """Inputs that the budget names; the rest is summed up."""
 
+EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
+"""Of a case whose tank runs empty."""
+
 TINY = 1e-300
 
 ROUNDING = 1e-12
@@ -54,7 +57,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
-    parts += [Text(), *requirement_lines(results), *_cones(results), Text(), *_budget(results)]
+    parts += [Text(), *requirement_lines(results), *_cones(results), *_emptied(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
@@ -133,6 +136,13 @@ def _cones(results: Results) -> Iterator[RenderableType]:
             (f"broken in {share} of cases", "red" if broken else "green"),
             f"; {seen} in all cases, {alone} in the nominal one.",
         )
+
+
+def _emptied(results: Results) -> Iterator[RenderableType]:
+    """In how many cases the tank runs empty, where any does."""
+    if results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
 
 
 class BudgetRow(NamedTuple):
@@ -338,9 +348,10 @@ def case_screen(
         for row, which in enumerate(("least", "largest")):
             cells = (f"{math.degrees(found[index, row]):.4g}" for found in angles if found is not None)
             outcome.add_row(Text(f"{which} from {keep.name}, deg", style="dim"), *cells)
+    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(real.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
-    return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"))
+    return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"), *empty)
 
 
 def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:

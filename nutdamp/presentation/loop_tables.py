@@ -68,6 +68,7 @@ def stopped(run: Run) -> str:
         after = f"after {count} firing{'s' * (count != 1)}, at {moment(run.fired[-1].pulse.end)}: "
     name = run.channel
     said = {
+        Stop.EMPTY: "the tank is empty, and nothing fires any more",
         Stop.SENSOR: "the sensor is reversed: firings of two channels changed what it shows against what they should",
         Stop.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
         Stop.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",

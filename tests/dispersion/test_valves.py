@@ -23,9 +23,10 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
-from nutdamp.schedule import Schedule, on_command
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.schedule import Pulse, Schedule, on_command
+from nutdamp.spacecraft import Requirement, Spacecraft
 from nutdamp.supply import supplied
+from nutdamp.tolerances import Dispersions, Tolerance
 
 SLOW = Trapezoid(0.008, 0.012, 0.005, 0.010)
 TABLE = Measured(((0.01, 0.008, 0.011), (0.05, 0.047, 0.036), (0.2, 0.198, 0.11)))
@@ -170,6 +171,64 @@ def test_a_case_of_another_tank_is_the_flight_of_such_a_body(change: str) -> Non
     outputs = flown_outputs(model, dict(draws))
     assert outputs[0] == pytest.approx(expected, rel=1e-9)
     assert outputs[4] == pytest.approx(given.propellant, rel=1e-12)
+
+
+LAST = replace(TANK, exponent=0.0, isp=None, inertia_per_kg=None)
+"""A tank that is all the same until it is empty."""
+
+
+def weaker(pulse: Pulse, factor: float) -> Pulse:
+    """So many times as strong."""
+    assert pulse.torque is not None
+    return replace(pulse, torque=factor * pulse.torque, impulse=factor * pulse.impulse)
+
+
+@pytest.mark.parametrize("short", [0.3, 0.7, 1.2])
+def test_with_an_empty_tank_nothing_fires_any_more(short: float) -> None:
+    """A case is the flight of the pulses that the propellant goes round for, the last of them weakened."""
+    body = replace(through(SLOW), cold=None)
+    one, two, three = (on_command(body.channels[at], 1.0 + 0.7 * at, 0.06) for at in (0, 1, 2))
+    each = one.propellant
+    assert each is not None
+    body = replace(body, tank=replace(LAST, propellant=3.0 * each))
+    model = Model(body, Schedule((one, two, three)))
+    draws = {"tank propellant": -short * each}
+    whole, part = divmod(3.0 - short, 1.0)
+    left = [*(one, two, three)[: int(whole)], weaker((one, two, three)[int(whole)], part)]
+    expected = flown(replace(body, tank=None), Schedule(tuple(left))).residual.nutation
+    assert nutation(model, {}) != pytest.approx(expected, rel=1e-2)
+    assert nutation(model, draws) == pytest.approx(expected, rel=1e-9)
+    ends = ClosedForm(model)(model.cases({"tank propellant": np.full(2, -short * each)}))
+    assert np.arctan2(np.hypot(*ends.momentum[:2]), ends.momentum[2])[0] == pytest.approx(expected, rel=1e-5)
+    assert ends.drained == pytest.approx(3.0 / (3.0 - short), rel=1e-9)
+    assert flown_outputs(model, draws)[[0, 4]] == pytest.approx([expected, (3.0 - short) * each], rel=1e-9)
+
+
+def test_what_a_schedule_takes_beyond_the_tank_does_not_fire() -> None:
+    body = replace(through(SLOW), cold=None)
+    pulses = [on_command(body.channels[at], 1.0 + 0.7 * at, 0.06) for at in (0, 1, 2)]
+    each = pulses[0].propellant
+    assert each is not None
+    given = supplied(replace(body, tank=replace(LAST, propellant=1.5 * each)), pulses)
+    assert [one.propellant for one in given] == pytest.approx([each, 0.5 * each, 0.0], rel=1e-9)
+    for share, one, whole in zip((1.0, 0.5, 0.0), given, pulses, strict=True):
+        assert one.impulse == pytest.approx(share * whole.impulse, rel=1e-9)
+
+
+def test_cases_whose_tank_runs_empty_are_counted_and_do_not_comply() -> None:
+    body = replace(through(SLOW), cold=None, requirement=Requirement(nutation=math.radians(5.0)))
+    fires = Schedule((on_command(body.channels[0], 1.0, 0.06),))
+    used = fires.propellant
+    assert used is not None
+    wide = Dispersions(tank_propellant=Tolerance("uniform", 0.2, relative=True))
+    body = replace(body, tank=replace(LAST, propellant=1.1 * used), dispersions=wide)
+    study = study_of(body, Schedule(supplied(body, fires)), seed=3)
+    results = run(Results(study, 3000))
+    tanks = 1.1 * used + study.source().block(0)[0]["tank propellant"][:3000]  # type: ignore[index]
+    assert results.emptied == np.count_nonzero(tanks < used)
+    assert 0.15 < results.emptied / 3000 < 0.35
+    assert results.met == 3000 - results.emptied
+    assert set(results.worst.cases[: results.emptied].tolist()) == set(np.flatnonzero(tanks < used).tolist())
 
 
 @pytest.mark.parametrize(

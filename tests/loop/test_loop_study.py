@@ -14,10 +14,11 @@ from nutdamp.dispersion import study_of
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.plan import loop_of
+from nutdamp.loop.run import fly
 from nutdamp.loop.stability import dead_band
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy, loop_study, run
 from nutdamp.loop_settings import ACCELEROMETER, BANG, Loop, Sensor
-from nutdamp.physics.feed import Cold
+from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Trapezoid
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Channel, Disturbance, Requirement, Spacecraft
@@ -164,6 +165,22 @@ def test_what_never_settles_is_worst_and_does_not_comply() -> None:
     assert results.settled == 60 - never.sum()
     assert set(results.worst.cases[: never.sum()]) == set(np.flatnonzero(never))
     assert results.met <= results.settled
+
+
+def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
+    body = craft(dispersions=Dispersions(tank_propellant=Tolerance("uniform", 0.3, relative=True)))
+    assert body.loop is not None
+    needs = fly(body, body.loop, 60.0).schedule.propellant
+    assert needs is not None
+    tank = Tank(needs, 22e5, 22e5, 0.0)
+    results = run(LoopResults(study(replace(body, tank=tank)), 200))
+    empty = results.stops[Stop.EMPTY]
+    assert 60 < empty < 140
+    assert results.met == results.settled == 200 - empty
+    used = results.values[OUTPUTS.index("propellant")]
+    tanks = np.broadcast_to(needs + results.study.draws_from(0, 200)["tank propellant"], 200)
+    assert used[results.lost] == pytest.approx(tanks[results.lost], rel=1e-9)
+    assert np.all(used <= tanks)
 
 
 def test_faults_stop_each_case_on_its_own() -> None:
