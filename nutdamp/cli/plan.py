@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from nutdamp.robust import RobustComparison
 
 
-SCHEMES = "schemes"
-"""The picture of all plans; the others are of one."""
+SCHEMES, PRIMER = "schemes", "primer"
+"""The pictures of all plans and of the certificate; the others are of one plan."""
 
 
 @click.command("plan", cls=PlanningCommand)
@@ -59,7 +59,8 @@ SCHEMES = "schemes"
 @click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
-@plot_options((*FIGURES, SCHEMES))
+@click.option("--certificate", type=FILE, help="Write the proof of the least cost of optimal.")
+@plot_options((*FIGURES, SCHEMES, PRIMER))
 @quiet_option
 def command(
     spacecraft: Input,
@@ -73,6 +74,7 @@ def command(
     blocks: str | None,
     table: str | None,
     json: str | None,
+    certificate: str | None,
     plot: str | None,
     figure: str,
     quiet: bool,
@@ -83,9 +85,9 @@ def command(
     A FILE of - is standard output.
     """
     expect_impulses(impulses, force, robust, "--robust")
-    one_plan, all_plans = (None, plot) if figure == SCHEMES else (plot, None)
+    one_plan, all_plans, curve = (plot if here else None for here in _pictured(figure))
     _expect_one_scheme(names, csv=csv, plot=one_plan)
-    files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "plot": plot}
+    files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "certificate": certificate, "plot": plot}
     job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
     if robust:
         require_dispersions(job.spacecraft)
@@ -103,6 +105,7 @@ def command(
         (json, partial(_data, compared, decided, dispersed)),
         (table, partial(_schemes, compared, decided)),
         (all_plans, partial(_schemes_picture, compared, decided)),
+        *_outputs_of_proof(compared, certificate, curve),
         *_outputs_of(chosen, csv, one_plan, figure),
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
     ]
@@ -159,6 +162,31 @@ def _outputs_of_blocks(
     from nutdamp.files.blocks_csv import blocks_csv
 
     return [(path, partial(blocks_csv, found.flight))]
+
+
+def _pictured(figure: str) -> tuple[bool, bool, bool]:
+    """Whether a picture is of one plan, of all of them, or of the certificate."""
+    return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
+
+
+def _outputs_of_proof(compared: Comparison, path: str | None, plot: str | None) -> list[Output]:
+    """The files of the certificate of the plan of optimal, which must be among the plans."""
+    if path is None and plot is None:
+        return []
+    from nutdamp.certificate import SCHEME, certificate
+
+    planned = next((one for one in compared if one.scheme == SCHEME), None)
+    if planned is None:
+        raise BadRequest(f"a certificate is of {SCHEME}, which was not planned: name it with --scheme")
+    found = certificate(planned)
+    from nutdamp.files.certificate_json import certificate_json
+
+    def picture() -> Figure:
+        from nutdamp.presentation import figures
+
+        return figures.certificate_figure(found)
+
+    return [(path, partial(certificate_json, found)), (plot, picture)]
 
 
 def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:

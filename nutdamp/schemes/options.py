@@ -158,7 +158,7 @@ class OptimalOptions(SchemeOptions):
         "What to save; impulse if propellant is unknown.",
     )
     free_axis: bool = _option(False, FLAG, "Let the angular momentum end anywhere.")
-    shift: float | None = _option(None, ANGLE, "How far from its target H may end, such as 0.2deg.")
+    shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
     def __post_init__(self) -> None:
         super().__post_init__()

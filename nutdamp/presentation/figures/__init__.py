@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp import flight as flights
 from nutdamp.presentation import geometry
+from nutdamp.presentation.figures.certificate import certificate_figure
 from nutdamp.presentation.figures.dispersion import dispersion_figure
 from nutdamp.presentation.figures.export import ending, rendered, svg
 from nutdamp.presentation.figures.overview import flight_figure
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from nutdamp.track import Track
 
 __all__ = [
+    "certificate_figure",
     "dispersion_figure",
     "ending",
     "flight_figure",

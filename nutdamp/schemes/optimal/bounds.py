@@ -189,21 +189,36 @@ def _largest(value: Callable[[Vector], Vector], middle: float, reach: float) -> 
     return best
 
 
-def first_order(program: Program, prices: Vector) -> float:
-    """Cost that the ``program`` of small angles cannot go below, by ``prices`` (equations,) of one N m s each.
+class Proof(NamedTuple):
+    """Cost that no schedule goes below, ``bound``, and the ``prices`` (equations,) of one N m s each that prove it.
 
-    Any prices give a bound; the best are those of a solution.
+    ``gained`` is what channels that are on for long gain by these prices, and is taken off.
     """
+
+    bound: float
+    prices: Vector
+    gained: float = 0.0
+
+
+def first_order(program: Program, prices: Vector) -> Proof:
+    """What the ``program`` of small angles cannot go below, by ``prices`` (equations,) of one N m s each.
+
+    Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
+    """
+    nothing = Proof(0.0, np.zeros_like(prices))
     if not prices.any():
-        return 0.0
+        return nothing
     gains = _Gains(program, prices)
     lowered = max(gains.highest(program.strong), 0.0 if program.strong.all() else 1.0)
     if lowered <= 0.0:
-        return 0.0
+        return nothing
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
     factors = lowered * np.array([1.0] if program.strong.all() else LOWERINGS)
-    best = max(goal / factor - gains.lasting(~program.strong, factor) for factor in map(float, factors))
-    return float(max(best, 0.0) * (1.0 - ROUNDING))
+    found = []
+    for factor in map(float, factors):
+        gained = gains.lasting(~program.strong, factor)
+        found.append(Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained))
+    return max([nothing, *found], key=lambda one: one.bound)
 
 
 class _Gains:

@@ -109,7 +109,7 @@ class Problem:
         """The schedule with what any other must cost."""
         program = self.program()
         first = first or program.solve()
-        least = None if first.unmet > UNMET else bounds.first_order(program, first.prices)
+        least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
         return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end))
 
     def rigorous(self, made: Schedule) -> float | None:

@@ -70,13 +70,19 @@ class Influence:
         return np.asarray(np.einsum("nek,nk,ne->e", self.rows(times), impulses, self.widths(widths)))
 
 
+def growth_from(spacecraft: Spacecraft) -> float:
+    """s from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
+    growth = spacecraft.growth
+    return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
+
+
 def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
     """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
 
     What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
     """
     inertia, spin, goal, growth = spacecraft.inertia, spacecraft.spin, spacecraft.goal, spacecraft.growth
-    last = min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
+    last = growth_from(spacecraft)
     shift = -square_to_target(spacecraft) @ spacecraft.momentum
     if np.any(shift):  # as long as the way there is on the sphere
         shift *= spacecraft.turning_impulse / np.linalg.norm(shift)
