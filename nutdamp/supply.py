@@ -13,7 +13,7 @@ from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.errors import Infeasible
 from nutdamp.lightening import lightened
 from nutdamp.schedule import Pulse, Schedule, on_command
-from nutdamp.spacecraft import BLOWDOWN, COLD, LIGHTER, VALVES, Channel, Spacecraft, Tank
+from nutdamp.spacecraft import BLOWDOWN, COLD, LIGHTER, VALVES, Channel, Spacecraft
 
 
 class Supply:
@@ -132,8 +132,10 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
     elif law == LIGHTER and spacecraft.tank is not None:
         body = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
+    elif law == BLOWDOWN and spacecraft.tank is not None:  # once it is empty nothing fires, at full pressure too
+        body = replace(spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure))
     else:
-        body = replace(spacecraft, cold=None) if law == COLD else replace(spacecraft, tank=_steady(spacecraft.tank))
+        body = replace(spacecraft, cold=None)
     known = {channel.name: channel for channel in body.channels}
     fired = [
         on_command(known[pulse.channel], *pulse.loaded)
@@ -142,8 +144,3 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         for pulse in schedule
     ]
     return body, Schedule(supplied(body, fired))
-
-
-def _steady(tank: Tank | None) -> Tank | None:
-    """The tank with its pressure kept; None where nothing else is known of it."""
-    return None if tank is None or tank.inertia_per_kg is None else replace(tank, final_pressure=tank.pressure)

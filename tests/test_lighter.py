@@ -22,7 +22,7 @@ from nutdamp.lightening import lightened
 from nutdamp.loop.run import fly
 from nutdamp.physics.feed import Tank
 from nutdamp.physics.valve import Trapezoid
-from nutdamp.schedule import Schedule, on_command
+from nutdamp.schedule import Schedule, channel_pulse, on_command
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.supply import supplied
 from nutdamp.verification import verify
@@ -214,3 +214,28 @@ def test_three_moments_of_a_file() -> None:
     assert craft.tank is not None
     assert craft.tank.inertia_per_kg == (0.4, 0.3, 0.2)
     assert lightened(craft, 0.5).moments == pytest.approx((119.8, 119.85, 79.9))
+
+
+@pytest.mark.parametrize("per_kg", [None, (900.0, 900.0, 600.0)])
+def test_without_blowdown_the_tank_is_empty_sooner(per_kg: tuple[float, float, float] | None) -> None:
+    """At full pressure the commands take more than there is; what comes after that does not fire."""
+    jets = tuple(
+        channel(name, *torque, thrust=10.0, isp=220.0)
+        for name, torque in {"a": (8.0, 0.0, 0.0), "b": (0.0, 8.0, 0.0)}.items()
+    )
+    craft = replace(spinner(degrees=2.0, channels=jets), tank=Tank(0.1, 22e5, 8e5, 1.0, inertia_per_kg=per_kg))
+    wide = [channel_pulse(jets[at % 2], 5.0 * at + 5.0, 1.0) for at in range(40)]
+    full = wide[0].propellant
+    assert full is not None
+    made = Schedule(supplied(craft, wide[:32]))
+    assert 0.085 < (made.propellant or 0.0) < 0.1 < 32 * full
+    (row,) = (one for one in verify(craft, made).budget if one.name == "without blowdown")
+    steady = replace(craft, tank=Tank(1.0, 22e5, 22e5, 0.0, inertia_per_kg=per_kg))
+    whole, part = divmod(0.1, full)
+    last = wide[int(whole)]
+    assert last.torque is not None
+    share = part / full
+    fires = [*wide[: int(whole)], replace(last, impulse=share * last.impulse, torque=share * last.torque)]
+    expected = flown(steady, Schedule((*fires[:-1], replace(fires[-1], propellant=part)))).residual
+    assert row.nutation == pytest.approx(expected.nutation, rel=1e-6)
+    assert row.momentum_shift == pytest.approx(expected.momentum_shift, rel=1e-6)
