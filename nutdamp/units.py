@@ -139,6 +139,11 @@ def pattern(kind: str) -> str:
     return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})\s*$"
 
 
+def bar(pressure: float) -> str:
+    """A pressure given in Pa as people read it."""
+    return f"{1e-5 * pressure:.4g} bar"
+
+
 def shown(value: object) -> str:
     """A value as messages show it: one line, short, in the words of YAML."""
     if isinstance(value, bool):

@@ -170,20 +170,24 @@ class Model:
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
         """Which cases can be: moments of a rigid body, thrust that pushes."""
-        first, second, third = self._moments(draws)
-        slack = 1.0 + DISC
-        good: Any = True
-        if "A" in draws or "C" in draws:
-            good = (first > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
-            if first is not second:
-                good = good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
+        moments = self._moments(draws)
+        good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
             if entry.tolerance in NOT_NEGATIVE and entry.name in draws:
                 good = good & (entry.nominal + draws[entry.name] >= 0.0)
         tank = tank_of(self.spacecraft, draws)
         if tank is not None and any(name.startswith("tank ") for name in draws):
             good = good & feed.possible(tank)
+        per_kg = self._per_kg(draws)
+        if tank is not None and per_kg is not None:  # with all of it used there must be a body left
+            shed = scaled(per_kg, -1.0 * tank.propellant)
+            good = good & _possible(*added(moments, shed))
         return good  # type: ignore[no-any-return]
+
+    def _per_kg(self, draws: Draws) -> Triple | None:
+        """What each kg of propellant takes off the moments, m²; None where they stay."""
+        per_kg = shed(self.spacecraft)
+        return None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
 
     def cases(self, draws: Draws) -> DispersedCases:
         """The cases of the ``draws`` (deviations by input name)."""
@@ -222,7 +226,6 @@ class Model:
             strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
             thrust.append(tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()))
         levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
-        per_kg = shed(self.spacecraft)
         return DispersedCases(
             moments=self._moments(draws),
             omega0=added(omega0, turned(turn.T, off)),
@@ -240,7 +243,7 @@ class Model:
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
             spent=spent,
             drained=drained,
-            per_kg=None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0))),
+            per_kg=self._per_kg(draws),
         )
 
     def _moments(self, draws: Draws) -> Triple:
@@ -340,6 +343,13 @@ class Model:
             return x, y, z
         cosine, sine = cos_sin(angle)
         return x * cosine - y * sine, x * sine + y * cosine, z
+
+
+def _possible(first: Cases, second: Cases, third: Cases) -> Any:
+    """Which moments a rigid body can have."""
+    slack = 1.0 + DISC
+    good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
+    return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
 
 
 def _width(pulse: Pulse) -> float:

@@ -230,7 +230,8 @@ def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | Non
 def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
     """Tolerances of cold nozzles and of the tank; ``fires``: whether any thruster does."""
     cold, tank = spacecraft.cold, spacecraft.tank
-    of_cold = {"cold": (1.0, ""), "cold_pulses": (0.0 if cold is None else cold.pulses, "")}
+    first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
+    of_cold = {"cold": (first, ""), "cold_pulses": (count, "")}
     units = {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}
     of_tank = {f"tank_{name}": (0.0 if tank is None else getattr(tank, name), unit) for name, unit in units.items()}
     for key, (nominal, unit) in (of_cold | of_tank | {"inertia_per_kg": (1.0, "")}).items():

@@ -232,7 +232,7 @@ class DispersionsSection(Section):
     )
     cold: Annotated[ToleranceSection, _Alike("cold")] | None = Field(
         default=None,
-        description="Of the thrust of a first cold pulse, in % of a warm one.",
+        description="Of the factor of a first cold pulse, cold.first, in % of it.",
         examples=[{"normal": "2 %"}],
     )
     sensor_bias: Annotated[ToleranceSection, _Alike("sensor_bias")] | None = Field(

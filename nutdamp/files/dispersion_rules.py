@@ -28,8 +28,7 @@ from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.physics.inertia import principal_axes
 from nutdamp.schedule import STEERABLE
 from nutdamp.tolerances import KINDS
-from nutdamp.units import KINDS as KINDS_OF
-from nutdamp.units import shown
+from nutdamp.units import bar, shown
 
 LARGEST_SIGMA = 0.5
 """One sigma of a normal distribution, relative to the nominal value, that is still believed: beyond, more than one
@@ -73,16 +72,22 @@ def _below_zero(facts: Facts) -> Iterator[Finding]:
                 if size is not None and size[1] > (1.0 + 1e-12) * nominal:
                     yield _negative(path, size, f"the {key} of {name}, {nominal:g} s")
                     break
+    low = facts.number("pressure", "tank", "final_pressure")
     for key in ("tank_propellant", "tank_pressure", "tank_final_pressure"):
         nominal_, path_ = facts.number(QUANTITIES[key], "tank", key.removeprefix("tank_")), ("dispersions", key)
-        size = _size_of(facts, path_, QUANTITIES[key]) if nominal_ is not None else None
-        if size is not None and nominal_ is not None and size[1] > nominal_:
-            yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {nominal_:g} {KINDS_OF[QUANTITIES[key]].si}")
+        size = _size_of(facts, path_, QUANTITIES[key], nominal_) if nominal_ is not None else None
+        if size is None or nominal_ is None:
+            continue
+        floor = low if key == "tank_pressure" and low is not None else 0.0
+        if size[1] > (1.0 + 1e-12) * (nominal_ - floor):
+            value, least = (f"{one:g} kg" if key == "tank_propellant" else bar(one) for one in (nominal_, floor))
+            below = f"less than final_pressure, {least}" if floor else "negative"
+            yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {value}", below)
 
 
-def _negative(path: KeyPath, size: tuple[str, float], of: str) -> Finding:
+def _negative(path: KeyPath, size: tuple[str, float], of: str, below: str = "negative") -> Finding:
     reach = "draws beyond three sigma" if size[0] == "normal" else "draws"
-    problem = f"{reach} would make {of}, negative; expected a smaller spread, or a larger nominal value"
+    problem = f"{reach} would make {of}, {below}; expected a smaller spread, or a larger nominal value"
     return Finding((*path, size[0]), problem)
 
 
@@ -95,10 +100,17 @@ def _each(facts: Facts, key: str) -> list[KeyPath]:
     return [(*path, name) for name, _ in node.children()] if by_name(node.value) else [path]
 
 
-def _size_of(facts: Facts, path: KeyPath, kind: str) -> tuple[str, float] | None:
-    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``."""
+def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
+    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``.
+
+    One in % is that of the ``nominal`` value, where that is known.
+    """
     for name in KINDS:
         size = facts.number(kind, *path, name)
+        share = None if size is not None or nominal is None else facts.number("ratio", *path, name)
+        if share is not None and nominal is not None:
+            out_of_range = abs(share) > (LARGEST_SIGMA if name == "normal" else LARGEST_OFFSET)  # said by `_kinds`
+            size = None if out_of_range else share * nominal
         if size is not None:
             return name, -size if name == "bias" else 3.0 * size if name == "normal" else size
     return None

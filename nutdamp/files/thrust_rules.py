@@ -12,6 +12,7 @@ from nutdamp.files.dispersion_models import VALVE_TIMES
 from nutdamp.files.dispersion_rules import moments_of, thrusts
 from nutdamp.files.facts import Facts, Finding
 from nutdamp.files.yaml_tree import KeyPath, Node
+from nutdamp.units import bar
 
 THRUST_KEYS = ("valve", "cold", "tank")
 """At the root of the file."""
@@ -119,7 +120,7 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
     """What is wrong with the tank; ``named`` are the thrusts of the thrusters, N."""
     full, empty = (facts.number("pressure", "tank", key) for key in ("pressure", "final_pressure"))
     if full is not None and empty is not None and empty > full > 0.0:
-        problem = f"{empty:g} Pa exceeds pressure: it falls as propellant is used; expected at most {full:g} Pa"
+        problem = f"{bar(empty)} exceeds pressure: it falls as propellant is used; expected at most {bar(full)}"
         yield Finding(("tank", "final_pressure"), problem)
     mass, propellant = facts.number("mass", "mass"), facts.number("mass", "tank", "propellant")
     if mass is not None and propellant is not None and propellant >= mass > 0.0:
@@ -127,11 +128,11 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
     rows = [facts.number("pressure", "tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
     for number, (before, pressure) in enumerate(pairwise(rows), start=1):
         if before is not None and pressure is not None and pressure <= before:
-            problem = f"{pressure:g} Pa is not above that of the row before, {before:g} Pa; expected rising pressures"
+            problem = f"{bar(pressure)} is not above that of the row before, {bar(before)}; expected rising pressures"
             yield Finding(("tank", "isp", number, 0), problem)
     known = [pressure for pressure in rows if pressure is not None]
     if full is not None and known and not min(known) <= full <= max(known):
-        problem = f"{min(known):g} Pa to {max(known):g} Pa leave out the pressure at t = 0, {full:g} Pa; add a row"
+        problem = f"{bar(min(known))} to {bar(max(known))} leave out the pressure at t = 0, {bar(full)}; add a row"
         yield Finding(("tank", "isp"), problem)
     if propellant is not None and facts.has("tank", "inertia_per_kg"):
         yield from _emptied(facts, propellant)

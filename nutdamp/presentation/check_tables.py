@@ -14,6 +14,7 @@ from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import degrees, duration, in_degrees, moment, quantity, vector
 from nutdamp.spacecraft import Channel, Cold, Spacecraft, SunSensor, Tank
+from nutdamp.units import bar
 from nutdamp.words import listed
 
 
@@ -159,13 +160,13 @@ def _cold(cold: Cold) -> str:
 def _tank(tank: Tank) -> str:
     empty = tank.pressure_after(tank.propellant)
     levels = "; ".join(
-        f"{1e-5 * tank.pressure_after(used):.4g} bar and {100.0 * tank.thrust_factor(used):.4g} % of the thrust with "
+        f"{bar(tank.pressure_after(used))} and {100.0 * tank.thrust_factor(used):.4g} % of the thrust with "
         f"{used:.4g} kg used"
         for used in (0.5 * tank.propellant, tank.propellant)
     )
     isp = tank.isp_after(0.0), tank.isp_after(tank.propellant)
-    falls = "" if None in isp else f" Specific impulse: {isp[0]:.4g} s full, {isp[1]:.4g} s at {1e-5 * empty:.4g} bar."
-    return f"Tank: {1e-5 * tank.pressure:.4g} bar full; {levels}.{falls}"
+    falls = "" if None in isp else f" Specific impulse: {isp[0]:.4g} s full, {isp[1]:.4g} s at {bar(empty)}."
+    return f"Tank: {bar(tank.pressure)} full; {levels}.{falls}"
 
 
 def _on_times(channel: Channel) -> str:

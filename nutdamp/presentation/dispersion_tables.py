@@ -35,7 +35,13 @@ if TYPE_CHECKING:
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
-SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "m": ("mm", 1e3), "s": ("ms", 1e3)}
+SHOWN = {
+    "rad": ("deg", 180.0 / math.pi),
+    "rad/s": ("deg/s", 180.0 / math.pi),
+    "m": ("mm", 1e3),
+    "s": ("ms", 1e3),
+    "Pa": ("bar", 1e-5),
+}
 """Units that people read for those of inputs, and the factor."""
 
 MOST_ROWS = 12
@@ -263,7 +269,7 @@ def _percent(share: float) -> str:
 
 def in_words(name: str) -> str:
     """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the file."""
-    key, blank, whose = name.partition(" ")
+    key, blank, whose = name.replace("tank ", "tank_", 1).partition(" ")
     if key.startswith("omega0"):
         return f"initial ω{key.removeprefix('omega0').removeprefix('_')}"
     return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
@@ -272,9 +278,14 @@ def in_words(name: str) -> str:
 def size_text(entry: Input) -> str:
     """One sigma, or the bias, as the file might have it."""
     if entry.unit == "":
-        return f"{100 * (entry.sigma or entry.size):.3g} %"
+        return _of_nominal(entry, entry.sigma or entry.size, ".3g")
     unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
     return quantity(scale * (entry.sigma or entry.size), unit, 3)
+
+
+def _of_nominal(entry: Input, value: float, form: str) -> str:
+    """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
+    return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"
 
 
 def _worst(results: Results, count: int) -> list[RenderableType]:
@@ -320,7 +331,7 @@ def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
         unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
         draw = draws[entry.name]
         sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
-        off = f"{100 * draw:+.4g} %" if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
+        off = _of_nominal(entry, draw, "+.4g") if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
         estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
         inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
     return inputs

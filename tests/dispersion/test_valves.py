@@ -23,6 +23,7 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
+from nutdamp.presentation.dispersion_tables import in_words, size_text
 from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import Requirement, Spacecraft
 from nutdamp.supply import supplied
@@ -238,7 +239,13 @@ def test_cases_whose_tank_runs_empty_are_counted_and_do_not_comply() -> None:
         ("close_delay: {uniform: 13 ms}", "draws would make the close_delay of a, 0.012 s, negative"),
         ("rise_time: {a: {triangular: 6 ms}}", "draws would make the rise_time of a, 0.005 s, negative"),
         ("fall_time: {c: {bias: -11 ms}}", "draws would make the fall_time of c, 0.01 s, negative"),
-        ("tank_pressure: {uniform: 23 bar}", "draws would make tank.pressure, 2.2e+06 Pa, negative"),
+        ("tank_pressure: {uniform: 7 bar}", "draws would make tank.pressure, 22 bar, less than final_pressure, 16 bar"),
+        (
+            "tank_pressure: {normal: 10 %}",
+            "draws beyond three sigma would make tank.pressure, 22 bar, less than final_pressure, 16 bar",
+        ),
+        ("tank_final_pressure: {uniform: 17 bar}", "draws would make tank.final_pressure, 16 bar, negative"),
+        ("tank_propellant: {normal: 40 %}", "draws beyond three sigma would make tank.propellant, 2 kg, negative"),
         ("tank_propellant: {normal: 51 %}", "of at most 50 %"),
     ],
 )
@@ -310,3 +317,44 @@ def test_a_study_spreads_as_its_valves_do() -> None:
     assert found is not None
     low, high = found.quantiles(np.array([0.1587, 0.8413]))
     assert high - low == pytest.approx(abs(slope[1] - slope[0]), rel=0.05)
+
+
+def test_no_case_is_left_without_a_body_when_the_tank_is_empty() -> None:
+    """Moments less all of the propellant: drawn again where no rigid body has them."""
+    fires = Schedule((on_command(through(SLOW).channels[0], 1.0, 0.05),))
+    shed = replace(TANK, propellant=0.01, inertia_per_kg=(9000.0, 9000.0, 6500.0))  # 80 kg m² less 65
+    body = replace(
+        through(SLOW), tank=shed, dispersions=Dispersions(inertia_per_kg=Tolerance("normal", 0.15, relative=True))
+    )
+    model = study_of(body, Schedule(supplied(body, fires))).model
+    (entry,) = model.inputs.drawn
+    draws, redrawn = Source((entry,), 3, model.physical).block(0)
+    left = np.array([[120.0], [120.0], [80.0]]) - 0.01 * np.outer(
+        shed.inertia_per_kg or (), 1.0 + np.asarray(draws["inertia_per_kg"])
+    )
+    assert len(redrawn) > 100
+    assert np.all(left > 0.0)
+    assert np.all(left[2] <= 2.0 * left[0])
+
+
+@pytest.mark.parametrize(
+    ("line", "nominal", "shown"),
+    [
+        ("cold: {normal: 2 %}", 0.9, "2 %"),
+        ("cold_pulses: {uniform: 10 %}", 4.0, "5.77 %"),
+        ("tank_exponent: {bias: 5 %}", 1.2, "5 %"),
+        ("tank_final_pressure: {normal: 0.5 bar}", 16e5, "0.5 bar"),
+    ],
+)
+def test_bare_numbers_are_dispersed_and_shown_in_parts_of_their_own_values(
+    line: str, nominal: float, shown: str
+) -> None:
+    tank = "tank: {propellant: 2, pressure: 22 bar, final_pressure: 16 bar, exponent: 1.2}\n"
+    cold = "cold: {first: 90 %, pulses: 4}\n"
+    body = read_spacecraft(FILE + cold + tank + f"dispersions: {{{line}}}\n", "sat.yaml")
+    fires = Schedule((on_command(body.channels[0], 1.0, 0.05),))
+    (entry,) = list_inputs(body, fires).drawn
+    assert entry.nominal == pytest.approx(nominal)
+    assert size_text(entry) == shown
+    assert in_words(entry.name) == line.partition(":")[0].replace("_", " ")
+    assert Model(body, fires).physical({entry.name: np.array([-1.001 * nominal])}) == [False]
