@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
 from nutdamp.loop.law import ComplexArray
-from nutdamp.spacecraft import Vector
+from nutdamp.spacecraft import Spacecraft, Vector
 
 WORKS = 0.25
 """Share of what it was to add above which a firing works, and below whose negative it works backwards."""
@@ -17,12 +18,26 @@ WORKS = 0.25
 SIGMAS = 5.0
 """A firing is judged by what so many sigma of the noise leave open."""
 
+WHICH = 3.0
+"""The same, where it is known that something works backwards, to tell a channel from the sensor."""
 
 FED = 0.5
-"""Share of the first size that firings may add to it in all: then they feed it, whatever hides which of them."""
+"""Share of its first size by which the nutation may grow while it is fired at: then firings feed it."""
 
-STALE = 4.0
-"""Nutation periods after a firing, from which on what is seen no longer tells what it did."""
+PHASED = 1e-3
+"""Doubt of the phase of z (rad) from which on sizes tell more of what a firing did."""
+
+LOST = 1.0
+"""Doubt of the phase of a firing (rad) from which on nothing can be said of what it was to do."""
+
+LARGE = 100.0
+"""Exponent of growth beyond which it does not matter by how much more it grows."""
+
+STEPPED = math.sqrt(3.0)
+"""The most by which a value in steps is off over its root mean square."""
+
+ALIKE = 1e-9
+"""Share of the samples below which what they tell of the bias is rounding."""
 
 
 class Stop(Enum):
@@ -44,17 +59,79 @@ class Stop(Enum):
         return self not in (Stop.END, Stop.FULL)
 
 
+class Doubt(NamedTuple):
+    """What may be off in estimates of z: ``noise`` rad/s (one sigma) of a sample, ``white`` its part at the rate of z.
+
+    Both fall with the root of the number of samples, but to ``least``: of fits that share theirs. At rest the noise
+    counts ``lift`` times. ``bias`` is a constant of the coasts, ``steps`` of the quantisation are at most off by that.
+    ``turn`` is the share by which the rate at which z turns may be off, ``scale`` that of the sensor.
+    """
+
+    noise: float
+    white: float
+    least: float
+    lift: float
+    bias: float
+    steps: float
+    turn: float = 0.0
+    scale: float = 0.0
+
+    def of(self, seen: Glimpse) -> float:
+        """One sigma of what was ``seen`` on a coast, for a bias that is known."""
+        mixed = self.white * math.sqrt((1.0 + abs(seen.leak) ** 2 * (self.lift**2 - 1.0)) / seen.samples)
+        return math.hypot(max(min(mixed, self.noise), self.least), self.steps / STEPPED)
+
+
 @dataclass(slots=True)
 class Glimpse:
-    """The mean of the rates z seen on one coast, carried to the centre of a firing by the nutation ``rate`` (1/s)."""
+    """The rates z seen on one coast, carried to the centre of a firing by the nutation ``rate`` (1/s), with a bias b.
+
+    z = ``z`` - b ``leak``, the least squares fit; b by what is left of it: ``rest`` = b ``told``. ``apart``: time from
+    the samples to the firing, s.
+    """
 
     z: complex
     samples: int
+    leak: complex
+    rest: complex
+    told: float
+    apart: float
 
     @classmethod
     def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
         """Of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
-        return cls(complex((best * np.exp(1j * rate * (times - centre))).mean()), len(times))
+        course = np.exp(-1j * rate * (times - centre))  # of z = 1 at the centre
+        power, total, count = float((abs(course) ** 2).sum()), complex(course.sum()), len(times)
+        z = complex(np.vdot(course, best)) / power
+        rest, told = complex(best.sum()) - z * total, count - abs(total) ** 2 / power
+        return cls(z, count, total.conjugate() / power, rest, told, abs(float(times.mean()) - centre))
+
+
+class Change(NamedTuple):
+    """z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
+
+    ``bound``: by how much it may be off beside that, in every firing alike.
+    """
+
+    before: complex
+    after: complex
+    sigma: float
+    bound: float
+
+    @classmethod
+    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> Change:
+        """By two coasts of the same bias, which is estimated with them where that tells more than how large it can be.
+
+        What of it stays open counts by how unlike the coasts are.
+        """
+        sigma, unlike = math.hypot(doubt.of(before), doubt.of(after)), abs(after.leak - before.leak)
+        told, bias, open_ = before.told + after.told, 0j, doubt.bias
+        if doubt.bias > 0.0 and told > ALIKE * (before.samples + after.samples):
+            noise = doubt.white * doubt.lift / math.sqrt(told)
+            bends = math.pi * doubt.turn * max(abs(before.z), abs(after.z))  # by turning from the middle to the ends
+            if max(noise, bends) < doubt.bias:
+                bias, open_, sigma = (before.rest + after.rest) / told, bends, math.hypot(sigma, unlike * noise)
+        return cls(before.z - bias * before.leak, after.z - bias * after.leak, sigma, unlike * open_)
 
 
 @dataclass(slots=True)
@@ -64,25 +141,41 @@ class Effect:
     did: complex = 0.0
     wanted: float = 0.0
     noise: float = 0.0
-    offset: float = 0.0
+    bound: float = 0.0
 
-    def add(self, change: complex, expected: complex, noise: float, offset: float) -> None:
-        """A firing that changed z by ``change`` and was to by ``expected``, known to ``noise`` (sigma), ``offset``."""
-        size = abs(expected) ** 2
-        self.did += change * expected.conjugate()
-        self.wanted += size
-        self.noise += size * noise * noise
-        self.offset += abs(expected) * offset
+    def add(self, change: Change, expected: complex, phase: float) -> None:
+        """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a ``phase`` (rad).
+
+        Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies between |z + e| of
+        a firing that works and |z - e| of one that works backwards.
+        """
+        wanted, did = abs(expected), (change.after - change.before) * expected.conjugate()
+        bound = change.bound + phase * abs(change.before)
+        if phase > PHASED and abs(change.before) >= 0.5 * wanted:
+            works, feeds = abs(change.before + expected), abs(change.before - expected)
+            wanted, bound = 0.5 * (feeds - works), change.bound + phase * wanted
+            did = complex((0.5 * (feeds + works) - abs(change.after)) * wanted)
+        self.did += did
+        self.wanted += wanted * wanted
+        self.noise += 0.5 * (wanted * change.sigma) ** 2
+        self.bound += abs(wanted) * bound
 
     @property
     def factor(self) -> complex:
         """1 for what works, -1 for what works backwards, 0 for what does nothing."""
-        return self.did / self.wanted
+        return self.did / self.wanted if self.wanted > 0.0 else 1.0
 
-    @property
-    def known(self) -> bool:
-        """Whether noise and bias leave no doubt which."""
-        return SIGMAS * math.sqrt(self.noise) + self.offset < WORKS * self.wanted
+    def open(self, sigmas: float = SIGMAS) -> float:
+        """By how much noise, and what is off in every firing, may change the factor."""
+        return (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted if self.wanted > 0.0 else math.inf
+
+    def works(self, sigmas: float = SIGMAS) -> bool:
+        """Whether the firings surely do what they shall, not the contrary."""
+        return self.factor.real >= WORKS and self.factor.real - self.open(sigmas) > -WORKS
+
+    def backwards(self, sigmas: float = SIGMAS) -> bool:
+        """Whether they surely do the contrary."""
+        return self.factor.real <= -WORKS and self.factor.real + self.open(sigmas) < WORKS
 
 
 @dataclass(slots=True)
@@ -90,64 +183,87 @@ class Diagnosis:
     """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
 
     Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
+    z grows by ``growth`` 1/s, and with tan θ = ``slope`` |z| the spin falls; ``first``: |z| (rad/s) of the nutation that
+    is fired at, and the time (s), since the loop was last quiet.
     """
 
     period: float
+    growth: float = 0.0
+    slope: float = 0.0
     effects: dict[str, Effect] = field(default_factory=dict)
     suspect: str | None = None
     deadline: float = math.inf
-    fed: float = 0.0
-    variance: float = 0.0
-    sizes: list[float] = field(default_factory=list)
+    first: tuple[float, float] | None = None
 
     def judge(
-        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
+        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
     ) -> tuple[Stop, str] | None:
         """Why to stop after a firing of ``channel`` that was to add ``expected``, and the channel to name; else None.
 
-        ``now`` s is when it is judged. ``doubt``: sigma of ``before`` and of ``after``, and by how much each may be off
-        in any case.
+        Another may be fired from ``now`` s on.
         """
-        cause = self._cause(channel, now, before, after, expected, doubt)
-        first, second, offset = doubt
-        self.sizes.append(abs(before.z))
-        self.fed += abs(after.z) - abs(before.z)
-        self.variance += first * first + second * second
-        most = FED * self.sizes[0] + SIGMAS * math.sqrt(self.variance) + 2.0 * offset
-        return (Stop.FED, channel) if cause is None and len(self.sizes) > 1 and self.fed > most else cause
+        change, effect = Change.of(before, after, doubt), self.effects.setdefault(channel, Effect())
+        size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
+        falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
+        half = math.pi * doubt.turn  # by which z may have turned from the middle of a period to its ends
+        share = falls + doubt.scale + 0.5 * half * half
+        if doubt.turn * before.apart * turns < LOST:
+            unsure = change._replace(bound=change.bound + share * size)
+            effect.add(unsure, expected, turns * (before.apart + after.apart) * (0.5 * falls + doubt.turn))
+        cause = self._cause(channel, now, change, expected, doubt)
+        return cause or self._fed(channel, now, change, doubt)
 
     def _cause(
-        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: tuple[float, ...]
+        self, channel: str, now: float, change: Change, expected: complex, doubt: Doubt
     ) -> tuple[Stop, str] | None:
         """What the effects of firings show to be wrong, with the channel to name; None where nothing or not yet."""
-        first, second, offset = doubt
-        effect = self.effects.setdefault(channel, Effect())
-        effect.add(after.z - before.z, expected, math.hypot(first, second), 2.0 * offset)
-        if not effect.known:
-            return None
-        factor = effect.factor.real
-        if factor <= -WORKS:
-            if self.suspect not in (None, channel):
-                return Stop.SENSOR, channel
-            if self.suspect is None:
-                self.suspect, self.deadline = channel, now + self.period
-            return None
+        effect = self.effects[channel]
+        if self.suspect is None and effect.backwards():
+            self.suspect, self.deadline = channel, now + self.period
         if self.suspect is not None:
-            return Stop.CHANNEL, self.suspect
+            others = [one for name, one in self.effects.items() if name != self.suspect]
+            if any(one.backwards(WHICH) for one in others):
+                return Stop.SENSOR, channel
+            return (Stop.CHANNEL, self.suspect) if any(one.works(WHICH) for one in others) else None
+        if effect.open() >= WORKS:
+            return None
         if abs(effect.factor) < WORKS:
             return Stop.IDLE, channel
-        believed = abs(abs(before.z) - abs(expected))  # by a firing that comes at its moment
-        grown = abs(after.z) - abs(before.z)
-        lowers = abs(before.z) - believed > 0.5 * abs(expected)
-        if lowers and grown > SIGMAS * math.hypot(first, second) + 2.0 * offset + 1e-9 * abs(before.z):
+        size = abs(change.before)
+        lowers = size - abs(size - abs(expected)) > 0.5 * abs(expected)  # by a firing that comes at its moment
+        grown = abs(change.after) - size
+        seen_wrong = SIGMAS * doubt.noise + doubt.steps + doubt.bias  # the law fired at what it saw, not at what was
+        if lowers and grown > SIGMAS * change.sigma + change.bound + 2.0 * seen_wrong + 1e-9 * size:
             return Stop.FEEDS, channel
         return None
 
+    def _fed(self, channel: str, now: float, change: Change, doubt: Doubt) -> tuple[Stop, str] | None:
+        """That the nutation has grown while it was fired at, by more than what hides it can make a firing add."""
+        if self.first is None:
+            self.first = abs(change.before), now
+            return None
+        if self.suspect is not None:
+            return None
+        size, since = self.first
+        most = (1.0 + FED) * size * math.exp(min(self.growth * (now - since), LARGE))
+        most += SIGMAS * (change.sigma + doubt.noise) + 2.0 * (doubt.steps + doubt.bias)
+        return (Stop.FED, channel) if abs(change.after) > most else None
+
     def rest(self) -> None:
-        """The loop has fallen quiet: what firings add to the size is counted anew."""
-        self.fed = self.variance = 0.0
-        self.sizes.clear()
+        """The loop has fallen quiet: from what size the nutation grows is noted anew."""
+        self.first = None
 
     def overdue(self, now: float) -> tuple[Stop, str] | None:
         """That no other channel has fired in time to tell which of the two it is."""
         return None if self.suspect is None or now <= self.deadline else (Stop.UNCLEAR, self.suspect)
+
+
+def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
+    """By what shares the nutation rate and the scale of the sensor may be off, two sigma of the dispersions."""
+    given, inertia = spacecraft.dispersions, spacecraft.inertia
+    if given is None:
+        return 0.0, 0.0
+    pairs = ((given.A, inertia.A), (given.C, inertia.C))
+    moments = [0.0 if one is None else one.size / (1.0 if one.relative else nominal) for one, nominal in pairs]
+    scale = 0.0 if given.sensor_scale is None else given.sensor_scale.size
+    return 2.0 * math.hypot(*moments) * inertia.C / (inertia.A * abs(inertia.a)), 2.0 * abs(scale)

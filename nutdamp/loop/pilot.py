@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from nutdamp.errors import Infeasible
 from nutdamp.lightening import shed
 from nutdamp.limits import commandable
-from nutdamp.loop.diagnosis import STALE, Diagnosis, Glimpse, Stop
+from nutdamp.loop.diagnosis import Diagnosis, Glimpse, Stop
 from nutdamp.loop.law import ComplexArray, Firing, Law
 from nutdamp.loop.sensor import Estimator
 from nutdamp.loop.watch import GRID, MOST, Found, Seen, Watch
@@ -72,7 +72,7 @@ class Pilot:
         if shed(truth) is not None:
             raise Infeasible("the loop flies with constant moments of inertia; leave tank.inertia_per_kg out")
         self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
-        self.diagnosis = Diagnosis(law.period)
+        self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
         self.supply = Supply(truth)
@@ -191,26 +191,24 @@ class Pilot:
             if found is not None:
                 return found
             row = fire + 1
-        if count and not (self._pending is not None and seen.times[-1] < self._known(coast)):
+        if count and (self._pending is None or seen.times[-1] >= self._known(coast)):
             self._faulty(coast, seen, count - 1)
         return None
 
     def _known(self, coast: Watch) -> float:
-        """When enough has been seen of the coast after a firing to judge it, s."""
-        return float(coast.estimator.first) + 0.25 * self.law.period
+        """The sample, s, by which enough has been seen of the coast after a firing to judge it."""
+        last = self.until - self.loop.sensor.delay - coast.estimator.step
+        return min(float(coast.estimator.first) + self.law.period, last)
 
     def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
         """Judges the last firing by what was seen since, up to a ``row``; whether the loop has to stop."""
         if self._pending is not None:
             pulse, firing, before = self._pending
             after = self._glimpse(pulse.t, row, last=False)
-            if after is not None and seen.now[row] > pulse.t + STALE * self.law.period:
+            if after is not None:
                 self._pending = None
-            elif after is not None:
-                self._pending = None
-                estimator = coast.estimator
-                doubt = (estimator.doubt(before.samples), estimator.doubt(after.samples), estimator.offset)
-                verdict = self.diagnosis.judge(pulse.channel, float(seen.now[row]), before, after, firing.acts, doubt)
+                now = max(float(seen.now[row]), self.ready)
+                verdict = self.diagnosis.judge(pulse.channel, now, before, after, firing.acts, coast.estimator.doubts)
                 if verdict is not None:
                     self.ending = verdict
         if self._pending is None and not self.ending[0].fault:
@@ -250,7 +248,7 @@ class Pilot:
     def _margin(self) -> float:
         """By how much the sensor may show too much of |z|, rad/s."""
         estimator = Estimator(self.law, self.loop.sensor, 0.0)
-        return estimator.offset + NO_NOISE * estimator.doubt(1)
+        return estimator.offset + NO_NOISE * estimator.doubt
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:

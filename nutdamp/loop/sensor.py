@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.loop.diagnosis import Doubt, known_to
 from nutdamp.loop.law import ComplexArray, Law
 from nutdamp.loop_settings import ACCELEROMETER, Sensor
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -184,10 +185,10 @@ class Estimator:
             return best
         return np.asarray(best * np.exp(-1j * self.law.rate(spin) * self.sensor.delay))
 
-    def best(self, z: ComplexArray, spin: Vector) -> ComplexArray:
+    def best(self, z: Any, spin: Any) -> ComplexArray:
         """z without what the filter does to it in the steady state."""
         if self.sensor.low_pass == 0.0:
-            return z
+            return np.asarray(z)
         fresh = 1.0 - self._memory
         return np.asarray(z * (1.0 - self._memory * np.exp(1j * self.law.rate(spin) * self.step)) / fresh)
 
@@ -250,19 +251,48 @@ class Estimator:
         one, other = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
         return complex(one / self.law.gauge[0], other / self.law.gauge[1])
 
-    def doubt(self, samples: int) -> float:
-        """One sigma of the mean of so many estimates of |z|, rad/s, by the noise of the sensor."""
-        if self.sensor.kind != ACCELEROMETER:
-            return self.sensor.noise * math.sqrt(2.0 / max(samples, 1)) * max(self.law.gauge)
-        return 2.0 * self.sensor.noise / (math.sqrt(self.window) * self._least_gain)
+    @property
+    def doubt(self) -> float:
+        """One sigma of an estimate of |z|, rad/s, by the noise of the sensor."""
+        lasts = (1.0 - self._memory) / (1.0 + self._memory) if self.sensor.low_pass > 0.0 else 1.0
+        return self._white * (1.0 if self.sensor.kind == ACCELEROMETER else self._lift * math.sqrt(lasts))
+
+    @property
+    def _white(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return 2.0 * self.sensor.noise * self._lift / (math.sqrt(self.window) * self._least_gain)
+        return self.sensor.noise * math.sqrt(2.0) * max(self.law.gauge)
 
     @property
     def offset(self) -> float:
         """By how much |z| may be off in every estimate, rad/s: by bias and steps of the sensor."""
-        sensor = self.sensor
-        if sensor.kind != ACCELEROMETER:
-            return (math.hypot(*sensor.biases) + sensor.quantisation / math.sqrt(2.0)) * max(self.law.gauge)
-        return sensor.quantisation / self._least_gain
+        return self._bias + self._steps
+
+    @property
+    def doubts(self) -> Doubt:
+        """All of that, for a `Diagnosis`."""
+        least = self.doubt if self.sensor.kind == ACCELEROMETER else 0.0
+        off = known_to(self.law.spacecraft)
+        return Doubt(self.doubt, self._white, least, self._lift, self._bias, self._steps, *off)
+
+    @property
+    def _lift(self) -> float:
+        """By how much `best` makes a constant larger, and noise at most: it undoes what the filter does to z."""
+        if self.sensor.low_pass == 0.0:
+            return 1.0
+        return max(abs(complex(self.best(1.0, self.law.spacecraft.spin))), 1.0)
+
+    @property
+    def _bias(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return 0.0
+        return math.hypot(*self.sensor.biases) * self._lift * max(self.law.gauge)
+
+    @property
+    def _steps(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return self.sensor.quantisation * self._lift / self._least_gain
+        return self.sensor.quantisation / math.sqrt(2.0) * self._lift * max(self.law.gauge)
 
     @property
     def _least_gain(self) -> float:

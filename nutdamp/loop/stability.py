@@ -144,7 +144,7 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     law, spin = Law(spacecraft, loop), spacecraft.spin
     estimator = Estimator(law, loop.sensor, 0.0)
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
-    noise = estimator.offset + estimator.doubt(1) / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
+    noise = estimator.offset + estimator.doubt / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
     noise /= abs(loop.sensor.scale)
     steps = [abs(one.kick) * _shortest(spacecraft, one) for one in law.actuators]
     stop = law.size(loop.stop, spin) / abs(loop.sensor.scale)

@@ -73,7 +73,8 @@ def stopped(run: Run) -> str:
         Stop.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
         Stop.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
         Stop.IDLE: f"channel {name} does nothing, or much less than its torque should",
-        Stop.FED: "the firings feed the nutation: sensor or channels are reversed, and bias or noise hide which",
+        Stop.FED: "the firings feed the nutation: sensor or channels are reversed, or they come at the wrong time; "
+        "bias, noise or delay hide which",
         Stop.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
     }
     return after + said[run.stop]
