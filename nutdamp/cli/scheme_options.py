@@ -39,6 +39,9 @@ SHARED = names_of(SchemeOptions)
 """Options of every scheme."""
 
 
+NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
+
+
 class Grouped(click.Option):
     """An option under a heading of its own on the help page."""
 
@@ -68,6 +71,8 @@ class PlanningCommand(click.Command):
             return super().parse_args(ctx, args)
         except click.NoSuchOption as wrong:
             name = wrong.option_name.removeprefix("--").replace("-", "_")
+            if name == "sun":
+                raise click.UsageError(NO_SUN, ctx) from None
             readers = [scheme for scheme, entry in SCHEMES.items() if name in names_of(entry.options)]
             if not readers:
                 raise
@@ -77,19 +82,30 @@ class PlanningCommand(click.Command):
             raise click.UsageError(message, ctx) from None
 
 
-def goal_options(command: Command) -> Command:
-    """What is to be reached: gathered into ``aim`` for `load`, and ``options`` of every scheme."""
+def goal_options(command: Command, *, several: bool = True) -> Command:
+    """What is to be reached: gathered into ``aim`` for `load`, and ``options`` of every scheme.
+
+    ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
+    """
 
     @functools.wraps(command)
     def gathered(*args: Any, with_disturbances: bool, **parameters: Any) -> Any:
         own = parameters.pop("options", Options())
         options = Options(**own.chosen, with_disturbances=with_disturbances)
-        aim = Aim(*(parameters.pop(name) for name in Aim._fields))
+        aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
         return command(*args, options=options, aim=aim, **parameters)
 
     wrapped: Any = gathered
+    sun = click.option(
+        "--sun",
+        cls=Grouped,
+        group=GOAL,
+        type=Direction(),
+        metavar="ANGLE,ANGLE",
+        help="The Sun, as --target; rhumb-line keeps its phase.",
+    )
     for option in (
-        debug_option,
+        *((debug_option,) if several else ()),
         click.option(
             "--with-disturbances",
             cls=Grouped,
@@ -97,14 +113,7 @@ def goal_options(command: Command) -> Command:
             is_flag=True,
             help="Plan on the motion with the disturbances of the file.",
         ),
-        click.option(
-            "--sun",
-            cls=Grouped,
-            group=GOAL,
-            type=Direction(),
-            metavar="ANGLE,ANGLE",
-            help="The Sun, as --target; rhumb-line keeps its phase.",
-        ),
+        *((sun,) if several else ()),
         click.option(
             "--spin",
             cls=Grouped,
@@ -234,7 +243,7 @@ def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark
     if body.goal.sun is not None:
         without = [scheme.name for scheme in planned if not scheme.reads_sun]
         if len(without) == len(planned):
-            raise click.UsageError(f"--sun is for {' and '.join(SUNLIT)}, which is not planned here")
+            raise click.UsageError(NO_SUN)
         if without:
             remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
     if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):

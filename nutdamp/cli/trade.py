@@ -51,7 +51,7 @@ class Allowance(Quantity):
     show_default=True,
     help="What is traded against time; impulse where propellant is unknown.",
 )
-@goal_options
+@partial(goal_options, several=False)
 @click.option("--csv", type=FILE, help="Write the points.")
 @click.option("--json", type=FILE, help="Write the points with their pulses.")
 @click.option("--plot", type=FILE, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")

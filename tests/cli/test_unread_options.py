@@ -59,6 +59,14 @@ def test_a_help_page_fits_the_screen_of_a_terminal(run: Run, command: str) -> No
     assert max(map(len, lines)) <= 80
 
 
+def test_trade_shows_no_option_that_it_does_not_read(run: Run) -> None:
+    """No scheme of a front reads the Sun, and none is left out of it for a bug."""
+    shown = run("trade", "--help").stdout
+    assert "--target" in shown
+    assert "--sun" not in shown
+    assert "--debug" not in shown
+
+
 def test_a_scheme_that_cannot_set_the_spin_is_infeasible(run: Run) -> None:
     done = run("plan", "--spin", "31rpm")
     assert done.returncode == 3

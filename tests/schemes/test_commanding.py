@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,8 +22,9 @@ from nutdamp.limits import breaches, effective_on_times
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
 from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, on_command
+from nutdamp.schedule import Schedule, channel_pulse, on_command
 from nutdamp.schemes.options import FourPulseOptions, RhumbLineOptions
+from nutdamp.schemes.tools import commanding
 from nutdamp.spacecraft import Channel, Limits, Spacecraft
 from nutdamp.verification import verify
 
@@ -269,3 +270,30 @@ def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str
     assert said == pytest.approx([min(lengths), max(lengths)], rel=0.01)
     assert max(lengths) > 1.1 * min(lengths)
     assert not any("equal in impulse" in one for one in planning.plan(body, "rhumb-line").pulses.notes)
+
+
+class Silencing(NamedTuple):
+    """A correction of a train that leaves the pulse of this number without thrust."""
+
+    silenced: int
+    momentum: bool = True
+    equal: bool = True
+
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:
+        pulses = list(made.pulses)
+        pulses[self.silenced] = replace(pulses[self.silenced], impulse=np.zeros(3), on_time=0.0)
+        return replace(made, pulses=tuple(pulses))
+
+
+@pytest.mark.parametrize("silenced", [2, 5])
+def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> None:
+    """Two pulses of other lengths come before the train of four; they are no part of what is equal."""
+    body = replace(short_pulses(), cold=Cold(0.8, 4.0))
+    one = body.channels[0]
+    planned = Schedule(tuple(channel_pulse(one, 2.0 * n, on_time) for n, on_time in enumerate([0.4, 0.3] + 4 * [0.03])))
+    found = commanding.as_commands(body, planned, Silencing(silenced))
+    assert len(found) == 5
+    (note,) = (one for one in found.notes if one.startswith("equal in impulse"))
+    train = [pulse.loaded[1] for pulse in found.pulses[2:]]
+    assert f"commands of {min(train):.4g} s to {max(train):.4g} s" in note
+    assert max(train) < 0.05

@@ -171,22 +171,28 @@ def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inerti
     ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
     Infeasible where the propellant does not last.
     """
-    first = _firing(replace(made.without_proof, pulses=_translated(spacecraft, made, inertia, correct)))
+    commands = _translated(spacecraft, made, inertia, correct)
+    first = _firing(replace(made.without_proof, pulses=commands))
     if spacecraft.limits.tick is None or not first.pulses:
-        found = _firing(correct(spacecraft, first, TAIL))
+        corrected = correct(spacecraft, first, TAIL)
     else:
-        found = _firing(_on_ticks(spacecraft, first, correct))
+        corrected = _on_ticks(spacecraft, first, correct)
+    found = _firing(corrected)
     if found.pulses:
         supply = Supply(spacecraft)
         supply.count(found)
         supply.expect_to_last()
-    return replace(found, notes=(*found.notes, *_weakened(spacecraft, made, found, correct)))
+    fired = [pulse for pulse, command in zip(made, commands, strict=True) if command.magnitude > 0.0]
+    notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), found, correct)
+    return replace(found, notes=(*found.notes, *notes))
 
 
-def _weakened(spacecraft: Spacecraft, made: Schedule, found: Schedule, correct: Correct) -> Iterator[str]:
-    """What falling pressure and cold nozzles make of the schedule ``made``, in words."""
-    if correct.equal and found.pulses:
-        yield from _unequal(made, found)
+def _weakened(
+    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], found: Schedule, correct: Correct
+) -> Iterator[str]:
+    """What falling pressure and cold nozzles make of a plan, in words; ``pairs`` of its pulses and their commands."""
+    if correct.equal and pairs:
+        yield from _unequal(pairs)
     tank = spacecraft.tank
     if tank is not None and found.pulses:
         full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(found.propellant or 0.0)))
@@ -194,12 +200,11 @@ def _weakened(spacecraft: Spacecraft, made: Schedule, found: Schedule, correct: 
             yield f"tank pressure falls from {full} to {left} bar"
 
 
-def _unequal(made: Schedule, found: Schedule) -> Iterator[str]:
-    """What equal pulses of a plan are as commands where those differ, in words."""
-    last = made.pulses[-1].on_time
-    equal = sum(one.on_time == last for one in made)
-    alike = [one.loaded[1] for one in found.pulses[-equal:]]
-    shortest, longest = f"{min(alike):.4g}", f"{max(alike):.4g}"
+def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
+    """What equal pulses of a plan, the last ones, are as commands where those differ, in words."""
+    last = pairs[-1][0].on_time
+    alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
+    shortest, longest = (f"{one(alike, default=0.0):.4g}" for one in (min, max))
     if shortest != longest:
         yield (
             f"equal in impulse, and so commands of {shortest} s to {longest} s: cold nozzles or falling pressure make "
@@ -218,8 +223,8 @@ def _translated(
     """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where the propellant does
-    not last.
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses too weak to end
+    within the horizon.
     """
     supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
@@ -242,7 +247,6 @@ def _translated(
             raise Infeasible(f"{text}, longer than limits.horizon")
         given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
         pulses.append(supply.fire(given, channel))
-    supply.expect_to_last()
     return tuple(pulses)
 
 
@@ -251,9 +255,7 @@ def _outside(
 ) -> tuple[list[float], list[float], float]:
     """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
 
-    And by how much, s, a pulse becomes longer at either end.
-
-    Raises Infeasible where the propellant does not last.
+    And by how much, s, a pulse becomes longer at either end. Raises as `_translated` does.
     """
     channels = {one.name: one for one in spacecraft.channels}
     weak, strong, longer = [], [], 0.0
