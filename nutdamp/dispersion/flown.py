@@ -56,7 +56,7 @@ class RealWidths:
         shed = _sheds(cases, count)
         last = moments if shed is None else moments - shed.sum(axis=0)
         if watch is not None:
-            watch.turn(self._bodies(last), settled, turned, over)
+            watch.turn(rigid_cases.Stretch(self._bodies(last), over, settled, turned))
         momentum = _triple(last * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)

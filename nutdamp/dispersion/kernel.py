@@ -27,7 +27,7 @@ from nutdamp.dispersion.watched import watch_of
 from nutdamp.physics import energy_sink
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid import Forcing
-from nutdamp.physics.rigid_cases import Bodies, cos_sin
+from nutdamp.physics.rigid_cases import Bodies, Stretch, cos_sin
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
@@ -180,11 +180,11 @@ def _show(
 
     (x, y, spin), (A, C) = motion, moments
     bodies = Bodies(rows(A, A, C), np.zeros(3), Forcing(growth=growth))
-    rates, quaternion, now = rows(x / A, y / A, spin), rows(*(turn or (1.0, 0.0, 0.0, 0.0))), np.zeros(count)
+    here = Stretch(bodies, np.zeros(count), rows(x / A, y / A, spin), rows(*(turn or (1.0, 0.0, 0.0, 0.0))))
     if coast is None:
-        watch.turn(bodies, rates, quaternion, now)
+        watch.turn(here)
     else:
-        watch.motion(bodies, rates, quaternion, now, rows(coast)[0], None)
+        watch.motion(here, rows(coast)[0])
 
 
 def _lighter(

@@ -14,8 +14,8 @@ from nutdamp.dispersion.cases import DispersedCases, Model, Thrusting
 from nutdamp.dispersion.watched import in_body
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
-from nutdamp.physics.rigid_cases import Bodies
-from nutdamp.physics.sun_clock import Push, Stretch, SunClock
+from nutdamp.physics.rigid_cases import Bodies, Stretch
+from nutdamp.physics.sun_clock import Push, SunClock
 from nutdamp.schedule import Pulse
 
 Array = NDArray[np.float64]
@@ -80,8 +80,7 @@ def fly(
             starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:
-                    lasts = end - here.since
-                    watch.some(rows).motion(here.bodies, here.rates, here.quaternion, here.since, lasts, *here[4:])
+                    watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
     return Fired(rates, quaternion, starts, seen, over)
 

@@ -273,9 +273,10 @@ class _Fleet:
             self.largest[seen] = np.maximum(self.largest[seen], self._nutation(seen))
 
     def _advance(self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None) -> None:
-        rates, quaternion = self.rates[:, rows], self.quaternion[:, rows]
-        rigid_cases.advance(self.bodies.some(rows), rates, quaternion, self.now[rows], lasts, torque, slope)
-        self.rates[:, rows], self.quaternion[:, rows] = rates, quaternion
+        motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
+        here = rigid_cases.Stretch(self.bodies.some(rows), *motion, torque, slope)
+        rigid_cases.advance(here, lasts)
+        self.rates[:, rows], self.quaternion[:, rows] = here.rates, here.quaternion
 
     def _fire(self, fired: list[tuple[int, Pulse]]) -> None:
         """Pulses of cases, from the beginning of their thrust to its end."""

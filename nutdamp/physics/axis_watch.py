@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.rigid_cases import Bodies, advance
+from nutdamp.physics.rigid_cases import Stretch
 
 Array = NDArray[np.float64]
 
@@ -65,27 +65,18 @@ class AxisWatch:
         """How many cases are given to it."""
         return len(np.arange(self.least.shape[1])[self.rows])
 
-    def motion(
-        self,
-        bodies: Bodies,
-        rates: Array,
-        quaternion: Array,
-        now: Array,
-        duration: Array,
-        torque: Array | None,
-        slope: Array | None = None,
-    ) -> None:
+    def motion(self, here: Stretch, duration: Array) -> None:
         """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
-        if torque is None and bodies.free and bodies.forcing.growth == 0.0:
-            self._arc(bodies.moments, rates, quaternion, duration)
+        bodies = here.bodies
+        if here.torque is None and bodies.free and bodies.forcing.growth == 0.0:
+            self._arc(bodies.moments, here.rates, here.quaternion, duration)
         else:
-            self._steps(bodies, rates, quaternion, now, duration, torque, slope)
+            self._steps(here, duration)
 
-    def turn(self, bodies: Bodies, rates: Array, quaternion: Array, now: Array) -> None:
-        """Take one turn of the axis about H, free of pulses, from ``now`` (n,) s."""
-        size = np.sqrt(np.sum((bodies.moments * rates) ** 2, axis=0))
-        duration = CIRCLE * 0.5 * (bodies.moments[0] + bodies.moments[1]) / size
-        self.motion(bodies, rates, quaternion, now, duration, None)
+    def turn(self, here: Stretch) -> None:
+        """Take one turn of the axis about H in a motion free of pulses."""
+        first, second, _ = here.bodies.moments
+        self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
         rows = np.arange(self.least.shape[1])[self.rows][cases]
@@ -107,51 +98,30 @@ class AxisWatch:
             least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
-    def _steps(
-        self,
-        bodies: Bodies,
-        rates: Array,
-        quaternion: Array,
-        now: Array,
-        duration: Array,
-        torque: Array | None,
-        slope: Array | None,
-    ) -> None:
+    def _steps(self, here: Stretch, duration: Array) -> None:
         """Begin and end of each step, and extremes between them."""
-        size = np.sqrt(np.sum((bodies.moments * rates) ** 2, axis=0))
-        pace = size / np.minimum(bodies.moments[0], bodies.moments[1])
-        if not np.array_equal(bodies.moments[0], bodies.moments[1]):
-            pace = pace + np.abs(rates[2])
+        first, second, _ = here.bodies.moments
+        pace = _momentum(here) / np.minimum(first, second)
+        if not np.array_equal(first, second):
+            pace = pace + np.abs(here.rates[2])
         count = max(math.ceil(float(np.max(pace * duration)) * ROWS / CIRCLE), 1)
-        step = duration / count
-
-        def after(start: tuple[Array, Array], since: Array, time: Array, cases: Any = ...) -> tuple[Array, Array]:
-            """The motion ``time`` s after ``start``, which is ``since`` s after ``now``."""
-            push, bend = (None if part is None else part[:, cases] for part in (torque, slope))
-            push = push if push is None or bend is None else push + bend * since
-            found = start[0].copy(), start[1].copy()
-            advance(bodies.some(cases), *found, now[cases] + since, time, push, bend)
-            return found
-
-        here = rates, quaternion
-        nearing = self._look(bodies, here, ...)
+        begin, step, nearing = here.since, duration / count, self._look(here, ...)
         for index in range(count):
-            then, before, here = here, nearing, after(here, index * step, step)
-            nearing = self._look(bodies, here, ...)
+            then, before, here = here, nearing, here.moved(begin + (index + 1) * step)
+            nearing = self._look(here, ...)
             for rise, fall in zip(before, nearing, strict=True):
                 cases = np.flatnonzero(rise * fall < 0.0)  # in between the axis comes nearest, or goes farthest
                 if len(cases):
                     way = step[cases] * rise[cases] / (rise[cases] - fall[cases])
-                    start = then[0][:, cases], then[1][:, cases]
-                    self._look(bodies.some(cases), after(start, index * step[cases], way, cases), cases)
+                    self._look(then.some(cases).moved(then.since[cases] + way), cases)
 
-    def _look(self, bodies: Bodies, motion: tuple[Array, Array], cases: Any) -> list[Array]:
+    def _look(self, here: Stretch, cases: Any) -> list[Array]:
         """Take the angles of one moment; returns at what rate the axis comes nearer, in cosines by s."""
-        rates, quaternion = motion
-        axis, (first, second, _) = self._axis(quaternion), rates
+        bodies, quaternion = here.bodies, here.quaternion
+        axis, (first, second, _) = self._axis(quaternion), here.rates
         moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
         if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
-            momentum = _rotated(quaternion, bodies.moments * rates)
+            momentum = _rotated(quaternion, bodies.moments * here.rates)
             momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
             cosine = np.sum(momentum * axis, axis=0)
             moving = moving + bodies.forcing.growth * cosine * (cosine * axis - momentum)
@@ -166,6 +136,11 @@ class AxisWatch:
     def _axis(self, quaternion: Array) -> Array:
         w, x, y, z = quaternion
         return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _momentum(here: Stretch) -> Array:
+    """Size (n,) of H, N m s."""
+    return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
 
 
 def _rotated(quaternion: Array, vector: Array) -> Array:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,22 +116,42 @@ def _edgewise(begins: Array, ends: Array) -> Array:
     return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
 
 
+class Stretch(NamedTuple):
+    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
+
+    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
+    """
+
+    bodies: Bodies
+    since: Array
+    rates: Array
+    quaternion: Array
+    torque: Array | None = None
+    slope: Array | None = None
+
+    def some(self, cases: Any) -> Stretch:
+        """That of some of the cases (an index of arrays)."""
+        torque, slope = (None if one is None else one[:, cases] for one in self[4:])
+        motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
+        return Stretch(self.bodies.some(cases), *motion, torque, slope)
+
+    def moved(self, times: Array) -> Stretch:
+        """The same from ``times`` (n,) s on; this one stays as it is."""
+        gone, torque = times - self.since, self.torque
+        if torque is not None and self.slope is not None:
+            torque = torque + self.slope * gone
+        later = self._replace(rates=self.rates.copy(), quaternion=self.quaternion.copy())
+        advance(later, gone)
+        return later._replace(since=times, torque=torque)
+
+
 class Watch(Protocol):
     """Sees the motion of cases on the way; see `axis_watch`."""
 
     def some(self, cases: Any) -> Watch:
         """That of some of the cases (an index of arrays)."""
 
-    def motion(
-        self,
-        bodies: Bodies,
-        rates: Array,
-        quaternion: Array,
-        now: Array,
-        duration: Array,
-        torque: Array | None,
-        slope: Array | None = None,
-    ) -> None:
+    def motion(self, here: Stretch, duration: Array) -> None:
         """The motion that `advance` is about to make with the same arguments."""
 
 
@@ -188,9 +208,7 @@ def _fly_alike(
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
             torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
-        if watch is not None:
-            watch.motion(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
-        advance(bodies, rates, quaternion, now, edges[edge] - now, torque, slope)
+        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
@@ -218,9 +236,7 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
-        if watch is not None:
-            watch.motion(bodies, rates, quaternion, now, edge - now, torque, slope)
-        advance(bodies, rates, quaternion, now, edge - now, torque, slope)
+        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
         if bends is not None:
@@ -229,27 +245,24 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
         rates += kick / bodies.moments
 
 
-def advance(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    now: Array,
-    duration: Array,
-    torque: Array | None,
-    slope: Array | None = None,
-) -> None:
-    """Move on by ``duration`` (n,) s from ``now`` under a ``torque`` (3, n) N m, in place; None is no torque.
+def _pass(here: Stretch, duration: Array, watch: Watch | None) -> None:
+    """`advance`, seen by a ``watch``."""
+    if watch is not None:
+        watch.motion(here, duration)
+    advance(here, duration)
 
-    With a ``slope`` (3, n) N m/s it runs evenly from there.
-    """
+
+def advance(here: Stretch, duration: Array) -> None:
+    """Move rates and quaternion on by ``duration`` (n,) s, in place."""
+    bodies, torque, slope = here.bodies, here.torque, here.slope
     if not duration.any():
         return
     if torque is None and bodies.free:
-        _arc(bodies.moments, bodies.forcing.growth, rates, quaternion, duration)
+        _arc(bodies.moments, bodies.forcing.growth, here.rates, here.quaternion, duration)
         return
     acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
     jerk = None if slope is None or not slope.any() else slope / bodies.moments
-    _integrate(bodies, rates, quaternion, now, duration, acceleration, jerk)
+    _integrate(here, duration, acceleration, jerk)
 
 
 def cos_sin(angle: Any) -> tuple[Any, Any]:
@@ -315,22 +328,14 @@ def _product(left: Sequence[Array] | Array, right: Sequence[Array]) -> tuple[Arr
     )
 
 
-def _integrate(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    now: Array,
-    duration: Array,
-    acceleration: Array,
-    jerk: Array | None = None,
-) -> None:
+def _integrate(here: Stretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
     """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
 
-    With a ``jerk`` (3, n) rad/s³ the acceleration is that at ``now``.
+    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the begin.
     """
-    forcing, moments = bodies.forcing, bodies.moments
-    if jerk is None and len(now) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
-        _integrate_symmetric(bodies, rates, quaternion, now, duration, acceleration)
+    forcing, moments = here.bodies.forcing, here.bodies.moments
+    if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
+        _integrate_symmetric(here, duration, acceleration)
         return
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     if jerk is not None:
@@ -338,13 +343,13 @@ def _integrate(
         strength = np.maximum(strength, np.sqrt(np.sum(last * last, axis=0)))
     strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
-    pace = np.sqrt(np.sum(rates * rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
+    pace = np.sqrt(np.sum(here.rates * here.rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
     _expect_short(span := float(np.max(pace * duration)))
     steps = max(1, math.ceil(span / STRIDE))
     for number in range(steps):
         gone = duration * (number / steps)
-        here = acceleration if jerk is None else acceleration + jerk * gone
-        _step(bodies, rates, quaternion, now + gone, duration / steps, here, jerk)
+        push = acceleration if jerk is None else acceleration + jerk * gone
+        _step(here._replace(since=here.since + gone), duration / steps, push, jerk)
 
 
 def _expect_short(span: float) -> None:
@@ -356,10 +361,9 @@ def _expect_short(span: float) -> None:
         )
 
 
-def _integrate_symmetric(
-    bodies: Bodies, rates: Array, quaternion: Array, now: Array, duration: Array, acceleration: Array
-) -> None:
+def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) -> None:
     """`_integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+    bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
     drive = driven.Drive(
         1.0 - C / A,
@@ -371,24 +375,16 @@ def _integrate_symmetric(
     _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))
     turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
     try:
-        omega, rates[2], (first, second) = driven.end(drive, omega, spin, turned, now, duration)
+        omega, rates[2], (first, second) = driven.end(drive, omega, spin, turned, here.since, duration)
     except driven.NotConverged:
         raise Infeasible(TOO_FAST) from None
     rates[:2] = omega.real, omega.imag
     quaternion[:] = first.real, second.real, second.imag, first.imag
 
 
-def _step(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    now: Array,
-    step: Array,
-    acceleration: Array,
-    jerk: Array | None = None,
-    halvings: int = 12,
-) -> None:
+def _step(here: Stretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
     """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
+    bodies, now, rates, quaternion = here[:4]
     series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
     if series.converges():
         rates[:], quaternion[:] = series.end()
@@ -396,5 +392,5 @@ def _step(
     if halvings == 0:
         raise Infeasible(TOO_FAST)
     for begin in (0.0, 0.5):
-        here = acceleration if jerk is None else acceleration + jerk * (begin * step)
-        _step(bodies, rates, quaternion, now + begin * step, 0.5 * step, here, jerk, halvings - 1)
+        push = acceleration if jerk is None else acceleration + jerk * (begin * step)
+        _step(here._replace(since=now + begin * step), 0.5 * step, push, jerk, halvings - 1)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.rigid_cases import Bodies, advance
+from nutdamp.physics.rigid_cases import Stretch
 
 Array = NDArray[np.float64]
 
@@ -36,35 +36,6 @@ class Push(NamedTuple):
     end: Any
     first: Array
     last: Array
-
-
-class Stretch(NamedTuple):
-    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
-
-    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
-    """
-
-    bodies: Bodies
-    since: Array
-    rates: Array
-    quaternion: Array
-    torque: Array | None = None
-    slope: Array | None = None
-
-    def some(self, cases: NDArray[np.intp]) -> Stretch:
-        """That of some cases."""
-        torque, slope = (None if one is None else one[:, cases] for one in self[4:])
-        motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
-        return Stretch(self.bodies.some(cases), *motion, torque, slope)
-
-    def moved(self, times: Array) -> Stretch:
-        """The same from ``times`` (n,) s on."""
-        rates, quaternion = self.rates.copy(), self.quaternion.copy()
-        advance(self.bodies, rates, quaternion, self.since, times - self.since, self.torque, self.slope)
-        torque = self.torque
-        if torque is not None and self.slope is not None:
-            torque = torque + self.slope * (times - self.since)
-        return Stretch(self.bodies, times, rates, quaternion, torque, self.slope)
 
 
 class SunClock:

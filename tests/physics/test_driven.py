@@ -77,7 +77,8 @@ def test_few_cases_fly_as_each_alone_does(turning: bool) -> None:
     now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
     forcing = Forcing(TURNING if turning else ())
     got, turn = rates.copy(), np.repeat(START[:, None], count, axis=1)
-    rigid_cases.advance(rigid_cases.Bodies(moments, np.zeros(3), forcing), got, turn, now, duration, torque)
+    bodies = rigid_cases.Bodies(moments, np.zeros(3), forcing)
+    rigid_cases.advance(rigid_cases.Stretch(bodies, now, got, turn, torque), duration)
     for case in range(count):
         one = tuple(moments[:, case].tolist())
         begin, end = float(now[case]), float(now[case] + duration[case])

@@ -279,7 +279,7 @@ class Silencing(NamedTuple):
     momentum: bool = True
     equal: bool = True
 
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:  # noqa: ARG002
         pulses = list(made.pulses)
         pulses[self.silenced] = replace(pulses[self.silenced], impulse=np.zeros(3), on_time=0.0)
         return replace(made, pulses=tuple(pulses))

@@ -92,12 +92,12 @@ class Task:
             begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
             for kick in range(kicks):
                 t = begin + on_time * ((kick + 0.5) / kicks)
-                rigid_cases.advance(bodies, rates, turn, now, t - now, None)
+                rigid_cases.advance(rigid_cases.Stretch(bodies, now, rates, turn), t - now)
                 rates += torque * (on_time / kicks) / moments
                 now = t
             if not kicks:
-                rigid_cases.advance(bodies, rates, turn, now, begin - now, None)
-                rigid_cases.advance(bodies, rates, turn, begin, on_time, torque)
+                rigid_cases.advance(rigid_cases.Stretch(bodies, now, rates, turn), begin - now)
+                rigid_cases.advance(rigid_cases.Stretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         momentum = rates * moments
         inertial = attitude.rotate(turn.T, momentum.T)

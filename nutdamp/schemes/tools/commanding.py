@@ -223,8 +223,8 @@ def _translated(
     """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses too weak to end
-    within the horizon.
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
+    they would be longer than the horizon.
     """
     supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0

@@ -14,8 +14,8 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
 from nutdamp.lightening import shed
 from nutdamp.physics import attitude
-from nutdamp.physics.rigid_cases import Bodies
-from nutdamp.physics.sun_clock import Push, Stretch, SunClock
+from nutdamp.physics.rigid_cases import Bodies, Stretch
+from nutdamp.physics.sun_clock import Push, SunClock
 from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.supply import Supply
