@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,14 @@ SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
 
 REMEMBERED = 1000
 """Legs that are remembered, before all are forgotten."""
+
+
+class Push(NamedTuple):
+    """What acts on a leg besides what always does; see `Dynamics.path`."""
+
+    torques: Sequence[Vector]
+    slope: Vector | None
+    falling: Falling | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,28 +77,21 @@ class Dynamics:
         With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
         Infeasible where it takes more than ``most`` steps of integration.
         """
+        push = Push(torques, slope, falling)
         if self.known is None:
-            return self._path(state, start, end, torques, slope, most, falling)
+            return self._path(state, start, end, push, most)
         more = (*(() if slope is None else (slope,)), *(falling or ()))
         leg = np.concatenate([self.moments, state.rates, state.quaternion, (start, end), *torques, *more]).tobytes()
         found = self.known.get(leg)
         if found is None or found[0].steps > most:
             if len(self.known) >= REMEMBERED:
                 self.known.clear()
-            found = self.known[leg] = self._path(state, start, end, torques, slope, most, falling)
+            found = self.known[leg] = self._path(state, start, end, push, most)
         return found
 
-    def _path(
-        self,
-        state: SpinState,
-        start: float,
-        end: float,
-        torques: Sequence[Vector],
-        slope: Vector | None,
-        most: int,
-        falling: Falling | None,
-    ) -> tuple[Path, SpinState]:
+    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
         work.spend(LEG)
+        torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
             arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
             return arc, state if end == start else arc.end(end)

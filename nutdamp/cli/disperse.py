@@ -89,6 +89,7 @@ def command(
     Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
+    # Long by its options, each a parameter, and by the two ways to fly, cases of a schedule and of a loop.
     if real and impulses:
         raise click.UsageError("--flown and --impulses exclude each other")
     expect_impulses(impulses, force, True, "disperse")

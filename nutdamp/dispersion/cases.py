@@ -121,6 +121,17 @@ class _Actuation:
     remainder: Triple
 
 
+class _Fired(NamedTuple):
+    """What one pulse gives in each case at the thrust of the file, and its ``flow``; see `DispersedCases`."""
+
+    start: Cases
+    width: Cases
+    lead: Cases
+    impulse: Triple
+    thrust: tuple[Thrusting, ...]
+    flow: Cases
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """A spacecraft and the schedule it flies, ready to be dispersed."""
@@ -195,55 +206,57 @@ class Model:
         omega0 = parts_of(self.spacecraft.omega0)
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
         torques = {source: self._torque(source, draws) for source in {one.source for one in self._actuations}}
-        offset = draws.get("timing offset", 0.0)
-        starts, widths, leads, impulses, thrust, flows = [], [], [], [], [], []
-        for number, one in enumerate(self._actuations, start=1):
-            opened, width = self._opened(one, draws), self.on_times[number - 1]
-            late = plus(offset, draws.get(f"Sun pulse {number}", 0.0))
-            shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-            lead: Cases = 0.0
-            start = one.pulse.start
-            if one.pulse.command is not None:
-                start = one.pulse.command.start
-                lead = one.pulse.t - 0.5 * width - start
-            longer: dict[str, Cases] = {}
-            if opened:
-                parts = {name: each.acts for name, each in opened.items()}
-                longer = {name: acts / one.pulse.on_time for name, (acts, _, _) in parts.items()}
-                centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
-                lead = centroid - 0.5 * width
-            starts.append(plus(start if nothing(shift) else _not_before(start + shift), lead))
-            widths.append(width)
-            leads.append(lead)
-            factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
-            torque, mean, flow = torques[one.source] if not opened else self._torque(one.source, draws, longer)
-            if one.source == STEERABLE and not self._members[STEERABLE]:
-                impulse = self._steered(one.pulse.impulse, mean, draws)
-            else:
-                impulse = added(scaled(torque, one.duration), scaled(one.remainder, mean))
-            impulses.append(impulse if isinstance(factor, float) and factor == 1.0 else scaled(impulse, factor))
-            flows.append(flow * factor)
-            strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
-            thrust.append(tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()))
-        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
+        fired = [self._fired(n, one, torques[one.source], draws) for n, one in enumerate(self._actuations)]
+        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, [one.flow for one in fired])
         return DispersedCases(
             moments=self._moments(draws),
             omega0=added(omega0, turned(turn.T, off)),
-            starts=tuple(starts),
-            widths=tuple(widths),
-            leads=tuple(leads),
+            starts=tuple(one.start for one in fired),
+            widths=tuple(one.width for one in fired),
+            leads=tuple(one.lead for one in fired),
             impulses=tuple(
-                impulse if isinstance(level, float) and level == 1.0 else scaled(impulse, level)
-                for impulse, level in zip(impulses, levels, strict=True)
+                one.impulse if isinstance(level, float) and level == 1.0 else scaled(one.impulse, level)
+                for one, level in zip(fired, levels, strict=True)
             ),
             thrust=tuple(
-                tuple(Thrusting(one.opened, scaled(one.torque, level)) for one in each)
-                for each, level in zip(thrust, levels, strict=True)
+                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in one.thrust)
+                for one, level in zip(fired, levels, strict=True)
             ),
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
             spent=spent,
             drained=drained,
             per_kg=self._per_kg(draws),
+        )
+
+    def _fired(self, index: int, one: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
+        """What the pulse ``index`` gives; ``nominal`` is the `_torque` of what fires it."""
+        opened, width, number = self._opened(one, draws), self.on_times[index], index + 1
+        late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
+        shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
+        start, lead = one.pulse.start, 0.0
+        if one.pulse.command is not None:
+            start = one.pulse.command.start
+            lead = one.pulse.t - 0.5 * width - start
+        longer: dict[str, Cases] = {}
+        if opened:
+            parts = {name: each.acts for name, each in opened.items()}
+            longer = {name: acts / one.pulse.on_time for name, (acts, _, _) in parts.items()}
+            centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
+            lead = centroid - 0.5 * width
+        factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
+        torque, mean, flow = nominal if not opened else self._torque(one.source, draws, longer)
+        if one.source == STEERABLE and not self._members[STEERABLE]:
+            impulse = self._steered(one.pulse.impulse, mean, draws)
+        else:
+            impulse = added(scaled(torque, one.duration), scaled(one.remainder, mean))
+        strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
+        return _Fired(
+            start=plus(start if nothing(shift) else _not_before(start + shift), lead),
+            width=width,
+            lead=lead,
+            impulse=impulse if isinstance(factor, float) and factor == 1.0 else scaled(impulse, factor),
+            thrust=tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()),
+            flow=flow * factor,
         )
 
     def _moments(self, draws: Draws) -> Triple:

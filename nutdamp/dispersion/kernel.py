@@ -107,6 +107,7 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
 
     ``watch`` sees the motion, and one turn of the axis after the last pulse.
     """
+    # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
     A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
     sheds = cases.sheds

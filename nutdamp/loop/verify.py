@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from nutdamp.dop853 import Equations
-from nutdamp.dynamics import Dynamics
+from nutdamp.dynamics import Dynamics, Push
 from nutdamp.errors import Infeasible
 from nutdamp.loop.run import SEED, Run, fly
 from nutdamp.motion import Path
-from nutdamp.physics.rigid import NOTHING, Falling
+from nutdamp.physics.rigid import NOTHING
 from nutdamp.spacecraft import Spacecraft, SpinState, Vector
 
 AGREE = 1e-6
@@ -49,16 +48,14 @@ class _Independent(Dynamics):
         state: SpinState,
         start: float,
         end: float,
-        torques: Sequence[Vector],
-        slope: Vector | None,
+        push: Push,
         most: int,  # noqa: ARG002 - of steps
-        falling: Falling | None,  # noqa: ARG002 - no loop is flown with moments that fall
     ) -> tuple[Path, SpinState]:
-        first = self.equations.state(state)
+        first = self.equations.state(state)  # no loop is flown with moments that fall
         if end <= start:
             return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
-        push = (np.asarray(sum(torques, np.zeros(3))), slope)
-        found = self.equations.solved(first, start, end, [push], dense=True)
+        torque = (np.asarray(sum(push.torques, np.zeros(3))), push.slope)
+        found = self.equations.solved(first, start, end, [torque], dense=True)
         rates, quaternion = self.equations.motion(found.y[:, -1:].T)
         one, two, three = rates[0].tolist()
         return _Solved(self.equations, found.sol, len(found.t)), SpinState(complex(one, two), three, quaternion[0])

@@ -112,6 +112,7 @@ def integrate(
     With a ``slope`` (3,) N m/s the torque is that at ``start`` and runs evenly from there; moments that are ``falling``
     are those at ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
+    # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
     pieces: list[Piece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
