@@ -1,7 +1,7 @@
 """Work, counted: what bounds a search on every machine alike, and tells how far it is.
 
 One unit is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents `spend` what they
-take, by counts that do not depend on the clock; searches ask whether the budget that they run in is `exhausted` and end
+take, by counts that do not depend on the clock; searches look whether the budget they run in is `exhausted` and end
 with the best found so far.
 """
 

@@ -103,9 +103,9 @@ def command(
         )
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, **files)
     if looped:
-        from nutdamp.cli.disperse_loop import Asked, disperse_loop
+        from nutdamp.cli.disperse_loop import Requested, disperse_loop
 
-        disperse_loop(job, Asked(samples, seed, until, case, worst, csv, json, plot))
+        disperse_loop(job, Requested(samples, seed, until, case, worst, csv, json, plot))
         return
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)

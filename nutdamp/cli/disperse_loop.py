@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from nutdamp.loop.study import Collect, LoopResults, LoopStudy
 
 
-class Asked(NamedTuple):
+class Requested(NamedTuple):
     """What the command line says."""
 
     samples: int
@@ -30,7 +30,7 @@ class Asked(NamedTuple):
     plot: str | None
 
 
-def disperse_loop(job: Job, asked: Asked) -> None:
+def disperse_loop(job: Job, requested: Requested) -> None:
     """Fly the loops and show what becomes of them, or of one case."""
     require_loop(job.spacecraft)
     require_dispersions(job.spacecraft)
@@ -39,18 +39,18 @@ def disperse_loop(job: Job, asked: Asked) -> None:
     from nutdamp.loop.study import loop_study
     from nutdamp.presentation.loop_cases_tables import loop_cases_screen
 
-    study = loop_study(job.spacecraft, asked.until, seed=asked.seed)
-    if asked.case is not None:
-        _one(job, study, asked.case - 1, asked.json)
+    study = loop_study(job.spacecraft, requested.until, seed=requested.seed)
+    if requested.case is not None:
+        _one(job, study, requested.case - 1, requested.json)
         return
-    count = study.expect_affordable(asked.samples)
+    count = study.expect_affordable(requested.samples)
     if study.alone:
         what = f"{study.alone}: the cases fly one by one, and look at about {count:,} samples"
-        job.remark(f"{what}, which takes {study.price_alone(asked.samples)}")
-    results, stopped_by = _flown(study, asked, job.quiet)
-    data = partial(loop_cases_json, results, worst=asked.worst)
-    screen = partial(loop_cases_screen, results, worst=asked.worst)
-    job.deliver([(asked.json, data), (asked.plot, partial(_picture, results))], screen)
+        job.remark(f"{what}, which takes {study.price_alone(requested.samples)}")
+    results, stopped_by = _flown(study, requested, job.quiet)
+    data = partial(loop_cases_json, results, worst=requested.worst)
+    screen = partial(loop_cases_screen, results, worst=requested.worst)
+    job.deliver([(requested.json, data), (requested.plot, partial(_picture, results))], screen)
     if stopped_by is not None and results.done < results.requested:
         say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
@@ -63,25 +63,25 @@ def _picture(results: LoopResults) -> Figure:
     return loop_cases_figure(results)
 
 
-def _flown(study: LoopStudy, asked: Asked, quiet: bool) -> tuple[LoopResults, int | None]:
+def _flown(study: LoopStudy, requested: Requested, quiet: bool) -> tuple[LoopResults, int | None]:
     """The cases, with a bar, and the signal that ended them, if any; where that is before the first, raise."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.files.loop_cases import LoopCasesWriter
     from nutdamp.files.output import whole_file
     from nutdamp.loop.study import LoopResults, run
 
-    results = LoopResults(study, asked.samples)
-    with stoppable() as stopped, progress("flying", asked.samples, quiet=quiet) as watch:
+    results = LoopResults(study, requested.samples)
+    with stoppable() as stopped, progress("flying", requested.samples, quiet=quiet) as watch:
 
         def fly(collect: Collect | None) -> None:
             run(results, watch=watch, stopped=stopped, collect=collect)
             if not results.done and stopped.number is not None:
                 raise interruption(stopped.number)  # so that no file is written
 
-        if asked.csv is None:
+        if requested.csv is None:
             fly(None)
         else:
-            with whole_file(asked.csv) as stream:
+            with whole_file(requested.csv) as stream:
                 fly(LoopCasesWriter(stream, study).write)
     return results, stopped.number
 

@@ -58,7 +58,7 @@ def _list() -> None:
 
 
 def _known(name: str) -> str:
-    """The ``name`` if there is such an example; a usage error says which one a misspelt name may stand for."""
+    """The ``name`` if there is such an example; a usage error says which one a misspelt name may mean."""
     from nutdamp.errors import nearest
     from nutdamp.files.examples import example_names
 

@@ -41,7 +41,7 @@ class Ends:
     """How cases end.
 
     ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
-    H at t = 0 and at the end in the true body axes of t = 0, which stand still in space; ``pointed``: the end in the
+    H at t = 0 and at the end in the true body axes of t = 0, which are fixed in space; ``pointed``: the end in the
     estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
     None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
     rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
@@ -103,7 +103,7 @@ class ClosedForm:
 
 
 def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: AxisWatch | None = None) -> Ends:
-    """How cases end whose pulses stand in order; ``nodes`` by pulse, ``growth`` κ in 1/s.
+    """How cases end whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s.
 
     ``watch`` sees the motion, and one turn of the axis after the last pulse.
     """

@@ -47,7 +47,7 @@ def vectors(model: Model, ends: Ends, out: NDArray[Any]) -> None:
 
     Nutation is the length of the transverse momentum over the axial one, the shift of H that of the change of its
     direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
-    nearly, for a good plan, so that they have no derivative themselves. All stand in the body axes of t = 0.
+    nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
     sense = math.copysign(1.0, model.spacecraft.spin)

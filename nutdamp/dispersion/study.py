@@ -280,7 +280,7 @@ def run(
     stopped: Callable[[], bool] = lambda: False,
     collect: Collect | None = None,
 ) -> Results:
-    """Fly the cases that ``results`` asks for and does not have; returns ``results``.
+    """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
     the first ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.

@@ -60,7 +60,7 @@ BY_THRUSTER = ("thrust", "thrust_direction", "position", *VALVE_TIMES, "impulse_
 """The keys that hold one tolerance for all thrusters, or one by name."""
 
 ALL = ""
-"""Stands for all thrusters, where the file gives one tolerance for them; no thruster has such a name."""
+"""Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
@@ -121,13 +121,13 @@ class ToleranceSection(Section):
 
 
 class _Alike(Rule):
-    """Annotation of what is at ``key``: several tolerances, for which one may stand; in the schema with their units."""
+    """Annotation of what is at ``key``: several tolerances, or one for all; in the schema with their units."""
 
     def __init__(self, key: str) -> None:
         self.key = key
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """A single tolerance stands for all three rates, or for all thrusters."""
+        """A single tolerance is that of all three rates, or for all thrusters."""
         if isinstance(value, dict) and self.key == "omega0":
             return inner([value] * 3)
         alone = isinstance(value, dict) and self.key in BY_THRUSTER and not by_name(value)

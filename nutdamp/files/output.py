@@ -31,7 +31,7 @@ ATTEMPTS = 10
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
-    """Write ``content`` to ``path``, or leave what stood there; ``-`` is standard output. Raises CannotWrite.
+    """Write ``content`` to ``path``, or leave what was there; ``-`` is standard output. Raises CannotWrite.
 
     What is long writes itself: it is called with the stream. Text becomes UTF-8; what has no place there, such as a
     byte of a file name that is not UTF-8, becomes \\udcff.

@@ -85,7 +85,7 @@ class _Reader:
             self.table.warn(pulses[-1][0], "tank", f"{supply.shortage}: the last pulses do not fire")
 
     def _instead(self, name: str) -> str:
-        """The channel that a name not in the file may stand for, or all there are."""
+        """The channel that is meant by a name not in the file, or all there are."""
         found = nearest(name, list(self.channels))
         return f"it has {', '.join(map(shown, self.channels))}" if found is None else f"did you mean {shown(found)}?"
 

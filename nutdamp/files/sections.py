@@ -27,7 +27,7 @@ REQUIRED: Any = ...
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of a section: the ``type`` of what it holds, what it stands for, and what holds where it is left out."""
+    """A key of a section: the ``type`` of what it holds, what it means, and what holds where it is left out."""
 
     type: Any
     default: Any

@@ -73,7 +73,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 
 
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
-    """The spacecraft in the text of a file; ``name`` stands for the file in messages.
+    """The spacecraft in the text of a file; ``name`` is that of the file in messages.
 
     ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
     """

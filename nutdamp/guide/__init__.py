@@ -31,7 +31,7 @@ SUMMARIES: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         "Motion",
         (
             *((topic.name, topic.summary) for topic in MOTION),
-            (OVERVIEW, "the numbered equations of the sources, and where they stand in the code"),
+            (OVERVIEW, "the numbered equations of the sources, and where they are in the code"),
             ("17", "one of them: M(1) to M(27) as 1 to 27, K(5) to K(15) as K5 to K15, 24.4"),
         ),
     ),

@@ -35,7 +35,7 @@ class Part(NamedTuple):
 
 
 class Topic(NamedTuple):
-    """One thing to explain: the ``name`` to ask for it by, one line about it, and its parts."""
+    """One thing to explain: the ``name`` to request it by, one line about it, and its parts."""
 
     name: str
     summary: str

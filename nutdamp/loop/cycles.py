@@ -151,12 +151,12 @@ class Map:
     def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
         """The limit cycle; raises Infeasible where the loop does not hold the nutation."""
         at = self._begin(chains)
-        wanted, going = SETTLING + cycles, np.ones(chains, dtype=bool)
+        enough, going = SETTLING + cycles, np.ones(chains, dtype=bool)
         for _ in range(MOST_STEPS):
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
-            going = np.array([one.cycles <= wanted and one.pulses < FIRINGS for one in at.sums])
+            going = np.array([one.cycles <= enough and one.pulses < FIRINGS for one in at.sums])
             if not going.any():
                 return self._summed(at)
         raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")

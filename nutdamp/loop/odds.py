@@ -52,9 +52,9 @@ class Odds:
 
     def size(self, now: Any, drawn: Any) -> Any:
         """|z| (rad/s) at which the event comes, from ``now`` on, by exponential numbers; infinite where it does not."""
-        wanted = np.interp(np.log(now), self.sizes, self.sum) + drawn
-        found = np.maximum(np.exp(np.interp(wanted, self.sum, self.sizes)), now)
-        return np.where(wanted > self.sum[-1], math.inf, found)
+        reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
+        found = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
+        return np.where(reached > self.sum[-1], math.inf, found)
 
 
 def _clustered(fresh: float, apart: Vector) -> Any:

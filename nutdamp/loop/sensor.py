@@ -37,7 +37,7 @@ FILTERED = 600.0
 """Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
 
 HARMONIC = 7
-"""Samples a nutation period from which on the sine of twice its rate can be told from the others."""
+"""Samples a nutation period from which on the sine of twice its rate can be distinguished from the others."""
 
 SETTLED = 5.0
 """Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""

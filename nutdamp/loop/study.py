@@ -302,7 +302,7 @@ def run(
     stopped: Callable[[], bool] = lambda: False,
     collect: Collect | None = None,
 ) -> LoopResults:
-    """Fly the cases that ``results`` asks for, a portion after the other; returns ``results``.
+    """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
     ``watch`` is called now and then with how many are done, ``collect`` with the portions in order. When ``stopped``
     says so, the portions done so far are kept.

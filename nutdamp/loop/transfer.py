@@ -74,12 +74,12 @@ class Transfer(NamedTuple):
             self.weights[0] * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
         )
 
-    def change(self, white: ComplexArray, towards: complex, wanted: float) -> ComplexArray:
-        """What makes the noise of the newest estimate ``wanted`` rad/s in a direction, as likely as it can be."""
+    def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
+        """What makes the noise of the newest estimate ``level`` rad/s in a direction, as likely as it can be."""
         newest = self.weights[::-1]
         pull = newest.conj() * towards
         real, other = (one * one for one in self.scatter)
-        missing = wanted - (complex(newest @ white) * towards.conjugate()).real
+        missing = level - (complex(newest @ white) * towards.conjugate()).real
         along = real * pull.real + 1j * other * pull.imag
         return np.asarray(missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along)
 

@@ -1,6 +1,6 @@
 """Nutation angle, body cone, space cone, and the periods of the nutation.
 
-``omega`` stands for the transverse rate |ω| = |ω1 + iω2| >= 0 in rad/s, ``spin`` for ω3 in rad/s, signed. The
+``omega`` is the transverse rate |ω| = |ω1 + iω2| >= 0 in rad/s, ``spin`` for ω3 in rad/s, signed. The
 sources print (12), (18)-(20), (22) for positive signs; here |ω3| and |a| make them hold for both spin directions.
 Angles come from components by arctan2: arccos loses everything below 1e-8 rad.
 """

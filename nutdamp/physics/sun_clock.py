@@ -43,7 +43,7 @@ class SunClock:
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
     the sign of the spin. ``time`` (n,) s is that of the last Sun pulse looked for, ``lost`` (n,) where there was none:
-    the Sun stands too near to the axis to go round in the body. ``over`` (n,) s: when the last pulse, command and
+    the Sun is too near to the axis to go round in the body. ``over`` (n,) s: when the last pulse, command and
     thrust, is over.
     """
 
@@ -146,7 +146,7 @@ class SunClock:
         here = start
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)
-            # Where the Sun is near the axis its azimuth may stand still for a moment: then by the mean rate.
+            # Where the Sun is near the axis its azimuth may not change for a moment: then by the mean rate.
             here = here.moved(here.since + off / np.where(rate > 0.1 * pace, rate, pace))
             if np.all(np.abs(off) < CIRCLE * EXACT):
                 break

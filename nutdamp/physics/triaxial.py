@@ -107,7 +107,7 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
 def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
     """The cone angles at the instant of the motion through ``rates0`` at which the nutation angle is largest.
 
-    The spin axis is ``sense``·e3, so that angles above 90 deg stand for a spin that has been reversed.
+    The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed.
     """
     least, largest = _extreme_cones(moments, rates0)
     # The extremes count from the end of the axis about which the body spins now, which need not be that one.

@@ -77,7 +77,7 @@ class Panel:
     def mark(self, point: Vector, text: str, style: str, *, at: bool = False) -> bool:
         """Write ``text`` at a point, in the first free place to its right, left, above or below; whether there is one.
 
-        What is to stand ``at`` the point itself only gives way to what was there before.
+        What is to be ``at`` the point itself only gives way to what was there before.
         """
         row, column = self.cell(float(point[0]), float(point[1]))
         around = [(row, column + 1), (row, column - len(text)), (row - 1, column), (row + 1, column)]
@@ -134,7 +134,7 @@ def fitted(width: int, middle: Vector, half: float) -> Panel:
 
 
 def _upright(panel: Panel) -> dict[int, str]:
-    """Numbers of the upright scale by the line they stand on."""
+    """Numbers of the upright scale by the line they are on."""
     low, high = float(panel.middle[1]) - panel.half, float(panel.middle[1]) + panel.half
     left = float(panel.middle[0]) - panel.half
     return {panel.cell(left, value)[0]: f"{value:.4g}" for value in ticks(low, high, max(panel.rows // 3, 2))}

@@ -314,7 +314,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:
-    """Names that share a reason stand together."""
+    """Names that share a reason are listed together."""
     table = facts()
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:

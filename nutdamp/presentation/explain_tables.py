@@ -17,7 +17,7 @@ WIDEST = 100
 """Columns of a text, at most: longer lines are hard to read."""
 
 NARROW = 60
-"""Columns below which names stand above what they are, and not beside it."""
+"""Columns below which names are above what they are, and not beside it."""
 
 
 def topics_screen() -> RenderableType:

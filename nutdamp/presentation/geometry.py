@@ -30,7 +30,7 @@ INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
 
 CLOSE = 1.0 / 125.0
-"""Part of the time shown below which firings that follow each other cannot be told apart: 4 points on a sheet."""
+"""Part of the time shown below which firings that follow each other cannot be distinguished: 4 points on a sheet."""
 
 MANY = 3
 """Firings that are drawn as one, at least."""
@@ -121,7 +121,7 @@ class Block(NamedTuple):
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Block]:
-    """The firings of a channel, or of all, up to ``until`` s; those that could not be told apart are one.
+    """The firings of a channel, or of all, up to ``until`` s; those that could not be distinguished are one.
 
     These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
     """

@@ -141,7 +141,7 @@ MILLISECONDS = 3
 Cell = Callable[[Plan], str]
 
 NOT = "✗"
-"""Stands before what is more than required."""
+"""Sign before what is more than required."""
 
 UNIT = re.compile(r"\d (\D+)$")
 """What follows the last digit of a cell and a space."""
@@ -259,7 +259,7 @@ def pulse_table(plan: Plan) -> Table:
     """One row a pulse: when, how long, which channel, and the nutation before and after.
 
     With an epoch the start in UTC takes the room of the centre. Through valves start and on-time are those of the
-    command, and the effective on-time stands beside it.
+    command, and the effective on-time is shown beside it.
     """
     before, after = plan.flight.around_pulses()
     pulses, body = plan.pulses, plan.spacecraft

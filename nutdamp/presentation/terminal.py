@@ -18,7 +18,7 @@ from nutdamp.track import Track
 PATH, PULSE, MOMENTUM = "cyan", "bold red", "green"
 
 SIDE_BY_SIDE = 76
-"""Characters from which both panels stand in one row."""
+"""Characters from which both panels fit side by side."""
 
 WIDEST, LEAST, GAP = 70, 30, 2
 """Characters of one panel at most and at least, and between the two."""

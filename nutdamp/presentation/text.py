@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from nutdamp.rounding import cleaned
 
 MISSING = "–"
-"""Stands where a number is not known."""
+"""Shown where a number is not known."""
 
 LONG = (
     ("s", 1.0, 3600.0),

@@ -242,7 +242,7 @@ class Search:
         return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
 
     def _spaced(self, every: int) -> bool:
-        """Whether pulses in one of ``every`` spins are as far apart as limits.gap asks for."""
+        """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
     def _counts(self, start: State, every: int) -> NDArray[np.int64]:

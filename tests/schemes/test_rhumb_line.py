@@ -226,7 +226,7 @@ def test_too_little_time_says_how_much_it_takes() -> None:
 def test_more_pulses_a_turn_than_channels() -> None:
     spacecraft = aimed(spinner(degrees=0.0, channels=cross(60.0)[:1]), 10.0, 0.0)
     plan = planning.plan(spacecraft, "rhumb-line", Options(per_turn=2))
-    assert "ask for 2 channels of different directions" in infeasibility(plan)
+    assert "need 2 channels of different directions" in infeasibility(plan)
 
 
 def test_limits_are_kept() -> None:

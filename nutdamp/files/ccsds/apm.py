@@ -48,7 +48,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         blocks.append(_block("SPIN", {**_frames(reference.frame), **_spin(body)}))
     blocks.append(_block("INERTIA", _inertia(body)))
     blocks += [
-        _block("MAN", _manoeuvre(pulse, number, body, reference), *told(pulse, number, reference))
+        _block("MAN", _manoeuvre(pulse, number, body, reference), *notes_on(pulse, number, reference))
         for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
     ]
     about = block("", APM_METADATA, {**identity(body), "TIME_SYSTEM": "UTC"})
@@ -81,7 +81,7 @@ def unsaid(body: Spacecraft) -> list[str]:
     return found
 
 
-def told(pulse: Pulse, number: int, reference: Reference) -> list[str]:
+def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
     """What is said of the manoeuvre of a pulse: its channel, and through a valve what is commanded for it."""
     found = [f"pulse {number}: {pulse.channel}"]
     if pulse.command is not None:

@@ -43,7 +43,7 @@ def _block(block: Block) -> list[str]:
 def from_kvn(text: str, name: str) -> tuple[list[Block], list[Fault]]:
     """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
 
-    Lines count from 1; ``name`` stands for the file in faults.
+    Lines count from 1; ``name`` is that of the file in faults.
     """
     outside: list[Entry] = []
     blocks: list[Block] = []

@@ -13,7 +13,7 @@ import numpy as np
 from nutdamp import flight
 from nutdamp.epoch import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.apm import Values, header, identity, told
+from nutdamp.files.ccsds.apm import Values, header, identity, notes_on
 from nutdamp.files.ccsds.message import OPM_BLOCKS, OPM_METADATA, Block, Message, Segment, block
 from nutdamp.files.frames import Reference
 from nutdamp.flight import Flight
@@ -47,7 +47,7 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
         gained = _velocity(pulse, number, flown, body.mass)
         values = _manoeuvre(pulse, number, gained, reference)
-        blocks.append(_block("MANEUVER", values, *told(pulse, number, reference)))
+        blocks.append(_block("MANEUVER", values, *notes_on(pulse, number, reference)))
     return Message("OPM", header(plan, created), (Segment(metadata, tuple(blocks)),))
 
 

@@ -81,7 +81,7 @@ def is_xml(data: bytes) -> bool:
 def from_xml(data: bytes, name: str) -> tuple[list[Block], list[Fault]]:
     """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
 
-    Lines count from 1; ``name`` stands for the file in faults. The encoding is the one declared, any that Python has a
+    Lines count from 1; ``name`` is that of the file in faults. The encoding is the one declared, any that Python has a
     codec for. Document types, and with them entities, are refused.
     """
     encoding = _encoding(data)

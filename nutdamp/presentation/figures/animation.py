@@ -45,7 +45,7 @@ MARKED = math.radians(60.0)
 """Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
 
 TRANSPARENT = 255
-"""Entry of the palette of a GIF that leaves what stood there."""
+"""Entry of the palette of a GIF that leaves what was there before."""
 
 FRAMED = 300
 """Frames by whose cones the scales are laid out, evenly over the film."""

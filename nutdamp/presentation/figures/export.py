@@ -22,7 +22,7 @@ LONG = 30
 
 FONT = "'DejaVu Sans'"
 FONTS = f"{FONT}, 'Bitstream Vera Sans', Verdana, sans-serif"
-"""Of text in SVG: that of the layout, and what stands for it, alike in width, where that is not installed."""
+"""Of text in SVG: that of the layout, and a substitute of the same width where that is not installed."""
 
 # No dates in the file, so that the same flight gives the same picture.
 _METADATA: dict[str, dict[str, Any]] = {
@@ -78,7 +78,7 @@ def svg(figure: Figure) -> str:
     """The figure as an inline ``<svg>`` element, as wide as what holds it, on no background.
 
     Text and frames take the colour of the text around it, so that it suits light and dark pages. Its ids begin with a
-    digest of its content: several may stand in one page.
+    digest of its content: several may be in one page.
     """
     stream = io.StringIO()
     figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})

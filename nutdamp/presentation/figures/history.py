@@ -163,12 +163,12 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
 
 
 def _bar(axes: Axes, flight: Flight, block: geometry.Block, row: int, *, brief: bool) -> None:
-    """The bar of a firing, or of several that cannot be told apart: paler where they do not fill it."""
+    """The bar of a firing, or of several that cannot be distinguished: paler where they do not fill it."""
     size = block.ends - block.begins
     dense = block.many == 1 or block.on > FULL * size
     axes.broken_barh(
         [(block.begins, size)], (row - 0.5 * BAR, BAR), facecolor=PULSE if dense else (PULSE, PALE), edgecolor=PULSE,
-        linewidth=0.8, label=None if dense else "many firings, too close to be told apart",
+        linewidth=0.8, label=None if dense else "many firings, too close to be distinguished",
     )  # fmt: skip
     text = block.name
     if not brief:

@@ -71,10 +71,10 @@ def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
     """Some of the samples, evenly, with the noise that the loop saw; those within firings are left out."""
     run = plan.flown_run
     count = math.floor(run.until * rate) + 1
-    wanted = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
+    shown_at = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
     signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.key), [], []
     for block in range(0, count, BLOCK):
-        numbers = wanted[(wanted >= block) & (wanted < block + BLOCK)]
+        numbers = shown_at[(shown_at >= block) & (shown_at < block + BLOCK)]
         if len(numbers):
             times.append(np.asarray(numbers / rate, dtype=np.float64))
             values.append(signal.sampled(numbers, signal.shown(run.flight.motion(times[-1])[0])))

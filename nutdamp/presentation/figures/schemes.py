@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DECADES = 5.0
-"""Of a log axis at most: what is less stands at its left edge."""
+"""Of a log axis at most: what is less is drawn at its left edge."""
 
 SPAN = 0.1
 """Of a linear axis at least, as a part of its largest value: what is equal but for rounding looks equal."""
@@ -45,7 +45,7 @@ class Floor(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A column: its name, the value of a plan (None: unknown), what stands beside the dot, and the lines.
+    """A column: its name, the value of a plan (None: unknown), what is written beside the dot, and the lines.
 
     ``required``: the bound of the requirement. ``log``: an angle in degrees on a log axis. ``most``: no value is more.
     """
@@ -84,7 +84,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
 
 
 def _place(plan: Plan) -> int:
-    """Schemes that reach more stand higher, those without a plan at the foot."""
+    """Schemes that reach more are higher up, those without a plan at the foot."""
     return list(Standing).index(plan.standing) if plan.feasible else len(Standing)
 
 
@@ -190,7 +190,7 @@ def _name_rows(axes: Axes, plans: Sequence[Plan], chosen: Plan | None) -> None:
 
 
 def _scale(axes: Axes, values: list[float], column: Quantity) -> float:
-    """Scale and limits of a column; returns its least value, below which a dot stands at the edge."""
+    """Scale and limits of a column; returns its least value, below which a dot is drawn at the edge."""
     from matplotlib.ticker import LogLocator
 
     if not column.log:

@@ -28,7 +28,7 @@ MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
 """Spin axis, body cone and what moves; firings; angular momentum and space cone."""
 
 FIRED = "#B34700"
-"""Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 asks for 4.5:1)."""
+"""Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 requires 4.5:1)."""
 
 TURNED = "#007a58"
 """Words about H: as `MOMENTUM`, dark enough to be read on white (5.3:1)."""
@@ -291,7 +291,7 @@ def _settle(
     best, least = None, np.inf
     led = note in _MEANT
     for x, y in [*_AROUND, *_FAR] if led else _OFFSETS[role]:
-        # Sideways offsets are counted from the edge of the text, so that long names stand as near as short ones.
+        # Sideways offsets are counted from the edge of the text, so that long names are as near as short ones.
         offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
         box = here.translated(offset[0] * points, offset[1] * points)
         curves, leads = (box.count_contains(part) for part in inked)

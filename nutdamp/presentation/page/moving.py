@@ -44,7 +44,7 @@ FAR = 4.0
 """How far a target may lie from H(0) to be in the panel of the axis track, as a multiple of the track."""
 
 NONE = -(10**8)
-"""Stands in a row for an angle that does not exist."""
+"""Entry of a row for an angle that does not exist."""
 
 QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
 """Seconds that playing takes at the quickest, at first, and at the slowest."""

@@ -376,7 +376,7 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
         farthest = max(channels, key=apart)
         if apart(farthest) < 0.2:
             raise Infeasible(
-                f"{count} pulses a spin turn ask for {count} channels of different directions, for each passes the "
+                f"{count} pulses a spin turn need {count} channels of different directions, for each passes the "
                 f"phase once a turn; there are {len(chosen)}"
             )
         chosen.append(farthest)

@@ -47,7 +47,7 @@ class SymmetricModel:
         return Schedule(tuple(pulses), made.notes, made.bounds)
 
     def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
-        """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits ask for it."""
+        """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
         torquer = self.spacecraft.torquer
         assert torquer is not None
         first, second = pulse.impulse[:2] / self.stretch
