@@ -220,13 +220,20 @@ _COVERED = {"_vital": np.inf, "_label": 14.0, "_number": np.inf}
 """Points of curves, 4 pixels apart, that a label may cover."""
 
 
+def _lay_out(figure: Figure) -> None:
+    """Lay the panels out as drawing the figure would, without drawing what is in them."""
+    figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
+    for axes in figure.axes:
+        axes.apply_aspect()
+
+
 def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
     for axes in figure.axes:  # drawn later outside this style, as many ticks fit between labels of the same size
         axes.tick_params(labelsize=_SETTINGS["xtick.labelsize"])
     before = np.zeros(1)
     for _ in range(PASSES):
-        figure.draw_without_rendering()
+        _lay_out(figure)
         now = np.array([axes.get_window_extent().extents for axes in figure.axes])
         if now.shape == before.shape and np.abs(now - before).max(initial=0.0) < 1.0:
             break
