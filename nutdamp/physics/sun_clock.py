@@ -159,16 +159,24 @@ class SunClock:
 
     def _ahead(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
         """The same in [0, 2π)."""
-        w, x, y, z = here.quaternion
-        s1, s2, s3 = sun
-        # The Sun as the body sees it: turned by the conjugate quaternion.
-        i, j, k = z * s2 - y * s3, x * s3 - z * s1, y * s1 - x * s2
-        s1, s2, s3 = (
-            s1 + 2.0 * (w * i + z * j - y * k),
-            s2 + 2.0 * (w * j + x * k - z * i),
-            s3 + 2.0 * (w * k + y * i - x * j),
-        )
-        first, second, third = here.rates
-        turning = s1 * (s3 * first - s1 * third) - s2 * (s2 * third - s3 * second)  # ds/dt = s × ω
-        ahead = self.sense * (np.arctan2(s2, s1) - self.azimuth) % CIRCLE
-        return ahead, -self.sense * turning / (s1 * s1 + s2 * s2)
+        return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
+
+
+def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
+    """By what angle (n,) in [0, 2π) bodies have to turn until the Sun passes the sensor, and at what rate, rad/s.
+
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
+    rad and ``sense`` are those of a `SunClock`.
+    """
+    w, x, y, z = quaternion
+    s1, s2, s3 = sun
+    # The Sun as the body sees it: turned by the conjugate quaternion.
+    i, j, k = z * s2 - y * s3, x * s3 - z * s1, y * s1 - x * s2
+    s1, s2, s3 = (
+        s1 + 2.0 * (w * i + z * j - y * k),
+        s2 + 2.0 * (w * j + x * k - z * i),
+        s3 + 2.0 * (w * k + y * i - x * j),
+    )
+    first, second, third = rates
+    turning = s1 * (s3 * first - s1 * third) - s2 * (s2 * third - s3 * second)  # ds/dt = s × ω
+    return sense * (np.arctan2(s2, s1) - azimuth) % CIRCLE, -sense * turning / (s1 * s1 + s2 * s2)

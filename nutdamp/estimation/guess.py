@@ -1,0 +1,169 @@
+"""Where a fit begins: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
+
+A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
+spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from nutdamp.estimation.model import Model, Values, Vector
+from nutdamp.estimation.parameters import RATIO
+from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS
+from nutdamp.physics import attitude
+
+FINER = 8
+"""The spectrum is taken at so many times as many frequencies as there are samples."""
+
+MOST = 1 << 16
+"""Samples of a spectrum at most; of longer records the first."""
+
+SMALL = 1e-3
+"""Share of the spin that trial transverse rates have: the motion is linear there."""
+
+TURNS = 8
+"""Starting values of the angle by which the body is turned about its axis."""
+
+
+def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
+    """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
+    values = {one.name: one.file for one in model.parameters}
+    spin = _spin(model)
+    if "omega_3" in values:
+        values["omega_3"] = spin
+    rate = _peak(model, spin, share)
+    if rate is not None:
+        values |= _moments(model, rate, spin)
+    values |= _towards(model, values)
+    if "attitude_3" not in values:
+        yield _linear(model, values)
+        return
+    for turn in range(TURNS):
+        yield _linear(model, values | {"attitude_3": values["attitude_3"] + 2.0 * math.pi * turn / TURNS})
+
+
+def _spin(model: Model) -> float:
+    """ω3 from the signal that shows it, rad/s; else as the file has it."""
+    record, spin = model.record, model.spacecraft.spin
+    if record.has(GYROS[2]) and np.isfinite(record.signals[GYROS[2]]).any():
+        return float(np.nanmedian(record.signals[GYROS[2]]))
+    if len(record.sun_pulses) > 1:
+        gaps = np.diff(record.sun_pulses)
+        turns = np.rint(gaps / gaps.min()).sum()
+        return math.copysign(2.0 * math.pi * turns / float(gaps.sum()), spin)
+    return spin
+
+
+def _peak(model: Model, spin: float, share: float) -> float | None:
+    """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
+    record, body = model.record, model.spacecraft
+    expected = body.inertia.body_rate * spin
+    count = max(int(share * len(record.times)), min(len(record.times), 16))
+    times = record.times[: min(count, MOST)]
+    signals = {name: values[: len(times)] for name, values in record.signals.items()}
+    if record.has(*GYROS[:2]):
+        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
+    for name in (*GYROS[:2], ACCELERATION):
+        if name in signals:
+            found = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            return None if found is None else math.copysign(found, expected)
+    if record.has(*AXIS):
+        axis = np.column_stack([signals[name] for name in AXIS])
+        mean = np.nanmean(axis, axis=0)
+        mean /= np.linalg.norm(mean)
+        first = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
+        first /= np.linalg.norm(first)
+        # Seen along H the axis goes round with |H|/A, in the sense of H.
+        x, y = axis @ first, axis @ np.cross(mean, first)
+        turned = _strongest(times, x, y, body.inertia.C / body.inertia.A * abs(spin), 2.1 * abs(spin), 1.0)
+        if turned is None:
+            return None
+        cosine = math.sqrt(max(1.0 - float(np.nanvar(x) + np.nanvar(y)), 0.1))
+        return spin * (1.0 - abs(turned) * cosine / abs(spin))
+    return None
+
+
+def _strongest(
+    times: Vector, real: Vector, imaginary: Vector | None, expected: float, most: float, sign: float
+) -> float | None:
+    """Rate (rad/s, times ``sign``) at the peak of a spectrum, nearest to ``expected`` of those that look alike."""
+    there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
+    if there.sum() < 4:
+        return None
+    at = times[there]
+    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    step = float(np.median(np.diff(at)))
+    count = min(math.ceil((at[-1] - at[0]) / step) + 1, MOST)
+    place = np.rint((at - at[0]) / step).astype(int)
+    inside = place < count
+    even = np.zeros(count, dtype=complex)
+    # Outliers are cut off at a few times the usual size.
+    centred = values - np.median(values.real) - 1j * np.median(values.imag)
+    limit = 3.0 * float(np.median(np.abs(centred))) or math.inf
+    centred /= np.maximum(np.abs(centred) / limit, 1.0)
+    even[place[inside]] = (centred - centred.mean())[inside]
+    length = 1 << math.ceil(math.log2(FINER * count))
+    power = np.abs(np.fft.fft(even, length)) ** 2
+    rates = 2.0 * math.pi * np.fft.fftfreq(length, step)
+    around = 2.0 * math.pi / step
+    if imaginary is None:
+        power = np.where(rates > 0.0, power, 0.0)
+        rates, expected = np.abs(rates), abs(expected)
+    else:
+        rates = rates + around * np.rint((expected - rates) / around) * (most > 0.5 * around)
+    power = np.where((np.abs(rates) <= 1.02 * most) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)), power, 0)
+    if not power.any():
+        return None
+    return sign * float(rates[int(np.argmax(power))])
+
+
+def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
+    """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
+    inertia = model.spacecraft.inertia
+    wanted = inertia.C / inertia.A - (rate / spin - inertia.body_rate)
+    wanted = min(max(wanted, 0.01), 1.999)
+    A, ratio = model.parameter("A"), model.parameter(RATIO)
+    assert ratio is not None
+    if A is None:
+        return {RATIO: wanted}
+    part = (A.prior / A.file) ** 2 / (ratio.prior / ratio.file) ** 2
+    return {"A": A.file * (ratio.file / wanted) ** part, RATIO: wanted}
+
+
+def _towards(model: Model, values: Values) -> dict[str, float]:
+    """The attitude turned the shortest way so that the spin axis is along the mean of the axes measured."""
+    record = model.record
+    if not record.has(*AXIS):
+        return {}
+    mean = np.nanmean(np.column_stack([record.signals[name] for name in AXIS]), axis=0)
+    quaternion = model.reference.quaternion
+    sense = math.copysign(1.0, model.spacecraft.spin)
+    wanted = sense * attitude.rotate(attitude.conjugate(quaternion), mean / np.linalg.norm(mean))
+    across = np.cross([0.0, 0.0, 1.0], wanted)
+    size = float(np.linalg.norm(across))
+    angle = math.atan2(size, wanted[2])
+    turn = angle * across / size if size > 0.0 else np.array([angle, 0.0, 0.0])
+    return {"attitude_1": float(turn[0]), "attitude_2": float(turn[1])} | (
+        {"attitude_3": 0.0} if "attitude_3" in values else {}
+    )
+
+
+def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
+    """The transverse rates, offsets and tilts by linear least squares, everything else as it is."""
+    names = ["omega_1", "omega_2", *(name for name in values if name.startswith(("bias", "attitude_1", "attitude_2")))]
+    base = values | {"omega_1": 0.0, "omega_2": 0.0}
+    steps = {name: SMALL * abs(values.get("omega_3", model.spacecraft.spin)) for name in names[:2]}
+    steps |= dict.fromkeys(names[2:], SMALL)
+    at_rest = model.predicted(base)
+    columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
+    weights = np.ones(len(at_rest))
+    for index in range(len(model.signals)):
+        rows = model.signal == index
+        weights[rows] = 1.0 / (float(np.ptp(model.measured[rows])) or 1.0)
+    matrix = np.column_stack(columns) * weights[:, None]
+    solved = np.linalg.lstsq(matrix, (model.measured - at_rest) * weights, rcond=1e-10)[0]
+    return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}

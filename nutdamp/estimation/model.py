@@ -1,0 +1,328 @@
+"""What telemetry would read, for given parameters: closed forms for coasts, the flight where pulses were fired.
+
+A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
+pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What an accelerometer feels is
+`loop.sensor.felt`, when the Sun passes a sensor `sun_clock.ahead`.
+
+Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the file's principal axes:
+regular at e = 0, where principal axes are any.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.errors import BadRequest, Infeasible, Unsuitable
+from nutdamp.estimation.parameters import Parameter, in_moments, parameters, prior
+from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, SUN_PULSE, Record
+from nutdamp.flight import Flight, flown
+from nutdamp.loop.sensor import felt, is_blind
+from nutdamp.loop_settings import ACCELEROMETER
+from nutdamp.motion import Arc, Path
+from nutdamp.physics import attitude, energy_sink, sun_clock, triaxial
+from nutdamp.physics.rigid import Forcing
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Attitude, Inertia, Spacecraft, SpinState
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The body that parameters describe: its ``state`` at the start of the record in its own principal axes.
+
+    ``moments`` (I1, I2, I3) kg m², ``axes`` (3, 3) its principal axes in those of the file, as columns.
+    """
+
+    moments: tuple[float, float, float]
+    axes: Matrix
+    state: SpinState
+    growth: float
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether I1 = I2."""
+        return self.moments[0] == self.moments[1]
+
+
+class Model:
+    """Predicts a record of a spacecraft.
+
+    ``parameters`` are estimated; ``measured`` (m,) are the samples that there are, signal by signal, ``signals`` their
+    names and ``signal`` (m,) which of them each is; ``times`` (m,) s when. Raises BadRequest where the spacecraft
+    file lacks what a signal needs.
+    """
+
+    def __init__(
+        self, spacecraft: Spacecraft, record: Record, *, unequal: bool | None = None, growing: bool = True
+    ) -> None:
+        """``unequal``: with I1 ≠ I2, as the file has it where that is not said; ``growing``: κ is estimated."""
+        _expect_described(spacecraft, record)
+        self.spacecraft, self.record = spacecraft, record
+        self.unequal = not spacecraft.inertia.symmetric if unequal is None else unequal
+        self.start = record.start
+        self.parameters = parameters(spacecraft, record, unequal=self.unequal, growing=growing)
+        self.prior = prior(spacecraft, self.parameters)
+        self.pulses = self._pulses()
+        parts = list(self._parts())
+        if not parts:
+            raise Infeasible("the record has no samples")
+        self.signals = tuple(name for name, *_ in parts)
+        self.measured = np.concatenate([values for _, _, values in parts])
+        self.times = np.concatenate([times for _, times, _ in parts])
+        self.signal = np.repeat(np.arange(len(parts)), [len(values) for *_, values in parts])
+
+    @cached_property
+    def reference(self) -> SpinState:
+        """The motion at the start of the record as the file has it."""
+        inertia = self.spacecraft.inertia
+        body = Body(inertia.moments, inertia.axes, self.spacecraft.initial, self.spacecraft.growth)
+        # As if the record began at t = 0; a file's disturbances are too small to turn it much before.
+        rates, quaternion = _coast(body).motion(np.array([self.start]))
+        return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
+
+    def parameter(self, name: str) -> Parameter | None:
+        """The one of that name, if it is estimated."""
+        return next((one for one in self.parameters if one.name == name), None)
+
+    def body(self, values: Values) -> Body:
+        """The body that parameters describe."""
+        of_file, spacecraft = self.spacecraft.inertia, self.spacecraft
+        A, C = in_moments(spacecraft, values)
+        rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
+        turn = np.array([values.get(f"attitude_{number}", 0.0) for number in (1, 2, 3)])
+        quaternion = attitude.multiply(self.reference.quaternion, _turned(turn))
+        growth = values.get("growth", spacecraft.growth)
+        e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
+        size = math.hypot(e1, e2)
+        moments, axes = (A, A, C), of_file.axes
+        if size > 0.0:
+            half = 0.5 * math.atan2(e2, e1)
+            about = np.array([[math.cos(half), -math.sin(half), 0.0], [math.sin(half), math.cos(half), 0.0], [0, 0, 1]])
+            moments, axes, rates = (A * (1.0 + size), A * (1.0 - size), C), axes @ about, about.T @ rates
+            quaternion = attitude.multiply(quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)]))
+        return Body(moments, axes, SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion), growth)
+
+    def motion(self, values: Values, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) rad/s and quaternions (n, 4) of the file's axes at rising ``times`` (n,) s."""
+        body = self.body(values)
+        rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(times - self.start)
+        return rates @ body.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.axes.T))
+
+    def moved(self, body: Body, schedule: Schedule, time: float) -> SpinState:
+        """The motion of a body at ``time`` s, in its own principal axes; before the record it coasts."""
+        if time < self.start:
+            schedule = Schedule()
+        path = self._path(body, schedule, time)
+        rates, quaternion = path.motion(np.array([time - self.start]))
+        return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
+
+    def at(self, values: Values, time: float) -> tuple[Body, SpinState]:
+        """The body, and its motion at ``time`` s."""
+        body = self.body(values)
+        return body, self.moved(body, self._fired(values), time)
+
+    def predicted(self, values: Values) -> Vector:
+        """What the samples of `measured` would be without noise, (m,)."""
+        times, back = self._all_times
+        if self._turned:
+            rates, quaternion = self.motion(values, times)
+            quaternion = quaternion[back]
+        else:
+            rates, quaternion = self._rates(values, times), np.empty((len(back), 0))
+        rates = rates[back]
+        parts = []
+        for index, name in enumerate(self.signals):
+            rows = self.signal == index
+            parts.append(self._shown(name, values, rates[rows], quaternion[rows]))
+        return np.concatenate(parts)
+
+    @property
+    def _turned(self) -> bool:
+        """Whether any signal shows the attitude."""
+        return "axis" in self.signals or SUN_PULSE in self.signals
+
+    def _rates(self, values: Values, times: Vector) -> Vector:
+        """The rates of `motion` alone."""
+        body = self.body(values)
+        if self.pulses.pulses or self.spacecraft.disturbances or not body.symmetric:
+            return self.motion(values, times)[0]
+        state, (A, _, C) = body.state, body.moments
+        omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, times - self.start)
+        return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
+
+    @cached_property
+    def _all_times(self) -> tuple[Vector, NDArray[np.intp]]:
+        return np.unique(self.times, return_inverse=True)
+
+    @cached_property
+    def _across(self) -> tuple[Vector, Vector]:
+        """Two unit vectors (n, 3) across each measured axis."""
+        axis = np.column_stack([self.record.signals[name] for name in AXIS])
+        axis = axis[np.isfinite(axis).all(axis=1)]
+        aside = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
+        first = np.cross(axis, aside)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        return first, np.cross(axis, first)
+
+    def _parts(self) -> Iterator[tuple[str, Vector, Vector]]:
+        """Name, times and samples of each signal; of the axis and of Sun pulses what is off, zero if nothing is."""
+        record = self.record
+        for name in (*GYROS, ACCELERATION):
+            if name in record.signals:
+                there = np.isfinite(record.signals[name])
+                if there.any():
+                    yield name, record.times[there], record.signals[name][there]
+        if record.has(*AXIS):
+            there = np.all(np.isfinite([record.signals[name] for name in AXIS]), axis=0)
+            if there.any():
+                times = np.concatenate([record.times[there]] * 2)
+                yield "axis", times, np.zeros(len(times))
+        if len(record.sun_pulses):
+            yield SUN_PULSE, record.sun_pulses, np.zeros(len(record.sun_pulses))
+
+    def _shown(self, name: str, values: Values, rates: Vector, quaternion: Vector) -> Vector:
+        """A signal at the motion of its samples."""
+        if name in GYROS:
+            first, second = values.get("misalignment_1", 0.0), values.get("misalignment_2", 0.0)
+            x, y, z = rates.T
+            # What gyros turned by the small angles (first, second, 0) read: ω - tilt × ω.
+            shown = (x - second * z, y + first * z, z - first * y + second * x)[GYROS.index(name)]
+            return np.asarray(shown + values.get(f"bias_{name}", 0.0))
+        if name == ACCELERATION:
+            assert self.spacecraft.loop is not None
+            of_file = self.spacecraft.inertia
+            columns = felt(self.spacecraft.loop.sensor, self._moments(values), (rates @ of_file.axes).T)
+            return np.asarray(columns[0] + values.get("bias_acceleration", 0.0))
+        if name == SUN_PULSE:
+            return self._sun_late(rates, quaternion)
+        half = len(rates) // 2
+        sense = math.copysign(1.0, self.spacecraft.spin)
+        wobble = np.array([values.get("wobble_2", 0.0), -values.get("wobble_1", 0.0), 1.0])
+        axis = attitude.rotate(quaternion[:half], sense * self.spacecraft.inertia.axes @ wobble)
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        return np.concatenate([np.sum(one * axis, axis=1) for one in self._across])
+
+    def _moments(self, values: Values) -> tuple[float, float, float]:
+        A, C = in_moments(self.spacecraft, values)
+        e1 = values.get("unequal_1", 0.0)
+        return A * (1.0 + e1), A * (1.0 - e1), C
+
+    def _sun_late(self, rates: Vector, quaternion: Vector) -> Vector:
+        """By how much later than it came each Sun pulse should have come, s, (k,)."""
+        body, sensor = self.spacecraft, self.spacecraft.sun_sensor
+        assert sensor is not None
+        assert body.sun is not None
+        of_body = attitude.multiply(quaternion, attitude.from_matrix(body.inertia.axes))
+        sun = np.broadcast_to(body.sun[:, None], (3, len(rates)))
+        sense = math.copysign(1.0, body.spin)
+        ahead, rate = sun_clock.ahead((rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
+        off = (ahead + math.pi) % (2.0 * math.pi) - math.pi
+        return np.asarray(off / np.where(rate > 0.0, rate, abs(body.spin)))
+
+    def _pulses(self) -> Schedule:
+        """The pulses fired since the record began; times count from there."""
+        kept = []
+        for pulse in self.record.schedule:
+            if pulse.over <= self.start:
+                continue
+            if pulse.thrust[0] < self.start:
+                raise BadRequest(f"the pulse at {pulse.t:g} s is on as the record begins, at {self.start:g} s")
+            kept.append(pulse.moved(-self.start))
+        return Schedule(tuple(kept))
+
+    def _fired(self, values: Values) -> Schedule:
+        """The pulses with the thrust factors and delays of their channels."""
+        made = []
+        for pulse in self.pulses:
+            factor = values.get(f"thrust {pulse.channel}", 1.0)
+            torque = None if pulse.torque is None else factor * pulse.torque
+            late = max(values.get(f"delay {pulse.channel}", 0.0), -pulse.thrust[0])
+            made.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
+        return Schedule(tuple(made))
+
+    def _path(self, body: Body, fired: Schedule, until: float) -> Path:
+        """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
+        if not fired.pulses and not self.spacecraft.disturbances and (body.symmetric or body.growth == 0.0):
+            return _coast(body)
+        if until < self.start:
+            raise Infeasible(
+                f"the motion at {until:g} s, before the record begins at {self.start:g} s, needs an integration "
+                "backwards: name a later --at"
+            )
+        spacecraft = self._as_spacecraft(body)
+        made = make_dynamics(spacecraft)
+        dynamics = Dynamics(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
+        return _Flown(flown(spacecraft, fired, until - self.start, dynamics=dynamics))
+
+    def _as_spacecraft(self, body: Body) -> Spacecraft:
+        to_file = attitude.multiply(body.state.quaternion, attitude.from_matrix(body.axes.T))
+        return replace(
+            self.spacecraft,
+            inertia=Inertia(body.moments, body.axes),
+            omega0=body.state.rates,
+            attitude=Attitude(to_file),
+            disturbances=self.spacecraft.disturbances,
+        )
+
+
+def _coast(body: Body) -> Path:
+    """The motion without pulses; of three moments that without dissipation."""
+    if body.symmetric:
+        return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth)
+    return _Polhode(body)
+
+
+@dataclass(frozen=True)
+class _Polhode:
+    """Coast of a body of three different moments."""
+
+    body: Body
+    steps: int = 0
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        body = self.body
+        rates = body.state.rates
+        turned = triaxial.free_attitude(body.moments, rates, body.state.quaternion, times)
+        return triaxial.free_rates(body.moments, rates, times), turned
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """A flight as a path."""
+
+    flight: Flight
+    steps: int = 0
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        return self.flight.motion(np.maximum(times, 0.0))
+
+
+def _turned(angles: Vector) -> Vector:
+    """Quaternion of the turn by a vector of angles (3,), rad."""
+    size = float(np.linalg.norm(angles))
+    share = math.sin(0.5 * size) / size if size > 0.0 else 0.5
+    return np.array([math.cos(0.5 * size), *(share * angles)])
+
+
+def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
+    """Raises BadRequest where the file does not describe what a signal needs."""
+    if record.has(ACCELERATION):
+        loop = spacecraft.loop
+        if loop is None or loop.sensor.kind != ACCELEROMETER:
+            problem = "expected kind: accelerometer with its position, for the column acceleration_m_s2"
+            raise Unsuitable(("loop", "sensor"), problem)
+        if is_blind(spacecraft.inertia.moments, loop.sensor.position, loop.sensor.axis):
+            raise Unsuitable(("loop", "sensor"), "the accelerometer shows nothing of a nutation where it is")
+    if len(record.sun_pulses) and (spacecraft.sun is None or spacecraft.sun_sensor is None):
+        key = "sun" if spacecraft.sun is None else "sun_sensor"
+        raise Unsuitable((key,), f"expected the key {key}: Sun pulses are timed by attitude, sun and sun_sensor")

@@ -1,0 +1,200 @@
+"""Which parameters telemetry is fitted with: what the file says of each, and how far it may be off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.dispersion.inputs import SPREAD
+from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, SUN_PULSE, UNITS, Record, quantisation
+from nutdamp.loop_settings import GYRO
+from nutdamp.spacecraft import Spacecraft
+from nutdamp.tolerances import Tolerance
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+RATIO = "C/A"
+"""Name of the parameter that a coast fixes."""
+
+BIAS = math.radians(0.02)
+"""Standard deviation of the bias of a gyro, rad/s, where the file names none (dispersions.sensor_bias)."""
+
+TILT = math.radians(1.0)
+"""Standard deviation of each tilt of the gyros, and of the observed axis, from the principal axes, rad."""
+
+DELAY = 0.05
+"""Standard deviation of what a channel's thrust is late, s."""
+
+TINY = 1e-7
+"""Step of derivatives, rad, or as a share of a value."""
+
+
+class Parameter(NamedTuple):
+    """One number to be estimated: its ``name`` and ``unit``, SI.
+
+    ``file``: what the file says, to within ``prior`` (one sigma; infinite where it says nothing that counts);
+    ``step``: by which it is changed for derivatives.
+    """
+
+    name: str
+    unit: str
+    file: float
+    prior: float
+    step: float
+
+
+def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool) -> tuple[Parameter, ...]:
+    """The parameters of a record, the motion first; ``unequal``: with I1 ≠ I2, ``growing``: with dissipation.
+
+    Rates are those at the start of the record.
+    """
+    return tuple(_all(spacecraft, record, unequal, growing))
+
+
+def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
+    """A and the ratio C/A, as far as the file lets them differ from its values; the ratio in any case.
+
+    Its prior is that of A and C together; with A they are correlated, see `prior`. What has no tolerance is fixed: A
+    where neither has one. The ratio and not C, because what telemetry fixes best is then linear in the parameters.
+    """
+    of_A, of_C = _of_moments(spacecraft)
+    ratio = of_C[0] / of_A[0]
+    if of_A[1] > 0.0 and of_C[1] > 0.0:
+        yield Parameter("A", "kg m²", of_A[0], of_A[1], TINY * of_A[0])
+    sigma = ratio * math.hypot(of_A[1] / of_A[0], of_C[1] / of_C[0])
+    yield Parameter(RATIO, "", ratio, sigma or math.inf, TINY * ratio)
+
+
+def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[float, float]:
+    """A and C (kg m²) of the ``values`` of parameters."""
+    of_A, of_C = _of_moments(spacecraft)
+    ratio = values[RATIO]
+    if of_A[1] > 0.0 and of_C[1] == 0.0:
+        return of_C[0] / ratio, of_C[0]
+    A = values.get("A", of_A[0])
+    return A, ratio * A
+
+
+def prior(spacecraft: Spacecraft, made: Sequence[Parameter]) -> tuple[Matrix, Vector]:
+    """Rows (k, p) of what the file says of the parameters, over its sigmas, and their values (k,)."""
+    rows, values = [], []
+    names = [one.name for one in made]
+    for index, one in enumerate(made):
+        row = np.zeros(len(made))
+        row[index] = 1.0 / one.prior
+        value = one.file / one.prior if math.isfinite(one.prior) else 0.0
+        if one.name == RATIO and "A" in names:  # C = A·(C/A), to first order
+            (A, _), (C, sigma) = _of_moments(spacecraft)
+            row[index], row[names.index("A")] = A / sigma, one.file / sigma
+            value = 2.0 * C / sigma
+        if row.any():
+            rows.append(row)
+            values.append(value)
+    return np.array(rows).reshape(-1, len(made)), np.array(values)
+
+
+def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Means and standard deviations of A and C by the file, kg m²."""
+    given, inertia = spacecraft.dispersions, spacecraft.inertia
+    pairs = ((inertia.A, None if given is None else given.A), (inertia.C, None if given is None else given.C))
+    of_A, of_C = ((value, 0.0) if tolerance is None else prior_of(tolerance, value) for value, tolerance in pairs)
+    return of_A, of_C
+
+
+def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -> Iterator[Parameter]:
+    given, spin = spacecraft.dispersions, float(spacecraft.omega0[2])
+    yield from moments(spacecraft)
+    for number in (1, 2):
+        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, TINY * abs(spin))
+    if record.has(GYROS[2]) or len(record.sun_pulses):
+        yield Parameter("omega_3", "rad/s", spin, math.inf, TINY * abs(spin))
+    elif given is not None and given.omega0[2] is not None:
+        mean, sigma = prior_of(given.omega0[2], spin)
+        yield Parameter("omega_3", "rad/s", mean, sigma, TINY * abs(spin))
+    if growing and spacecraft.inertia.a != 0.0:
+        yield Parameter("growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3))
+    if record.has(*AXIS) or len(record.sun_pulses):
+        yield from _attitude(spacecraft, record)
+    yield from _gyros(spacecraft, record)
+    if record.has(*AXIS):
+        for number in (1, 2):
+            yield Parameter(f"wobble_{number}", "rad", 0.0, TILT, TINY)
+    if record.has(ACCELERATION):
+        size = 1e-6 * spin * spin
+        yield Parameter("bias_acceleration", UNITS[ACCELERATION], 0.0, math.inf, size)
+    if unequal:
+        first, second, _ = spacecraft.inertia.moments
+        yield Parameter("unequal_1", "", (first - second) / (first + second), math.inf, 1e-6)
+        yield Parameter("unequal_2", "", 0.0, math.inf, 1e-6)
+    yield from _channels(spacecraft, record)
+
+
+def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
+    """Turns of the attitude at the start about body axes; the last shows only beside what turns with the body."""
+    seen, given = record.has(*AXIS), spacecraft.dispersions
+    sigma = math.inf
+    if not seen:
+        sigma = 0.0 if given is None or given.attitude is None else prior_of(given.attitude, 0.0)[1]
+    for number in (1, 2) if sigma > 0.0 else ():
+        yield Parameter(f"attitude_{number}", "rad", 0.0, sigma, TINY)
+    if len(record.sun_pulses) or record.has(GYROS[0]) or record.has(GYROS[1]) or record.has(ACCELERATION):
+        yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
+
+
+def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
+    """Biases; misalignment only beside gyro 3, for else it looks like a bias of gyros 1 and 2."""
+    loop, given = spacecraft.loop, spacecraft.dispersions
+    mean = loop.sensor.bias if loop is not None and loop.sensor.kind == GYRO else 0.0
+    sigma = BIAS
+    if loop is not None and given is not None and given.sensor_bias is not None and loop.sensor.kind == GYRO:
+        mean, sigma = prior_of(given.sensor_bias, mean)
+    aligned = record.has(GYROS[2])
+    for name in GYROS:
+        if record.has(name):
+            step = quantisation(record.signals[name])
+            free = math.hypot(sigma, step / math.sqrt(12.0)) if aligned else math.inf
+            yield Parameter(f"bias_{name}", "rad/s", mean, free, TINY)
+    if aligned and (record.has(GYROS[0]) or record.has(GYROS[1])):
+        for number in (1, 2):
+            yield Parameter(f"misalignment_{number}", "rad", 0.0, TILT, TINY)
+
+
+def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
+    """Thrust factor and delay of each channel that fired."""
+    given = spacecraft.dispersions
+    known = {channel.name: channel for channel in spacecraft.channels}
+    for name in dict.fromkeys(pulse.channel for pulse in record.schedule):
+        sigma, mean = math.inf, 1.0
+        if given is not None and name in known:
+            sizes = [given.thrust.get(one.name) for one in known[name].thrusters]
+            priors = [prior_of(one, 1.0) for one in sizes if one is not None]
+            if priors:
+                mean = math.fsum(one for one, _ in priors) / len(sizes) + (1.0 - len(priors) / len(sizes))
+                sigma = math.hypot(*(one for _, one in priors)) / len(sizes) or math.inf
+        yield Parameter(f"thrust {name}", "", mean, sigma, TINY)
+        yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
+
+
+def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:
+    """Mean and standard deviation of a value of the file, in its unit."""
+    size = tolerance.size * (abs(nominal) if tolerance.relative else 1.0)
+    if tolerance.kind == "bias":
+        return nominal + math.copysign(size, tolerance.size), 0.0
+    return nominal, abs(size) * SPREAD[tolerance.kind]
+
+
+def untold(record: Record) -> Iterator[str]:
+    """What signals of the kinds in a record cannot tell, whatever the file: in words."""
+    if not record.schedule.pulses:
+        yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
+    if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
+        yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
+    if not record.has(GYROS[2]) and not len(record.sun_pulses):
+        yield f"no signal shows the spin (omega_3 or {SUN_PULSE}): it is that of the file"
+    if record.has(*AXIS) and not (record.has(GYROS[0]) or record.has(GYROS[1]) or len(record.sun_pulses)):
+        yield "the axis alone does not show how the body is turned about it: the phase is that of the file's attitude"

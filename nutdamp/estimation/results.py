@@ -1,0 +1,254 @@
+"""What a fit says in quantities people know, with their standard deviations; and the spacecraft carried to an epoch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.model import Body, Matrix, Values, Vector
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of
+from nutdamp.physics import attitude
+from nutdamp.physics.arc_cones import arc_cones
+from nutdamp.spacecraft import SpinState
+
+DEG = math.pi / 180.0
+
+UNTOLD, SHARED, TOLD = "file", "both", "data"
+"""Where an estimate comes from: the file's tolerances, both, or the data."""
+
+FROM_DATA, FROM_FILE = 0.5, 0.9
+"""Share of its prior that a sigma is below where the data tell a value, and above where they do not."""
+
+WORTH_NAMING = 0.9
+"""Correlation from which on it is named."""
+
+
+class Estimate(NamedTuple):
+    """A ``value`` with its ``sigma`` in ``unit`` (SI times ``factor``); what the ``file`` says, to within ``prior``.
+
+    ``file`` and ``prior`` are None where it says nothing.
+    """
+
+    key: str
+    label: str
+    unit: str
+    factor: float
+    value: float
+    sigma: float
+    file: float | None
+    prior: float | None
+
+    @property
+    def source(self) -> str:
+        """Where it comes from."""
+        if self.prior is None or self.sigma <= FROM_DATA * self.prior:
+            return TOLD
+        return UNTOLD if self.sigma > FROM_FILE * self.prior else SHARED
+
+    @property
+    def change(self) -> float | None:
+        """By how many of the file's sigmas the value differs from that of the file."""
+        return None if self.file is None or not self.prior else (self.value - self.file) / self.prior
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The spacecraft at ``time`` s: ``values`` (k,) and ``covariance`` (k, k) of the inputs ``names`` of dispersions.
+
+    They are A, C (kg m²), omega0_1 … omega0_3 (rad/s, axes of the file) and ``thrust`` of thrusters (factors).
+    ``body`` with its ``state`` then, in its own principal axes; ``tilt`` (rad) one sigma of the axis about each of two
+    axes across it, None where the attitude is not estimated.
+    """
+
+    time: float
+    names: tuple[str, ...]
+    values: Vector
+    covariance: Matrix
+    body: Body
+    state: SpinState
+    tilt: float | None
+
+    @property
+    def sigmas(self) -> Vector:
+        """Standard deviations, (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Matrix:
+        """Correlations (k, k); zero with what is exactly known."""
+        sigmas = self.sigmas
+        scale = np.where(sigmas > 0.0, sigmas, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+
+def carried(found: Fit, time: float) -> Carried:
+    """The spacecraft as it is at ``time`` s, and how well that is known."""
+    model = found.model
+    channels = {channel.name: channel for channel in model.spacecraft.channels}
+    factors: dict[str, str] = {}
+    for one in model.parameters:
+        kind, _, name = one.name.partition(" ")
+        if kind == "thrust" and name in channels:
+            factors |= {f"thrust {member.name}": one.name for member in channels[name].thrusters}
+    names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *factors)
+
+    def inputs(values: Values) -> Vector:
+        body, state = model.at(values, time)
+        rates = body.axes @ state.rates
+        return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in factors.values())])
+
+    slopes = derivatives(found, inputs)
+    body, state = model.at(found.named, time)
+    tilt = None
+    if found.index("attitude_1") is not None:
+        tilt = math.sqrt(0.5 * float(np.trace(_axis_covariance(found, time))))
+    elif found.index("attitude_3") is None:
+        # Rates say nothing of where the body points: at t = 0 it is as the file has it.
+        first, at_first = model.at(found.named, 0.0)
+        of_file = attitude.multiply(
+            model.spacecraft.initial.quaternion, attitude.from_matrix(model.spacecraft.inertia.axes.T)
+        )
+        back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
+        state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
+    return Carried(time, names, inputs(found.named), slopes @ found.covariance @ slopes.T, body, state, tilt)
+
+
+def derivatives(found: Fit, function: Callable[[Values], Vector]) -> Matrix:
+    """Derivatives (k, p) of what a function makes of the parameters, by central differences."""
+    columns = []
+    for one in found.model.parameters:
+        ends = [function(found.named | {one.name: found.named[one.name] + sign * one.step}) for sign in (1.0, -1.0)]
+        columns.append((ends[0] - ends[1]) / (2.0 * one.step))
+    return np.column_stack(columns)
+
+
+def _axis_covariance(found: Fit, time: float) -> Matrix:
+    """Covariance (3, 3) of the inertial unit vector along the spin axis."""
+    sense = math.copysign(1.0, found.model.spacecraft.spin)
+
+    def axis(values: Values) -> Vector:
+        _, state = found.model.at(values, time)
+        return attitude.rotate(state.quaternion, sense * np.array([0.0, 0.0, 1.0]))
+
+    slopes = derivatives(found, axis)
+    return np.asarray(slopes @ found.covariance @ slopes.T)
+
+
+def estimates(found: Fit, time: float) -> tuple[Estimate, ...]:
+    """What there is to know: the motion at ``time`` s, the body, and the sensors and thrusters."""
+    return (*_of_motion(found, time), *_of_body(found), *_of_others(found))
+
+
+def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
+    model = found.model
+    spacecraft = model.spacecraft
+    sense = math.copysign(1.0, spacecraft.spin)
+    phase0 = math.atan2(*_transverse(model.at(found.named, time))[::-1])
+
+    def motion(values: Values) -> Vector:
+        body, state = model.at(values, time)
+        x, y = _transverse((body, state))
+        turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
+        nutation = arc_cones(body.moments, state.rates, sense).nutation
+        return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
+
+    slopes = derivatives(found, motion)
+    values, sigmas = motion(found.named), np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    omega = complex(*spacecraft.rates[:2])
+    file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
+    given = spacecraft.dispersions
+    spin_prior = None if given is None or given.omega0[2] is None else prior_of(given.omega0[2], spacecraft.spin)[1]
+    rows = (
+        ("spin", "spin ω3", "deg/s"),
+        ("nutation", "nutation", "deg"),
+        ("omega", "transverse rate |ω|", "deg/s"),
+        ("phase", "phase arg(ω1 + iω2)", "deg"),
+    )
+    for (key, label, unit), value, sigma, of_file in zip(rows, values, sigmas, file, strict=True):
+        prior = spin_prior if key == "spin" else None
+        # Carried to another time the motion is not comparable with that of the file, but for the spin and the angle.
+        known = of_file if time == 0.0 or key != "phase" else None
+        yield Estimate(key, label, unit, 1.0 / DEG, float(value), float(sigma), known, prior)
+
+
+def _transverse(now: tuple[Body, SpinState]) -> tuple[float, float]:
+    """ω1 and ω2 in the axes of the file, rad/s."""
+    body, state = now
+    rates = body.axes @ state.rates
+    return float(rates[0]), float(rates[1])
+
+
+def _of_body(found: Fit) -> Iterator[Estimate]:
+    spacecraft, inertia = found.model.spacecraft, found.model.spacecraft.inertia
+
+    def body(values: Values) -> Vector:
+        A, C = in_moments(spacecraft, values)
+        return np.array([values[RATIO], 1.0 - values[RATIO], A, C])
+
+    slopes = derivatives(found, body)
+    values, sigmas = body(found.named), np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    given = spacecraft.dispersions
+    of_A = None if given is None or given.A is None else prior_of(given.A, inertia.A)[1]
+    of_C = None if given is None or given.C is None else prior_of(given.C, inertia.C)[1]
+    ratio = inertia.C / inertia.A
+    both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
+    rows = (
+        ("C/A", "C/A", "", ratio, both),
+        ("a", "a = 1 - C/A", "", 1.0 - ratio, both),
+        ("A", "A", "kg m²", inertia.A, of_A),
+        ("C", "C", "kg m²", inertia.C, of_C),
+    )
+    for (key, label, unit, file, prior), value, sigma in zip(rows, values, sigmas, strict=True):
+        if sigma > 0.0:
+            yield Estimate(key, label, unit, 1.0, float(value), float(sigma), file, prior)
+    if found.index("growth") is not None:
+        value, sigma = _at(found, "growth")
+        yield Estimate("growth", "growth 1/τ", "1/s", 1.0, value, sigma, spacecraft.growth, None)
+    for number, label in ((1, "(I1 - I2)/(I1 + I2)"), (2, "I12/A")):
+        if found.index(f"unequal_{number}") is not None:
+            value, sigma = _at(found, f"unequal_{number}")
+            one = found.model.parameters[found.index(f"unequal_{number}") or 0]
+            yield Estimate(f"unequal_{number}", label, "", 1.0, value, sigma, one.file, None)
+
+
+LABELS = {
+    "bias": ("bias of {}", "deg/s", 1.0 / DEG),
+    "misalignment": ("misalignment {} of the gyros", "deg", 1.0 / DEG),
+    "wobble": ("wobble tilt {}", "deg", 1.0 / DEG),
+    "thrust": ("thrust factor of {}", "", 1.0),
+    "delay": ("delay of {}", "ms", 1e3),
+}
+
+
+def _of_others(found: Fit) -> Iterator[Estimate]:
+    """Sensors and thrusters."""
+    for one in found.model.parameters:
+        kind, _, which = one.name.partition(" " if " " in one.name else "_")
+        if kind not in LABELS:
+            continue
+        label, unit, factor = LABELS[kind]
+        if which == "acceleration":
+            unit, factor = "m/s²", 1.0
+        value, sigma = _at(found, one.name)
+        prior = one.prior if math.isfinite(one.prior) else None
+        yield Estimate(one.name, label.format(which), unit, factor, value, sigma, one.file, prior)
+
+
+def _at(found: Fit, name: str) -> tuple[float, float]:
+    index = found.index(name)
+    assert index is not None
+    return float(found.values[index]), float(found.sigmas[index])
+
+
+def correlated(found: Fit) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of parameters that are known together much better than apart, and their correlations."""
+    scale = found.sigmas
+    matrix = found.covariance / np.outer(scale, scale)
+    names = [one.name for one in found.model.parameters]
+    pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
+    return tuple(sorted((one for one in pairs if abs(one[2]) > WORTH_NAMING), key=lambda one: -abs(one[2])))
