@@ -90,6 +90,10 @@ disperse smoke.yaml --loop --until 20s --samples 2
 loop smoke.yaml --case 2 --json dispersed.json
 budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json --plot budget.png
 budget smoke.yaml; 2
+simulate smoke.yaml --scheme none --until 60s --samples 301 --csv telemetry.csv
+fit telemetry.csv smoke.yaml -o fitted.yaml --at 90s --json fit.json --plot fit.png
+plan fitted.yaml --scheme optimal
+fit telemetry.csv smoke.yaml --schedule missing.csv; 1
 verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
 report smoke.yaml -o report.html
 report -o report.md --disperse 2000; 0 4

@@ -19,6 +19,7 @@ COMMANDS = {
     "trade": "What an earlier end costs: a front of cheapest schedules.",
     "loop": "Fire from a gyro or an accelerometer, in a closed loop.",
     "budget": "Hold the nutation: pulses a day, propellant a year.",
+    "fit": "Estimate motion, C/A and thrust from telemetry; re-plan.",
     "disperse": "Fly many dispersed cases; percentiles, tolerance budget.",
     "verify": "Fly a schedule by independent means; an error budget.",
     "report": "One page to hand on: HTML, Markdown or PDF.",

@@ -1,0 +1,84 @@
+"""``nutdamp fit``: estimate the spacecraft from telemetry."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import click
+
+from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Output, begin
+from nutdamp.cli.parameters import FILE, Quantity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nutdamp.estimation.fit import Fit
+
+
+@click.command("fit")
+@click.argument("telemetry", type=FILE, metavar="TELEMETRY.csv")
+@spacecraft_argument
+@click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
+@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses: a CSV file with a column t_s or utc.")
+@click.option("--at", type=Quantity("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
+@click.option("-o", "--output", type=FILE, help="Write the spacecraft file with the estimates in it.")
+@click.option("--json", type=FILE, help="Write estimates, covariance and signals.")
+@click.option("--plot", type=FILE, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
+@quiet_option
+def command(
+    telemetry: str,
+    spacecraft: Input,
+    schedule: str | None,
+    sun_pulses: str | None,
+    at: float,
+    output: str | None,
+    json: str | None,
+    plot: str | None,
+    quiet: bool,
+) -> None:
+    """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
+
+    TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
+    axis_dec_deg, axis_x, axis_y and axis_z, acceleration_m_s2, sun_pulse (0 or 1); empty cells are missing samples.
+    Least squares on the closed forms of the coast; what the data do not tell stays at the tolerances of the file.
+    -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well all is known.
+
+    \b
+      nutdamp fit flight.csv -o now.yaml --at 90s
+      nutdamp plan now.yaml
+
+    Exit status 3 where nothing can be estimated. SPACECRAFT and FILE are as for `nutdamp plan`.
+    """
+    job = begin(spacecraft, telemetry, schedule, sun_pulses, quiet=quiet, output=output, json=json, plot=plot)
+
+    from nutdamp.estimation.fit import fit
+    from nutdamp.estimation.results import carried
+    from nutdamp.files.fit_json import fit_json
+    from nutdamp.files.fitted_file import fitted_text, notes
+    from nutdamp.files.schedule_file import read_pulses
+    from nutdamp.files.telemetry_csv import read_telemetry
+    from nutdamp.presentation.fit_tables import fit_screen
+
+    fired = None
+    if schedule is not None:
+        fired, warnings = read_pulses(schedule, job.spacecraft)
+        job.warn(warnings)
+    record, warnings = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
+    job.warn(warnings)
+    found = fit(job.spacecraft, record)
+    now = carried(found, at)
+    job.warn(notes(found, now))
+    outputs: list[Output] = [
+        (output, partial(fitted_text, *job.source, spacecraft.settings, found, now)),
+        (json, partial(fit_json, found, now)),
+        (plot, partial(_picture, found)),
+    ]
+    job.deliver(outputs, partial(fit_screen, found, at))
+
+
+def _picture(found: Fit) -> Figure:
+    from nutdamp.presentation.figures.fit import fit_figure
+
+    return fit_figure(found)

@@ -1,0 +1,63 @@
+"""What ``fit --json`` says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.results import Carried, Estimate, estimates
+from nutdamp.files.plan_json import spacecraft_json
+
+
+def fit_json(found: Fit, carried: Carried) -> dict[str, Any]:
+    """Estimates with sigmas, what the file says, the signals, and the covariance of what dispersions draw."""
+    model = found.model
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(model.spacecraft),
+        "record": {
+            "start_s": model.record.start,
+            "end_s": model.record.end,
+            "pulses": len(model.pulses),
+            "signals": [
+                {
+                    "signal": name,
+                    "samples": int((model.signal == index).sum()),
+                    "outliers": int(((model.signal == index) & ~found.used).sum()),
+                    "noise_SI": float(found.noise[index]),
+                    "white": found.white(index),
+                }
+                for index, name in enumerate(model.signals)
+            ],
+        },
+        "time_s": carried.time,
+        "estimates": [_estimate(one) for one in estimates(found, carried.time)],
+        "kept": list(found.kept),
+        "information": found.information.tolist(),
+        "parameters": [one.name for one in model.parameters],
+        "values_SI": found.values.tolist(),
+        "covariance_SI": found.covariance.tolist(),
+        "dispersed": {
+            "inputs": list(carried.names),
+            "values_SI": carried.values.tolist(),
+            "sigmas_SI": carried.sigmas.tolist(),
+            "correlation": carried.correlation.tolist(),
+        },
+    }
+
+
+def _estimate(one: Estimate) -> dict[str, Any]:
+    file = None if one.file is None else one.file * one.factor
+    prior = None if one.prior is None or math.isinf(one.prior) else one.prior * one.factor
+    return {
+        "quantity": one.key,
+        "unit": one.unit,
+        "value": one.value * one.factor,
+        "sigma": one.sigma * one.factor,
+        "file": file,
+        "file_sigma": prior,
+        "change_sigmas": one.change,
+        "from": one.source,
+    }

@@ -1,0 +1,290 @@
+"""A spacecraft file with what telemetry told of it: values, how well they are known, and the motion at an epoch.
+
+Only values change: comments, the order of the keys and units stay as they were.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nutdamp.epoch import Epoch
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.results import Carried
+from nutdamp.files.sections import KeyPath
+from nutdamp.files.settings import Setting
+from nutdamp.files.yaml_edit import edited
+from nutdamp.files.yaml_tree import Node, read_tree
+from nutdamp.physics import attitude, cones
+from nutdamp.spacecraft import Attitude, Inertia, Spacecraft
+from nutdamp.tolerances import Tolerance
+from nutdamp.units import parse
+
+SEEN = 3.0
+"""Standard deviations from which on a growth of the nutation, or a delay, counts as seen."""
+
+CORRELATED = 1e-3
+"""Correlations below are left out."""
+
+DIGITS = 9
+"""Decimals of the correlations."""
+
+Edits = Iterator[tuple[KeyPath, str]]
+
+
+def fitted_text(text: str, name: str, settings: Sequence[Setting], found: Fit, carried: Carried) -> str:
+    """The text of a spacecraft file, called ``name``, with the estimates; ``settings`` become part of it.
+
+    Raises BadRequest for values that an alias stands for.
+    """
+    text = text.removeprefix("\ufeff")
+    for setting in settings:
+        tree = read_tree(text, name)[0]
+        value = setting.value if isinstance(setting.value, str) else _flow(setting.node()[0].plain())
+        text = edited(text, {_positions(tree, setting.path): value or "null"})
+    tree = read_tree(text, name)[0]
+    made = replaced(found, carried)
+    values = dict(_edits(tree, found, carried, made))
+    rename = {"state": "omega0"} if ("state",) in values else {}
+    return edited(text, values, rename)
+
+
+def notes(found: Fit, carried: Carried) -> Iterator[str]:
+    """What of the estimates the file does not say, and what in it still counts from the old t = 0; in words."""
+    body = found.model.spacecraft
+    growth = found.index("growth")
+    if growth is not None:
+        value, sigma = float(found.values[growth]), float(found.sigmas[growth])
+        if abs(value) > SEEN * sigma and not _grows_so(carried, value):
+            way = "grows" if value > 0.0 else "decays"
+            yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation does not explain for this shape"
+    for name in (one.name for one in found.model.parameters if one.name.startswith("delay ")):
+        at = found.index(name)
+        assert at is not None
+        if abs(found.values[at]) > SEEN * found.sigmas[at]:
+            channel = name.removeprefix("delay ")
+            yield f"the delay of {channel}, {1e3 * found.values[at]:.3g} ms, is not written: see the key valve"
+    limits = body.limits
+    if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
+        yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
+    if body.tank is not None and len(found.model.record.schedule):
+        yield "tank.propellant is that before the pulses of the schedule"
+
+
+def replaced(found: Fit, carried: Carried) -> Spacecraft:
+    """The spacecraft of the file with the motion and the moments of the estimate."""
+    body = carried.body
+    return replace(
+        found.model.spacecraft,
+        inertia=Inertia(body.moments, body.axes),
+        omega0=carried.state.rates,
+        attitude=None if found.model.spacecraft.attitude is None else Attitude(_quaternion(carried)),
+    )
+
+
+def _edits(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
+    yield from _inertia(tree, carried)
+    yield from _motion(tree, carried, made)
+    yield from _attitude(tree, found, carried)
+    yield from _dissipation(tree, found, carried)
+    yield from _goal(tree, found, carried, made)
+    yield from _thrusts(tree, carried)
+    yield from _dispersions(found, carried)
+
+
+def _inertia(tree: Node, carried: Carried) -> Edits:
+    moments, axes = carried.body.moments, carried.body.axes
+    if tree.get("inertia", "tensor") is None and carried.body.symmetric:
+        for key, value in (("A", moments[0]), ("C", moments[2])):
+            yield ("inertia", key), _as_before(tree.get("inertia", key), value, "inertia", "kg m^2")
+        return
+    tensor = axes @ np.diag(moments) @ axes.T
+    rows = ", ".join("[" + ", ".join(_number(part) for part in row) + "]" for row in 0.5 * (tensor + tensor.T))
+    if tree.get("inertia", "tensor") is None:
+        yield ("inertia",), f"{{tensor: [{rows}]}}"
+    else:
+        yield ("inertia", "tensor"), f"[{rows}]"
+
+
+def _motion(tree: Node, carried: Carried, made: Spacecraft) -> Edits:
+    rates = carried.values[2:5]
+    if tree.get("state") is not None and made.inertia.symmetric and made.inertia.aligned:
+        omega = complex(rates[0], rates[1])
+        inertia = made.inertia
+        angle = cones.nutation_angle(inertia.A, inertia.C, abs(omega), float(rates[2]))
+        phase = math.atan2(omega.imag, omega.real)
+        for key, value, kind, unit in (
+            ("spin", float(rates[2]), "rate", "rad/s"),
+            ("nutation", angle, "angle", "deg"),
+            ("phase", phase, "angle", "deg"),
+        ):
+            yield ("state", key), _as_before(tree.get("state", key), value, kind, unit)
+        return
+    if tree.get("state") is not None:
+        yield ("state",), "[" + ", ".join(_number(rate) for rate in rates) + "]"
+        return
+    for index, rate in enumerate(rates):
+        yield ("omega0", index), _as_before(tree.get("omega0", index), float(rate), "rate", "rad/s")
+
+
+def _attitude(tree: Node, found: Fit, carried: Carried) -> Edits:
+    if tree.get("attitude") is None:
+        return
+    yield ("attitude", "quaternion"), "[" + ", ".join(_number(part) for part in _quaternion(carried)) + "]"
+    given = found.model.spacecraft.attitude
+    if given is not None and given.epoch is not None and carried.time != 0.0:
+        zone = "Z" if tree.get("attitude", "epoch") is not None else ""
+        yield ("attitude", "epoch"), f"{Epoch.parse(given.epoch).plus(carried.time).text}{zone}"
+
+
+def _quaternion(carried: Carried) -> np.ndarray:
+    """Attitude of the file's axes, scalar first."""
+    return attitude.multiply(carried.state.quaternion, attitude.from_matrix(carried.body.axes.T))
+
+
+def _grows_so(carried: Carried, growth: float) -> bool:
+    """Whether dissipation lets the nutation of such a body grow (or decay) as it does."""
+    first, second, third = carried.body.moments
+    return (0.5 * (first + second) - third) * growth > 0.0
+
+
+def _dissipation(tree: Node, found: Fit, carried: Carried) -> Edits:
+    index = found.index("growth")
+    if index is None:
+        return
+    value, sigma = float(found.values[index]), float(found.sigmas[index])
+    given = tree.get("dissipation", "time_constant")
+    if _grows_so(carried, value) and (abs(value) > SEEN * sigma):
+        yield ("dissipation", "time_constant"), _as_before(given, 1.0 / abs(value), "time", "s")
+
+
+def _goal(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
+    """Tilt and azimuth count from the motion at t = 0, which is another one now."""
+    target = found.model.spacecraft.goal.axis
+    if target is None or tree.get("goal", "tilt") is None:
+        return
+    in_body = attitude.rotate(attitude.conjugate(carried.state.quaternion), target)
+    to_n = replace(made, attitude=None).initial.quaternion
+    x, y, z = attitude.rotate(to_n, in_body).tolist()
+    tilt, azimuth = math.atan2(math.hypot(x, y), z), math.atan2(y, x)
+    yield ("goal", "tilt"), _as_before(tree.get("goal", "tilt"), tilt, "angle", "deg")
+    yield ("goal", "azimuth"), _as_before(tree.get("goal", "azimuth"), azimuth, "angle", "deg")
+
+
+def _factors(carried: Carried) -> dict[str, tuple[float, float]]:
+    """Thrust factor and its sigma by thruster."""
+    return {
+        name.removeprefix("thrust "): (float(value), float(sigma))
+        for name, value, sigma in zip(carried.names, carried.values, carried.sigmas, strict=True)
+        if name.startswith("thrust ")
+    }
+
+
+def _thrusts(tree: Node, carried: Carried) -> Edits:
+    """Force or torque of the thrusters times their factors."""
+    factors = _factors(carried)
+    entries = tree.get("thrusters")
+    for index, _ in entries.children() if entries is not None else ():
+        name = tree.get("thrusters", index, "name")
+        if name is None or name.value not in factors:
+            continue
+        factor = factors[str(name.value)][0]
+        force = tree.get("thrusters", index, "force")
+        if force is not None:
+            value = parse(force.value, "force") * factor
+            yield ("thrusters", index, "force"), _as_before(force, value, "force", "N")
+            continue
+        for axis in range(3):
+            part = tree.get("thrusters", index, "torque", axis)
+            if part is not None:
+                value = parse(part.value, "torque") * factor
+                yield ("thrusters", index, "torque", axis), _as_before(part, value, "torque", "N m")
+
+
+def _dispersions(found: Fit, carried: Carried) -> Edits:
+    sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
+    values = dict(zip(carried.names, carried.values.tolist(), strict=True))
+    for key in ("A", "C"):
+        if sigmas[key] > 0.0:
+            yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
+    rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
+    yield ("dispersions", "omega0"), f"[{rates}]"
+    factors, given = _factors(carried), found.model.spacecraft.dispersions
+    if factors:
+        before = {} if given is None else given.thrust
+        parts = [f"{_quoted(name)}: {_tolerance(one)}" for name, one in before.items() if name not in factors]
+        parts += [
+            f"{_quoted(name)}: {{normal: {100.0 * sigma / factor:.6g} %}}" for name, (factor, sigma) in factors.items()
+        ]
+        yield ("dispersions", "thrust"), "{" + ", ".join(parts) + "}"
+    if carried.tilt is not None:
+        yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
+    pairs = list(correlations(carried))
+    if pairs:
+        rows = ", ".join(f"[{_quoted(one)}, {_quoted(other)}, {value:.{DIGITS}f}]" for one, other, value in pairs)
+        yield ("dispersions", "correlation"), f"[{rows}]"
+
+
+def correlations(carried: Carried) -> Iterator[tuple[str, str, float]]:
+    """Pairs of inputs and their correlations as the file holds them: rounded, and together positive definite."""
+    matrix = carried.correlation
+    known = [index for index, sigma in enumerate(carried.sigmas) if sigma > 0.0]
+    rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(known, known)]
+    np.fill_diagonal(rounded, 1.0)
+    apart = rounded - np.eye(len(known))
+    for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
+        # What is rounded may be impossible by a hair: then all correlations are taken a hair smaller.
+        made = np.eye(len(known)) + np.round(apart * (1.0 - shrunk), DIGITS)
+        if np.linalg.eigvalsh(made)[0] > 0.5 * 10.0**-DIGITS:
+            break
+    for at, first in enumerate(known):
+        for other in range(at + 1, len(known)):
+            if made[at, other] != 0.0:
+                yield carried.names[first], carried.names[known[other]], float(made[at, other])
+
+
+def _tolerance(one: Tolerance) -> str:
+    return f"{{{one.kind}: {100.0 * one.size:.6g} %}}"
+
+
+def _quoted(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z_+-][\w +-]*", name) else "'" + name.replace("'", "''") + "'"
+
+
+def _positions(tree: Node, path: KeyPath) -> KeyPath:
+    """A path with the entries of lists by their positions instead of their names."""
+    made: list[str | int] = []
+    for step in path:
+        node = tree.get(*made)
+        if node is not None and isinstance(node.value, list) and isinstance(step, str):
+            names = [entry.get("name") for entry in node.value]
+            step = next(index for index, name in enumerate(names) if name is not None and name.value == step)
+        made.append(step)
+    return tuple(made)
+
+
+def _flow(value: object) -> str:
+    import json
+
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _as_before(node: Node | None, value: float, kind: str, unit: str) -> str:
+    """A value as text in the unit that the file has for it; of a new key in ``unit``."""
+    before = None if node is None else node.value
+    if before is not None and not isinstance(before, str):
+        return _number(value)
+    if isinstance(before, str):
+        found = re.search(r"[^\d.eE+\s-].*$", before.strip())
+        unit = found.group() if found else unit
+    return f"{_number(value / parse(f'1 {unit}', kind))} {unit}"
+
+
+def _number(value: float) -> str:
+    text = f"{value + 0.0:.12g}"
+    # Without a point YAML 1.1 readers take 1e-05 for a text.
+    return text if "e" not in text or "." in text else text.replace("e", ".0e")

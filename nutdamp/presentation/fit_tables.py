@@ -1,0 +1,113 @@
+"""The screen of ``fit``: what the telemetry tells, how well, and what it does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.parameters import untold
+from nutdamp.estimation.results import SHARED, TOLD, Estimate, correlated, estimates
+from nutdamp.presentation.layout import columns, facts
+from nutdamp.presentation.text import MISSING, sentence
+
+SHOWN = {
+    "axis": ("deg", 180.0 / math.pi),
+    "acceleration": ("m/s²", 1.0),
+    "sun_pulse": ("ms", 1e3),
+}
+"""Units of signals for people, and their factors; of all others deg/s."""
+
+FAR = 4.0
+"""Sigmas of the file from which on a change is remarked upon."""
+
+MOST_PAIRS = 6
+"""Correlations that are named."""
+
+SOURCES = {TOLD: "data", SHARED: "both", "file": "file"}
+
+
+def fit_screen(found: Fit, time: float) -> RenderableType:
+    """Everything that ``fit`` shows; the motion is that at ``time`` s."""
+    rows = estimates(found, time)
+    parts: list[RenderableType] = [Text(found.model.spacecraft.name, style="bold"), Text(), _record(found), Text()]
+    parts += [Text(f"Estimates; the motion is that at t = {time:g} s", style="bold"), _table(rows), Text()]
+    parts += [Text(sentence(line)) for line in told(found, rows)]
+    return Group(*parts)
+
+
+def in_shown(signal: str) -> tuple[str, float]:
+    """Unit in which a signal is shown, and its factor from SI."""
+    return SHOWN.get(signal, ("deg/s", 180.0 / math.pi))
+
+
+def _record(found: Fit) -> Table:
+    model = found.model
+    record, table = model.record, facts()
+    period = 2.0 * math.pi / abs(_rate(found)) if _rate(found) else math.inf
+    turns = f", {record.length / period:.3g} nutation periods" if math.isfinite(period) else ""
+    table.add_row("record", f"{record.start:g} s to {record.end:g} s{turns}")
+    if len(model.pulses):
+        table.add_row("schedule", f"{len(model.pulses)} pulses fired meanwhile")
+    for index, name in enumerate(model.signals):
+        rows = model.signal == index
+        unit, factor = in_shown(name)
+        count, out = int(rows.sum()), int((rows & ~found.used).sum())
+        left = f", {out} outliers left out" if out else ""
+        white = "white" if found.white(index) else "NOT white: the sigmas are too small"
+        table.add_row(name, f"{count} samples{left}; noise {found.noise[index] * factor:.3g} {unit}, residuals {white}")
+    return table
+
+
+def _rate(found: Fit) -> float:
+    """Rate of the nutation in the body, rad/s, for small angles."""
+    values = found.named
+    return (1.0 - values["C/A"]) * values.get("omega_3", found.model.spacecraft.spin)
+
+
+def _table(rows: tuple[Estimate, ...]) -> Table:
+    table = columns("quantity", "value", "sigma", "unit", "file", "change\nsigmas", "from", text=("unit", "from"))
+    for one in rows:
+        digits = _digits(one)
+        file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
+        change = MISSING if one.change is None else f"{one.change:+.2g}"
+        value, sigma = f"{one.value * one.factor:.{digits}g}", f"{one.sigma * one.factor:.2g}"
+        table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
+    return table
+
+
+def _digits(one: Estimate) -> int:
+    """Significant digits of a value that its sigma leaves, and one more."""
+    if one.value == 0.0 or one.sigma <= 0.0:
+        return 4
+    return min(max(2 + math.ceil(math.log10(max(abs(one.value) / one.sigma, 1.0))), 2), 9)
+
+
+def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
+    """What the data do not tell, what is known together only, and what the file does not expect: clauses."""
+    yield from untold(found.model.record)
+    kept = [one.label for one in rows if one.source == "file"]
+    if kept:
+        yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
+    tied = [f"{one} and {other} {value:+.4f}" for one, other, value in _moments(found)]
+    tied += [f"{one} and {other} {value:+.3f}" for one, other, value in correlated(found)[:MOST_PAIRS]]
+    if tied:
+        yield f"correlated: {', '.join(tied)}"
+    far = [f"{one.label} ({one.change:+.2g})" for one in rows if one.change is not None and abs(one.change) > FAR]
+    if far:
+        yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
+    if found.model.unequal and found.model.spacecraft.inertia.symmetric:
+        yield "I1 and I2 differ: the file has one A for both"
+
+
+def _moments(found: Fit) -> Iterator[tuple[str, str, float]]:
+    """The correlation of A and C, where both are estimated."""
+    from nutdamp.estimation.results import carried
+
+    known = carried(found, found.model.start)
+    if known.sigmas[0] > 0.0:
+        yield "A", "C", float(known.correlation[0, 1])

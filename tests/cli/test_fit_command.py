@@ -1,0 +1,129 @@
+"""``nutdamp fit`` as a process: telemetry in, estimates and a spacecraft file out, and a plan from there."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from process import Run
+from synthetic import Array, motion
+
+import nutdamp
+from nutdamp.files.examples import example_text
+from nutdamp.flight import flown
+
+
+def flight(folder: Path, seed: int, *, phase: float = 0.0) -> tuple[float, float, Array]:
+    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example with A and C 0.5 % off: A, C, rates."""
+    draw = np.random.default_rng(seed)
+    A, C = 120.0 * (1.0 + 0.005 * draw.normal()), 80.0 * (1.0 + 0.005 * draw.normal())
+    rates = nutdamp.example().omega0 + math.radians(0.1) * draw.normal(size=3)
+    rates = np.array([*(rates[:2] * math.cos(phase)), rates[2]])
+    times = np.arange(601) / 10.0
+    shown = np.degrees(motion((A, A, C), rates, times)) + 0.01 * draw.normal(size=(601, 3))
+    lines = ["t_s,omega_1_deg_s,omega_2_deg_s,omega_3_deg_s"]
+    lines += [f"{time:.1f}," + ",".join(f"{one:.5f}" for one in row) for time, row in zip(times, shown, strict=True)]
+    (folder / "flight.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return A, C, rates
+
+
+def test_estimates_are_shown_and_written(run: Run, tmp_path: Path) -> None:
+    A, C, _ = flight(tmp_path, 1)
+    done = run("fit", "flight.csv", "--json", "f.json", "--plot", "f.svg", columns=120)
+    assert done.returncode == 0, done.stderr
+    assert "A coast fixes C/A only, never A and C apart" in done.stdout
+    assert "The data do not tell bias of omega_3: kept as the file has it." in done.stdout
+    assert "A and C +0.9999" in done.stdout
+    found = json.loads((tmp_path / "f.json").read_text())
+    rows = {one["quantity"]: one for one in found["estimates"]}
+    ratio = rows["C/A"]
+    assert abs(ratio["value"] - C / A) < 4.0 * ratio["sigma"]
+    assert ratio["sigma"] < 1e-4
+    assert ratio["from"] == "data"
+    assert rows["bias_omega_3"]["from"] == "file"
+    assert [one["white"] for one in found["record"]["signals"]] == [True] * 3
+    assert f"{ratio['value']:.7g}"[:6] in done.stdout
+    picture = (tmp_path / "f.svg").read_text()
+    for text in ("omega_1, deg/s", "residual, deg/s", "autocorrelation", "3 sigma", "95 % of white noise"):
+        assert text in picture
+
+
+def test_the_file_written_keeps_comments_and_moves_to_an_epoch(run: Run, tmp_path: Path) -> None:
+    A, C, rates = flight(tmp_path, 2)
+    done = run("fit", "flight.csv", "-o", "now.yaml", "--at", "90s")
+    assert done.returncode == 0, done.stderr
+    before, after = example_text(), (tmp_path / "now.yaml").read_text()
+    comments = [line.partition("#")[2] for line in before.splitlines() if "#" in line]
+    assert [line.partition("#")[2] for line in after.splitlines() if "#" in line] == comments
+    old = {line.split(":")[0] for line in before.splitlines() if line[:1].isalpha()}
+    assert {line.split(":")[0] for line in after.splitlines() if line[:1].isalpha()} == old
+    now = nutdamp.load(tmp_path / "now.yaml")
+    expected = motion((A, A, C), rates, np.array([0.0, 90.0]))[-1]
+    known = now.dispersions
+    assert known is not None
+    for one, other, tolerance in zip(now.omega0, expected, known.omega0, strict=True):
+        assert tolerance is not None
+        assert abs(one - other) < 4.0 * tolerance.size
+        assert tolerance.size < math.radians(0.05)
+    assert {(one, other): value for one, other, value in known.correlation}["A", "C"] > 0.999
+
+
+def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_path: Path) -> None:
+    blind = run("disperse", "-q", "--set", "requirement.probability=99.7%", "--json", "blind.json")
+    assert blind.returncode == 4
+    shares = {}
+    for seed in (3, 4):
+        flight(tmp_path, seed)
+        assert run("fit", "flight.csv", "-q", "-o", "now.yaml", "--at", "90s").returncode == 0
+        done = run("disperse", "now.yaml", "-q", "--set", "requirement.probability=99.7%", "--json", "after.json")
+        assert done.returncode == 0, done.stdout
+        shares[seed] = json.loads((tmp_path / "after.json").read_text())["requirement"]["met_fraction"]
+    assert min(shares.values()) >= 0.997
+    assert json.loads((tmp_path / "blind.json").read_text())["requirement"]["met_fraction"] < 0.88
+
+
+@pytest.mark.slow
+def test_plans_from_the_estimate_meet_the_requirement_on_the_true_bodies(run: Run, tmp_path: Path) -> None:
+    met = 0
+    for seed in range(30):
+        A, C, rates = flight(tmp_path, 100 + seed)
+        assert run("fit", "flight.csv", "-q", "-o", "now.yaml", "--at", "90s").returncode == 0
+        now = nutdamp.load(tmp_path / "now.yaml")
+        plan = nutdamp.compare(now).recommended
+        assert plan is not None
+        true = motion((A, A, C), rates, np.array([0.0, 90.0]))[-1]
+        truth = now.with_(inertia={"A": A, "C": C}, state={"spin": float(true[2])}).replace(omega0=true)
+        left = flown(truth, plan.pulses).residual
+        met += left.nutation < math.radians(0.5) and left.momentum_shift < math.radians(0.2)
+    assert met == 30
+
+
+def test_faults_and_records_without_content(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_text("t_s,omega_1\n0,1\n")
+    done = run("fit", "bad.csv")
+    assert done.returncode == 2
+    assert "bad.csv:1:1: omega_1: 'omega_1' is no column of telemetry; expected omega_1_rad_s" in done.stderr
+    (tmp_path / "short.csv").write_text(
+        "t_s,omega_1_rad_s,omega_2_rad_s\n" + "".join(f"{0.05 * at:.2f},{0.1 + 0.001 * at},0.1\n" for at in range(20))
+    )
+    done = run("fit", "short.csv", "-o", "now.yaml")
+    assert done.returncode == 3
+    assert "the record is too short" in done.stderr
+    assert not (tmp_path / "now.yaml").exists()
+    assert run("fit", "none.csv").returncode == 1
+    flight(tmp_path, 1)
+    assert run("fit", "flight.csv", "-o", "flight.csv").returncode == 2
+
+
+def test_settings_become_part_of_the_file(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 5)
+    done = run(
+        "fit", "flight.csv", "-q", "-o", "now.yaml", "--set", "thrusters.+M1.force=12N", "--set", "limits.horizon=90s"
+    )
+    assert done.returncode == 0, done.stderr
+    now = nutdamp.load(tmp_path / "now.yaml")
+    assert now.limits.horizon == 90.0
+    assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -12.0, 0.0])
