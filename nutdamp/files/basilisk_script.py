@@ -9,6 +9,7 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.basilisk import default_step, stretches
 from nutdamp.errors import BadRequest
+from nutdamp.lightening import shed
 from nutdamp.planning import Plan
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -19,11 +20,14 @@ LONGEST_STEP = 0.1
 def basilisk_script(plan: Plan) -> str:
     """The text of the script: data of the body and of each stretch of constant torque, and the code that flies them.
 
-    Raises BadRequest for a body with energy dissipation, which a rigid hub has not.
+    Raises BadRequest for a body with energy dissipation, or moments that fall, which a rigid hub has not.
     """
     body = plan.spacecraft
     if body.dissipation is not None:
         raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
+    if shed(body) is not None:
+        problem = "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft"
+        raise BadRequest(f"{problem} file, and plan without it, if the moments may count as constant")
     rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     title = " ".join(f"{plan.scheme} schedule for {body.name}".split()).replace("\\", "/").replace('"', "'")
     return _SCRIPT.format(

@@ -19,6 +19,7 @@ from nutdamp import planning
 from nutdamp.errors import BadRequest
 from nutdamp.files.exchange import export_text
 from nutdamp.physics.arc_cones import arc_cones
+from nutdamp.physics.feed import Tank
 from nutdamp.planning import Plan
 from nutdamp.presentation.text import degrees
 from nutdamp.schedule import Pulse, Schedule
@@ -111,6 +112,16 @@ def test_dissipation_is_refused() -> None:
     plan = messages.planned("prolate")
     with pytest.raises(BadRequest, match="leave dissipation out"):
         export_text(replace(plan, spacecraft=replace(plan.spacecraft, dissipation=600.0)), "basilisk")
+
+
+def test_falling_moments_are_refused() -> None:
+    plan = messages.planned("prolate")
+    tank = Tank(2.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.4, 0.4, 0.3))
+    with pytest.raises(BadRequest, match=r"leave tank\.inertia_per_kg out"):
+        export_text(replace(plan, spacecraft=replace(plan.spacecraft, tank=tank)), "basilisk")
+    assert export_text(
+        replace(plan, spacecraft=replace(plan.spacecraft, tank=replace(tank, inertia_per_kg=None))), "basilisk"
+    )
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

@@ -25,6 +25,7 @@ from nutdamp.files.ccsds.message import (
 )
 from nutdamp.files.ccsds.spin import spin_values, spinning
 from nutdamp.files.frames import Reference
+from nutdamp.lightening import shed
 from nutdamp.planning import Plan
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
@@ -78,6 +79,10 @@ def unsaid(body: Spacecraft) -> list[str]:
         found.append("The disturbances of the spacecraft file are not in this message.")
     if body.dissipation is not None:
         found.append("The energy dissipation of the spacecraft file is not in this message.")
+    per_kg = shed(body)
+    if per_kg is not None:
+        values = ", ".join(f"{one:.9g}" for one in per_kg)
+        found.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
     return found
 
 

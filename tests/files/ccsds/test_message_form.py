@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import APM_BLOCKS, comment, label, number
 from nutdamp.files.exchange import export_text
+from nutdamp.physics.feed import Tank
 from nutdamp.planning import Plan
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Disturbance
@@ -130,6 +131,9 @@ def test_what_a_message_leaves_out_is_said() -> None:
     text = export_text(replace(plan, spacecraft=body), "apm")
     assert "COMMENT The disturbances of the spacecraft file are not in this message." in text
     assert "COMMENT The energy dissipation" in text
+    tank = Tank(2.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.4, 0.4, 0.3))
+    text = export_text(replace(plan, spacecraft=replace(plan.spacecraft, tank=tank)), "apm")
+    assert "COMMENT INERTIA is that at EPOCH: the principal moments fall by 0.4, 0.4, 0.3 kg*m**2 for each" in text
     assert "COMMENT No SPIN block" in export_text(messages.planned("ace"), "apm")
     assert "COMMENT No SPIN block" not in text
 
