@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -226,3 +227,38 @@ def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path)
     assert sun["least_deg"] > 60.0  # at the equinox the Sun is square to the pole
     simulated = run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=FILE)
     assert "axis from Sun" in simulated.stdout
+
+
+BROKEN = """
+name: Breaker
+inertia: {A: 120 kg m^2, C: 180 kg m^2}
+state: {spin: 30 rpm, nutation: 3 deg, phase: 20 deg}
+attitude: {epoch: 2026-03-20T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+thrusters:
+  - {name: T1, torque: [8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 400 ms}
+  - {name: T2, torque: [-8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 400 ms}
+requirement: {nutation: 0.5 deg}
+keep: [{name: Star, direction: [0 deg, 86 deg], min: 4 deg, max: 60 deg}]
+dispersions: {thrust: {normal: 5 %}}
+"""
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
+def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run, scheme: str) -> None:
+    shown = run("plan", "-", "--scheme", scheme, stdin=BROKEN)
+    assert shown.returncode == 4
+    text = " ".join(shown.stdout.split())
+    assert "it meets the requirement at the end." in text
+    rows = [line.split() for line in shown.stdout.splitlines()]
+    assert ["requirement:", "NOT", "met"] in rows
+    assert any(row[:7] == ["axis", "from", "Star", "≥", "4", "deg", "✗"] for row in rows)
+    assert any(row[:6] == ["axis", "from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows)
+
+
+def test_disperse_shows_one_angle_of_the_nominal_case_and_no_warning_of_numpy(run: Run) -> None:
+    """Thrust alone is dispersed: derivatives are of the pulses, and not of body or rates."""
+    done = run("disperse", "-", "--scheme", "four-pulse", "--samples", "300", stdin=BROKEN)
+    text = " ".join(done.stdout.split())
+    assert "ComplexWarning" not in done.stderr
+    least, largest = re.findall(r"axis from Star ✗ (\S+) deg at \S+ s to (\S+) deg", text)[0]
+    assert f"{least} deg to {largest} deg in the nominal one." in text

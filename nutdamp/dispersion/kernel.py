@@ -85,7 +85,8 @@ class ClosedForm:
 
     def _watch(self, cases: DispersedCases) -> AxisWatch | None:
         """Sees the spin axis where the body has cones to keep; not while derivatives are taken by a complex step."""
-        if not self.model.spacecraft.keep or any(map(np.iscomplexobj, (*cases.moments, *cases.omega0))):
+        parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.widths, *cases.tilt, *sum(cases.impulses, ()))
+        if not self.model.spacecraft.keep or any(map(np.iscomplexobj, parts)):
             return None
         return watch_of(self.model, cases)
 

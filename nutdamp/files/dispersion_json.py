@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp import __version__
+from nutdamp.aspect import aspects
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
@@ -95,10 +96,10 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 def _cones(results: Results) -> dict[str, Any]:
     """How many cases break each cone, and the least and largest angle from it to the axis; nothing without cones."""
-    nominal, entries = results.study.aspects_of({}), []
-    for index, keep in enumerate(results.study.model.spacecraft.keep):
-        assert nominal is not None
-        (least, largest), (least_of_all, largest_of_all) = np.degrees([nominal[index], results.aspects[index]]).tolist()
+    body, entries = results.study.model.spacecraft, []
+    nominal = aspects(results.study.nominal) if body.keep else ()
+    for index, (keep, one) in enumerate(zip(body.keep, nominal, strict=False)):
+        least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
         entries.append(
             {
                 "name": keep.name,
@@ -107,8 +108,8 @@ def _cones(results: Results) -> dict[str, Any]:
                 "broken_fraction": float(results.broken[index] / results.done),
                 "least_deg": least_of_all,
                 "largest_deg": largest_of_all,
-                "nominal_least_deg": least,
-                "nominal_largest_deg": largest,
+                "nominal_least_deg": math.degrees(one.least),
+                "nominal_largest_deg": math.degrees(one.largest),
             }
         )
     return {"aspects": entries} if entries else {}

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, Line
 from nutdamp.demands import SLACK
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.end_tables import end_table
+from nutdamp.presentation.end_tables import cone_margins, end_table
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.text import MISSING, degrees, mass, moment, most, quantity
 from nutdamp.remarks import strays
@@ -71,7 +69,7 @@ def decision_table(decision: Decision) -> Table:
         cells = (_limit(line.bound), _size(line.bound, line.nominal), *dispersed, _size(line.bound, line.margin))
         table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
     for one in decision.aspects:
-        for limit, angle, left in _cones(one):
+        for limit, angle, left in cone_margins(one):
             kept, none = left >= -SLACK, [""] * (cases is not None)
             said = coloured(KEPT[kept], kept)
             table.add_row(f"axis from {one.keep.name}", limit, degrees(angle), *none, degrees(left), said)
@@ -81,15 +79,6 @@ def decision_table(decision: Decision) -> Table:
         said = coloured(verdicts.VERDICT[cases.met], cases.met)
         table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
     return table
-
-
-def _cones(one: Aspect) -> Iterator[tuple[str, float, float]]:
-    """Each bound of a cone, the angle that comes nearest to it, and by how much it keeps it, rad."""
-    keep = one.keep
-    if keep.least > 0.0:
-        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
-    if keep.most < math.pi:
-        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest
 
 
 def coloured(text: str, met: bool | None) -> Text:

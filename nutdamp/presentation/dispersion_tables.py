@@ -129,13 +129,12 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
 def _cones(results: Results) -> Iterator[RenderableType]:
     """How many cases break each cone, and how near the spin axis comes to its direction and how far from it."""
     study = results.study
-    nominal = study.aspects_of({})
-    for index, keep in enumerate(study.model.spacecraft.keep if nominal is not None and results.done else ()):
-        assert nominal is not None
+    nominal = aspects(study.nominal) if results.done and study.model.spacecraft.keep else ()
+    for index, (keep, one) in enumerate(zip(study.model.spacecraft.keep, nominal, strict=False)):
         broken = int(results.broken[index])
         share = verdicts.percent(broken / results.done, 1.0 - results.probability)
         seen, alone = (
-            " to ".join(map(degrees, angles.tolist())) for angles in (results.aspects[index], nominal[index])
+            " to ".join(map(degrees, angles)) for angles in (results.aspects[index].tolist(), (one.least, one.largest))
         )
         yield Text.assemble(
             (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),

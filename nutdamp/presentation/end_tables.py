@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from rich.table import Table
 
@@ -90,3 +90,12 @@ def bounds_text(keep: Keep) -> str:
     least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
     largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
     return " and ".join(filter(None, (least, largest)))
+
+
+def cone_margins(one: Aspect) -> Iterator[tuple[str, float, float]]:
+    """Each bound of a cone, the angle that comes nearest to it, and by how much it keeps it, rad."""
+    keep = one.keep
+    if keep.least > 0.0:
+        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
+    if keep.most < math.pi:
+        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest

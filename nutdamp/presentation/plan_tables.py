@@ -14,13 +14,21 @@ from nutdamp import compliance
 from nutdamp.aspect import at_start
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
-from nutdamp.decision import decide
+from nutdamp.decision import Decision, decide
+from nutdamp.demands import SLACK
 from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
 from nutdamp.presentation.decisions import decision_screen
-from nutdamp.presentation.end_tables import add_aspects, angle_names, angle_texts, direction_text, spin_text
+from nutdamp.presentation.end_tables import (
+    add_aspects,
+    angle_names,
+    angle_texts,
+    cone_margins,
+    direction_text,
+    spin_text,
+)
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, mass, moment, most, quantity, steering
 from nutdamp.remarks import said
@@ -182,9 +190,11 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
     if any(plan.delta_v is not None for plan in compared.plans):
         rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
-    if compliance.required(compared.spacecraft):
-        rows.append(("requirement:", lambda plan: verdicts.VERDICT[plan.meets_requirement]))
+    if compliance.judged(compared.spacecraft):
+        rows.append(("requirement:", lambda plan: verdicts.VERDICT[Decision(plan).met if plan.feasible else None]))
         rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
+        cones = enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)])
+        rows += [_cone(at, one.keep.name, limit) for at, one in cones for limit, _, _ in cone_margins(one)]
     return rows
 
 
@@ -209,6 +219,16 @@ def _part(bound: Bound) -> tuple[str, Cell]:
 
     limit = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else most(bound.most)
     return f"  {bound.part.label} ≤ {limit}", cell
+
+
+def _cone(at: int, name: str, limit: str) -> tuple[str, Cell]:
+    """The row of one bound of the cone with the number ``at``, and the angle at which the plans come nearest to it."""
+
+    def cell(plan: Plan) -> str:
+        found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == limit)
+        return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in found)
+
+    return f"  axis from {name} {limit}", lambda plan: cell(plan) if plan.feasible else MISSING
 
 
 def _angle(left: Residual | None, name: str) -> str:

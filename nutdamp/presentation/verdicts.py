@@ -66,13 +66,17 @@ def reason(compared: Comparison) -> str:
     cones = " and keep the cones" * bool(found.plan.kept)
     cost = "propellant" if found.by_propellant else "impulse"
     if found.standing is Standing.COMPLIES:
-        among = f"of the {found.count} plans that {_those(body)}{cones}"
+        among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
         return {
             Ground.SHIFT: f"least {cost} {among}, within 0.1 %; of these least shift of H",
             Ground.END: f"least {cost} {among}, within 0.1 %; of these it ends first",
         }.get(found.ground or Ground.COST, f"least {cost} {among}")
     meeting = found.standing is Standing.MEETS
-    those = f"plans that meet the requirement{cones}" if meeting else f"feasible plans{cones.replace(' and', ' that')}"
+    those = (
+        f"plans that {_meeting(found.plan, 'meet')}{cones}"
+        if meeting
+        else f"feasible plans{cones.replace(' and', ' that')}"
+    )
     among = f"of the {found.count} {those}"
     least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
     if found.ground is Ground.NEAREST:
@@ -89,8 +93,8 @@ def _only(compared: Comparison) -> str:
     """Why a plan that had no rival of its standing."""
     found, body = compared.recommendation, compared.spacecraft
     verdict = {
-        Standing.COMPLIES: _those(body, plural=False),
-        Standing.MEETS: "meets the requirement",
+        Standing.COMPLIES: _those(body, found.plan, plural=False),
+        Standing.MEETS: _meeting(found.plan, "meets"),
         Standing.MISSES: "",
     }[found.standing or Standing.MISSES]
     if len(compared.plans) == 1:
@@ -100,13 +104,18 @@ def _only(compared: Comparison) -> str:
     return f"the only {'' if verdict else 'feasible '}plan{f' that {said}' * bool(said)}"
 
 
-def _those(body: Spacecraft, *, plural: bool = True) -> str:
-    """What the plans do that comply."""
+def _those(body: Spacecraft, chosen: Plan | None = None, *, plural: bool = True) -> str:
+    """What the plans do that comply, of which one was ``chosen``."""
     if compliance.required(body):
-        return f"meet{'s' * (not plural)} the requirement"
+        return _meeting(chosen, f"meet{'s' * (not plural)}")
     if body.goal.axis is None:
         return f"damp{'s' * (not plural)}"
     return f"reach{'es' * (not plural)} the target"
+
+
+def _meeting(chosen: Plan | None, verb: str) -> str:
+    """That plans meet the requirement; at the end alone, where the one ``chosen`` breaks a cone on the way."""
+    return f"{verb} the requirement{' at the end' * (chosen is not None and chosen.kept is False)}"
 
 
 def warnings(compared: Comparison, *, beside_verdict: bool = False) -> tuple[str, ...]:
