@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from nutdamp.files.fields import RIGHT_ANGLE, Quantity
 from nutdamp.files.quantities import AcuteAngle, Direction, Name, Position, PositiveTime, Time
 from nutdamp.files.sections import Field, Section
-from nutdamp.units import parse, pattern
+from nutdamp.units import parse, pattern, shown
 
 
 class Reading(Quantity):
@@ -16,15 +16,16 @@ class Reading(Quantity):
 
     def __init__(self, **bounds: float) -> None:
         super().__init__("rate", **bounds)
-        self.other = Quantity("acceleration", **bounds)
 
     def check(self, value: object) -> float:
         """SI value; raises ValueError, which says what would be right."""
         try:
-            parse(value, "acceleration")
+            result = parse(value, "acceleration")
         except ValueError:
-            return super().check(value)
-        return self.other.check(value)
+            result = parse(value, self.kind)
+        if not self._allows(result):
+            raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
+        return result
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
         """A number, or a text with a unit of either."""

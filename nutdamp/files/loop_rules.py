@@ -13,6 +13,8 @@ from nutdamp.files.rules import inertia_of, spin_axis, spin_of
 from nutdamp.files.thruster_rules import instead, norm, on_times_of, torque_of
 from nutdamp.files.yaml_tree import KeyPath, Node
 from nutdamp.spacecraft import Inertia
+from nutdamp.tolerances import KINDS
+from nutdamp.units import KINDS as UNITS
 from nutdamp.units import shown
 
 SAMPLES = 4.0
@@ -23,6 +25,12 @@ MOST_SAMPLES = 1e6
 
 LATE = 20.0
 """Nutation periods after which a sample tells nothing: how long delay, filter and settling may be."""
+
+LONGEST_WAIT = 1e4
+"""Nutation periods, more than which from firing to firing damp nothing."""
+
+LARGEST_BIAS, FARTHEST = 1e3, 1e3
+"""m/s² and m of an accelerometer beyond which it is none of a spacecraft: its nutation would be lost in rounding."""
 
 SCALES = (0.1, 10.0)
 """Sizes of scales between which a sensor shows what it measures."""
@@ -149,10 +157,13 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             if not one.least <= on_time <= one.most:
                 problem = f"{on_time:g} s is outside what {one.name} allows: {one.least:g} s to {one.most:g} s"
                 yield Finding(("loop", "on_time"), problem)
-    names = [one.name for one in known]
+    names, before = [one.name for one in known], set()
     for index, node in facts.children("loop", "faults", "reversed"):
+        path: KeyPath = ("loop", "faults", "reversed", index)
+        if node.value in before:
+            yield Finding(path, f"{shown(node.value)} is named twice; expected each channel once")
+        before.add(node.value)
         if isinstance(node.value, str) and node.value not in names:
-            path: KeyPath = ("loop", "faults", "reversed", index)
             yield Finding(path, f"no channel is called {shown(node.value)}; {instead(node.value, names)}")
 
 
@@ -165,17 +176,19 @@ def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
         yield Finding((*SENSOR, "rate"), f"{problem}, or alias: true beside start")
     most = MOST_SAMPLES * rate / (2.0 * math.pi)
     if given is not None and given > most:
-        problem = f"{given:g} Hz is more than a million samples a nutation period; expected at most {most:.4g} Hz"
+        problem = f"{given:g} Hz is more than a million samples a nutation period of {2.0 * math.pi / rate:.4g} s"
+        problem += f"; expected at most {most:.4g} Hz"
         yield Finding((*SENSOR, "rate"), f"{problem}, or no rate for a continuous signal")
 
 
 def _lags(facts: Facts, period: float) -> Iterator[Finding]:
     """Times after which what the sensor shows is of no use; ``period`` s is that of the nutation in the body."""
-    for path in ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle")):
+    lags = ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle"))
+    for path, most in (*((path, LATE) for path in lags), (("loop", "min_interval"), LONGEST_WAIT)):
         value = facts.number("time", *path)
-        if value is not None and value > LATE * period:
-            problem = f"{value:g} s is {value / period:.3g} nutation periods; expected at most {LATE:g}"
-            yield Finding(path, f"{problem} of them, {LATE * period:.4g} s")
+        if value is not None and value > most * period:
+            problem = f"{value:g} s is {value / period:.3g} nutation periods; expected at most {most:g}"
+            yield Finding(path, f"{problem} of them, {most * period:.4g} s")
 
 
 def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
@@ -185,6 +198,9 @@ def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
     position, axis = _mounting(facts, inertia)
     if facts.text(*SENSOR, "kind") != "accelerometer" or position is None or axis is None:
         return
+    if math.hypot(*position) > FARTHEST:
+        problem = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
+        yield Finding((*SENSOR, "position"), problem)
     if not is_blind(inertia.moments, position, axis):
         return
     if inertia.symmetric and inertia.C == 2.0 * inertia.A and abs(axis[2]) > 1.0 - 1e-9:
@@ -209,18 +225,34 @@ def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
     start, kind = facts.number("angle", "loop", "start"), facts.text(*SENSOR, "kind")
     if start is None or not 0.0 < start < 0.5 * math.pi or kind not in ("gyro", "accelerometer"):
         return
-    size, unit = inertia.C * abs(spin) / inertia.A * math.tan(start), "rad/s"
+    size = inertia.C * abs(spin) / inertia.A * math.tan(start)
     if kind == "accelerometer":
         from nutdamp.loop.sensor import gain
 
         position, axis = _mounting(facts, inertia)
         if position is None or axis is None:
             return
-        size, unit = size * abs(spin) * math.hypot(*gain(inertia.moments, position, axis)), "m/s^2"
+        size *= abs(spin) * math.hypot(*gain(inertia.moments, position, axis))
+        if size == 0.0:
+            return
     quantity = "rate" if kind == "gyro" else "acceleration"
     # The offset of an accelerometer is fitted, and does not matter.
-    for key, share in (("noise", 1.0), ("quantisation", 2.0), *([("bias", 1.0)] * (kind == "gyro"))):
-        value = facts.number(quantity, *SENSOR, key)
-        if value is not None and abs(value) > share * size > 0.0:
-            problem = f"{value:.4g} {unit} hides start, which shows as {size:.4g} {unit}"
-            yield Finding((*SENSOR, key), f"{problem}; expected at most {share * size:.4g} {unit}")
+    shares = {(*SENSOR, "noise"): 1.0, (*SENSOR, "quantisation"): 2.0}
+    biases: list[KeyPath] = [(*SENSOR, "bias"), *(("dispersions", "sensor_bias", one) for one in KINDS)]
+    for path, share in (*shares.items(), *((path, 1.0 if kind == "gyro" else LARGEST_BIAS / size) for path in biases)):
+        value = facts.number(quantity, *path)
+        if value is None or abs(value) <= share * size or (value < 0.0 and path in shares):
+            continue
+        unit, scale = _unit_of(facts.text(*path)) if kind == "gyro" else ("m/s^2", 1.0)
+        most = f"{share * size / scale:.4g} {unit}"
+        if kind == "gyro" or path in shares:
+            problem = f"{value / scale:.4g} {unit} hides start, which shows as {size / scale:.4g} {unit}"
+        else:
+            problem = f"{value:.4g} {unit} is no bias of an accelerometer"
+        yield Finding(path, f"{problem}; expected at most {most}")
+
+
+def _unit_of(text: str | None) -> tuple[str, float]:
+    """The unit of an angular rate as it is written, and its size in rad/s."""
+    written = (text or "").rpartition(" ")[2]
+    return (written, UNITS["rate"].factors[written]) if written in UNITS["rate"].factors else ("rad/s", 1.0)

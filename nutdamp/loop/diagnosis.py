@@ -183,8 +183,8 @@ class Diagnosis:
     """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
 
     Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
-    z grows by ``growth`` 1/s, and with tan θ = ``slope`` |z| the spin falls; ``first``: |z| (rad/s) of the nutation that
-    is fired at, and the time (s), since the loop was last quiet.
+    z grows by ``growth`` 1/s, and with tan θ = ``slope`` |z| the spin falls; ``first``: |z| (rad/s) of the nutation
+    that is fired at, and the time (s), since the loop was last quiet.
     """
 
     period: float

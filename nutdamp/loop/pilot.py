@@ -105,6 +105,11 @@ class Pilot:
         self._seen = []
         return later
 
+    @property
+    def lost(self) -> bool:
+        """Whether the loop does not comply, whatever it leaves: stopped, or fires and was never down to stop."""
+        return self.ending[0] is not Stop.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
+
     def _pulse(self, found: Found) -> Pulse | None:
         """What the channel does in truth when it is commanded; None where it may not, or not before the end."""
         known, channel = found.actuator.channel, self.channels[found.actuator.channel.name]

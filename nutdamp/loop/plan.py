@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from nutdamp.aspect import Aspect, aspects
 from nutdamp.compliance import Left
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
@@ -49,6 +50,17 @@ class LoopPlan(Plan):
     def left(self) -> Left:
         """The largest nutation since it was first quiet; direction of H and spin at the end."""
         return left_by(self.flight)._replace(nutation=self.largest[0])
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """As of any plan; not where the loop was stopped or never quiet, nor where the spin axis breaks a cone."""
+        found = super().meets_requirement
+        return False if self.kept is False or (found is not None and self.flown_run.lost) else found
+
+    @cached_property
+    def aspects(self) -> tuple[Aspect, ...]:
+        """How near the spin axis comes to each direction that is watched, to the end of the run."""
+        return aspects(self.flight, self.flown_run.until)
 
     @cached_property
     def margins(self) -> tuple[Margin, ...]:

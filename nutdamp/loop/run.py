@@ -14,7 +14,8 @@ from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
 from nutdamp.loop.pilot import Course, Fired, Pilot, Scatter
 from nutdamp.loop.sensor import Signal
-from nutdamp.loop.watch import Coast
+from nutdamp.loop.stability import dead_band
+from nutdamp.loop.watch import GRID, Coast
 from nutdamp.loop_settings import Loop
 from nutdamp.motion import Path
 from nutdamp.physics import rigid
@@ -26,6 +27,15 @@ from nutdamp.track import widest
 SEED = 1
 """Of the noise, where none is named."""
 
+LEFT = 0.1
+"""Share of the stop threshold that a last firing leaves, about."""
+
+SMALLEST = 1e-3
+"""Share of the start threshold from which a cycle of growing nutation is counted at least."""
+
+REGROWN = 2_000_000
+"""Samples for which it is waited that the nutation grows again."""
+
 ROWS = 2000
 """Even moments at which the largest nutation of a run is looked for."""
 
@@ -35,7 +45,8 @@ class Run:
     """A loop flown to ``until`` s: its firings, why it ended, and the channel to blame.
 
     ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
-    ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start.
+    ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start; ``lost``: see
+    `Pilot`.
     """
 
     spacecraft: Spacecraft
@@ -46,6 +57,7 @@ class Run:
     stop: Stop
     channel: str | None
     quiet: tuple[float, ...]
+    lost: bool
     looked_at: int
     flight: Flight
 
@@ -71,10 +83,18 @@ class Run:
 
 
 def until_default(spacecraft: Spacecraft, loop: Loop) -> float:
-    """End of a flight where none is named, s: the horizon, and before it the time until the nutation starts it."""
+    """End of a flight where none is named, s: the horizon, and before it the time until the nutation starts it.
+
+    Where the nutation grows again from what is left, a cycle longer, in which at most `REGROWN` samples are looked at.
+    """
     growth, now = spacecraft.growth, math.tan(spacecraft.nutation)
-    waits = math.log(math.tan(loop.start) / now) / growth if growth > 0.0 < now < math.tan(loop.start) else 0.0
-    return waits + spacecraft.horizon
+    if growth <= 0.0:
+        return spacecraft.horizon
+    first = math.tan(loop.start)
+    waits = math.log(first / now) / growth if 0.0 < now < first else 0.0
+    low = max(LEFT * math.tan(max(loop.stop, 0.5 * dead_band(spacecraft, loop).step)), SMALLEST * first)
+    step = spacecraft.body_period / GRID if loop.sensor.rate is None else 1.0 / loop.sensor.rate
+    return waits + spacecraft.horizon + min(max(math.log(first / low), 0.0) / growth, REGROWN * step)
 
 
 def fly(
@@ -185,6 +205,7 @@ class Alone:
             pilot.ending[0],
             pilot.ending[1] or None,
             tuple(pilot.quiet),
+            pilot.lost,
             pilot.looked_at,
             made,
         )

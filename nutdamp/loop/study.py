@@ -168,7 +168,7 @@ class LoopStudy:
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
         severity = np.asarray(compliance.severity(body, Left(out[2], aim, flown.rates[2])), dtype=float)
-        lost = np.array([p.ending[0] is not Stop.END or (p.active and not p.quiet) for p in pilots])
+        lost = np.array([pilot.lost for pilot in pilots])
         return out, np.where(lost, math.inf, severity)
 
 

@@ -37,6 +37,11 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
     elif run.case is not None:
         met = "" if plan.meets_requirement is None else " meets" if plan.meets_requirement else " does NOT meet"
         parts.append(Text(f"Dispersed case {run.case} of seed {run.seed}{met and met + ' the requirement'}."))
+    elif run.lost and decision.nominal and not decision.strays:
+        why = (
+            "limits.max_pulses is reached" if run.stop is Stop.FULL else "the loop is never down to its stop threshold"
+        )
+        parts.append(Text.assemble(("Requirement: ", "bold"), (f"NOT met: {why}", "bold red"), "."))
     else:
         parts += list(requirement(decision))
     parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
@@ -116,7 +121,7 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
 def _outcome(plan: LoopPlan) -> Table:
     run, band = plan.flown_run, plan.band
     table = facts()
-    settled = "never down to the stop threshold" if run.settled is None else f"at {moment(run.settled)}"
+    settled = _settled(run)
     table.add_row("first quiet", settled)
     if run.settled is not None:
         largest, when = plan.largest
@@ -127,6 +132,15 @@ def _outcome(plan: LoopPlan) -> Table:
     case = "" if run.case is None else f", dispersed case {run.case}"
     table.add_row("flown", f"0 to {moment(run.until)}, noise of seed {run.seed}{case}")
     return table
+
+
+def _settled(run: Run) -> str:
+    """When the loop was first quiet."""
+    if run.settled is not None:
+        return f"at {moment(run.settled)}"
+    if not run.fired and not run.lost:
+        return "always: it never shows the start threshold"
+    return "never down to the stop threshold" if run.loop.stop > 0.0 else "never: loop.stop is 0"
 
 
 def _firings(run: Run) -> Table:

@@ -106,6 +106,40 @@ def test_a_requirement_that_is_missed_is_said(run: Run, file: str) -> None:
     assert "NOT met" in done.stdout
 
 
+def test_a_loop_that_is_never_quiet_misses_the_requirement_alone_as_in_a_study(run: Run, file: str) -> None:
+    never = ("--set", "loop.stop=1e-8 deg", "--until", "60s")
+    done = run("loop", file, *never, "--json", "-", "-q")
+    found = json.loads(done.stdout)
+    assert (done.returncode, found["meets_requirement"], found["quiet_s"]) == (4, False, [])
+    assert found["flown"]["nutation_deg"] < 0.3
+    assert "Requirement: NOT met: the loop is never down to its stop threshold" in run("loop", file, *never).stdout
+    cases = ("--set", "dispersions={A: {normal: 0.01 %}}", "--samples", "20", "--json", "-", "-q")
+    found = json.loads(run("disperse", file, "--loop", *never, *cases).stdout)
+    assert found["requirement"]["met_fraction"] == 0.0
+    done = run("loop", file, "--set", "loop.stop=0")
+    assert (done.returncode, "never: loop.stop is 0" in done.stdout) == (0, True)
+    still = run("loop", file, "--set", "omega0=[0, 0, 3]").stdout
+    assert "it never shows the start threshold" in " ".join(still.split())
+
+
+def test_a_cone_that_is_broken_on_the_way_is_no_met_requirement(run: Run, file: str, tmp_path: Path) -> None:
+    sky = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
+    near = "keep: [{name: star, direction: [0 deg, 85 deg], min: 8 deg}]\n"
+    (tmp_path / "seen.yaml").write_text(BODY + LOOP + sky + near)
+    done = run("loop", "seen.yaml", "--json", "loop.json")
+    assert done.returncode == 4
+    assert "NOT met" in done.stdout
+    assert json.loads((tmp_path / "loop.json").read_text())["meets_requirement"] is False
+    (tmp_path / "seen.yaml").write_text(BODY + LOOP + sky + near.replace("8 deg", "1 deg"))
+    assert run("loop", "seen.yaml").returncode == 0
+
+
+def test_where_nutation_grows_the_default_end_comes_after_a_cycle(run: Run, file: str) -> None:
+    found = json.loads(run("loop", file, "--set", "dissipation={time_constant: 600 s}", "--json", "-").stdout)
+    assert len(found["quiet_s"]) >= 2
+    assert found["pulses"][-1]["start_s"] > 500.0
+
+
 def test_a_file_without_a_loop_is_told_what_to_write(run: Run, tmp_path: Path) -> None:
     (tmp_path / "bare.yaml").write_text(BODY)
     done = run("loop", "bare.yaml")
@@ -134,13 +168,16 @@ def test_pictures(run: Run, file: str, tmp_path: Path, sensor: str) -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("loop.sensor.rate=1e9Hz", "more than a million samples a nutation period; expected at most 7.857e+05 Hz"),
+        (
+            "loop.sensor.rate=1e9Hz",
+            "more than a million samples a nutation period of 1.273 s; expected at most 7.857e+05 Hz",
+        ),
         ("loop.sensor.delay=1e6s", "nutation periods; expected at most 20 of them, 25.45 s"),
         ("loop.sensor.low_pass=30s", "low_pass: 30 s is 23.6 nutation periods"),
         ("loop.settle=30s", "settle: 30 s is 23.6 nutation periods"),
         ("loop.sensor.scale=2000%", "2000 % is no scale of a sensor; expected 10 % to 1000 %"),
         ("loop.sensor.scale=-1%", "-1 % is no scale of a sensor"),
-        ("loop.sensor={kind: gyro, bias: 2 deg/s}", "bias: 0.03491 rad/s hides start"),
+        ("loop.sensor={kind: gyro, bias: 2 deg/s}", "bias: 2 deg/s hides start, which shows as 0.6732 deg/s"),
     ],
 )
 def test_senseless_numbers_are_refused(run: Run, setting: str, message: str) -> None:
