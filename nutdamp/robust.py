@@ -1,6 +1,7 @@
 """Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
 
-Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments.
+Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
+and, where `optimal` is among the schemes, those that `surest` makes for the dispersions.
 All of them fly the same draws through real widths, so that what is compared is the plans and not their luck.
 """
 
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp import planning
+from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
 from nutdamp.compliance import Part, aim, missed
 from nutdamp.decision import Cases, Decision, cases_of
@@ -92,8 +93,9 @@ class Cost(NamedTuple):
 class RobustComparison:
     """Candidates from the best down; ``usual`` is what `recommendation.recommend` takes, ``chosen`` the robust plan.
 
-    ``ground`` is what decided among the ``equals`` candidates that are as good as the best, by propellant or by
-    impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``, in closed form.
+    ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
+    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``,
+    in closed form.
     """
 
     comparison: Comparison
@@ -152,6 +154,8 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         found.append(partial(list, [("as planned", base)]))
         found.append(partial(_alignments, body, base.scheme, options))
         found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
+        if base.scheme == surest.SCHEME:
+            found.append(partial(surest.plans, body, options))
     return found
 
 
@@ -184,7 +188,7 @@ def compare(
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                 found[kind] = _dispersed(own, variant, samples, impulses=impulses, force=force)
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    equals = _equals(list(found.values()), samples)
+    equals = _equals(list(found.values()), samples, probability)
     chosen, ground = None, None
     if equals:
         best, ground = cheapest([one.plan for one in equals])
@@ -242,10 +246,14 @@ def _dispersed(plan: Plan, variant: str, samples: int, *, impulses: bool, force:
     return Candidate(plan, variant, cases_of(run(Results(study, samples), threads=threads_here())))
 
 
-def _equals(candidates: Sequence[Candidate], samples: int) -> list[Candidate]:
-    """The candidates that are as good as the best, but for what the sampling may make of them."""
-    if not candidates:
-        return []
+def _equals(candidates: Sequence[Candidate], samples: int, probability: float) -> list[Candidate]:
+    """The candidates that comply as often as is required; without any those that are as good as the best.
+
+    But for what the sampling may make of them.
+    """
+    enough = [one for one in candidates if one.met is not None and one.met >= probability]
+    if enough or not candidates:
+        return enough
     best = min(candidates, key=lambda one: one.rank)
     if best.met is None:
         return [one for one in candidates if one.rank <= AS_GOOD * best.rank]

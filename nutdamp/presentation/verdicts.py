@@ -290,6 +290,9 @@ def robust_reason(found: RobustComparison) -> str:
         level = exact_percent(found.probability)
         best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
         as_good = f"{found.equals} leave about as little"
+    elif chosen.met >= found.probability:
+        best = f"at least {exact_percent(found.probability)} of cases comply with it, of {count} plans"
+        as_good = f"they do with {found.equals}"
     else:
         best = f"most cases comply, of {count} plans"
         as_good = f"{found.equals} comply equally often within the sampling error"

@@ -31,10 +31,14 @@ SMALL, NONZERO = 10_000, 1e-2
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side of the equations costs."""
+    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side of the equations costs.
+
+    ``shadows`` are the same of the limits, at most zero.
+    """
 
     x: Vector
     prices: Vector
+    shadows: Vector
 
 
 class GrowingProgram:
@@ -61,6 +65,11 @@ class GrowingProgram:
         self._costs = np.concatenate([self._costs, cost])
         zeros = np.zeros(len(cost))
         self._highs.addCols(len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values)
+
+    def limit(self, row: Vector, most: float) -> None:
+        """One more limit, of the unknowns (n,) that there are: row @ x ≤ most."""
+        used = np.flatnonzero(row)
+        self._highs.addRow(-highspy.kHighsInf, most, len(used), used.astype(np.int32), row[used])
 
     @property
     def steps(self) -> int:
@@ -92,8 +101,8 @@ class GrowingProgram:
         found = None
         if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
             solution = highs.getSolution()
-            prices = np.array(solution.row_dual)[: len(self._level)]
-            found = Optimum(np.array(solution.col_value), prices / self._level / factor)
+            prices, shadows = np.split(np.array(solution.row_dual) / factor, [len(self._level)])
+            found = Optimum(np.array(solution.col_value), prices / self._level, shadows)
         if factor != 1.0:
             highs.changeColsCost(len(every), every, self._costs)
         return found

@@ -78,7 +78,7 @@ def _repaired(program: Program, solution: Solution) -> Solution:
     for _ in range(REPAIRS):
         if work.exhausted():
             raise Unrepairable
-        broken = next(_broken(program, solution.burns), None)
+        broken = next(broken_by(program, solution.burns), None)
         if broken is None:
             return solution
         program.forbid(*broken)
@@ -120,7 +120,7 @@ def _too_long(burn: Burn) -> bool:
     return burn.on_time > burn.channel.max_on_time + TOUCHING
 
 
-def _broken(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
+def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
     """What to forbid: ends of too long burns, too short ones, the less of two too near, the least if too many."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:

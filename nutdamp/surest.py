@@ -1,0 +1,254 @@
+"""The plan that meets a requirement most surely, or surely enough for the least propellant, by optimisation.
+
+`schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
+made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from nutdamp import compliance, flight, planning, schemes
+from nutdamp.compliance import Part
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.correlation import mixing
+from nutdamp.dispersion.inputs import Input
+from nutdamp.dispersion.study import PROBABILITY, Results, run, threads_here
+from nutdamp.errors import Infeasible
+from nutdamp.limits import keeps_limits
+from nutdamp.planning import Plan
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes import Options
+from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
+from nutdamp.schemes.optimal.linear_program import SLOTS
+from nutdamp.schemes.optimal.problem import Problem
+from nutdamp.schemes.optimal.refine import refine
+from nutdamp.schemes.optimal.repair import as_pulses, broken_by
+from nutdamp.schemes.optimal.residual_equations import Equations, small_angles
+from nutdamp.schemes.options import OptimalOptions
+from nutdamp.schemes.tools import commanding
+from nutdamp.schemes.tools.symmetric_model import model_of
+from nutdamp.spacecraft import Spacecraft, Vector
+
+SCHEME = "optimal"
+
+STEP = 1e-30
+"""Imaginary step of derivatives."""
+
+MARGINS = (1.0, 0.75, 0.5, 1.3)
+"""Over the sigmas of the probability required: margins that are tried first."""
+
+TRIED = 4_096
+"""Cases in which a plan is tried while its margin is adapted, of a seed of its own."""
+
+TRYING = 101
+"""That seed."""
+
+ROUNDS = 4
+"""Times that the margin is adapted."""
+
+REPAIRS = 24
+"""Times that a burn which breaks a limit is moved elsewhere."""
+
+STRAIGHT = 0.3
+"""rad by which one sigma may turn what a pulse does: for later pulses first order is no good."""
+
+TURNS = 2.5
+"""Nutation periods that are looked at in any case."""
+
+MOST = 8
+"""Burns that are kept, the longest: the program has very short ones besides."""
+
+LARGEST = 60_000
+"""Slots of all channels up to which a plan is looked for."""
+
+
+def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Input, ...]]:
+    """How the dispersions of a symmetric ``body`` act, to first order, with pulses of ``on_times`` (K,) s; the inputs.
+
+    Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
+    """
+    pulses = [
+        channel_pulse(one, 100.0 + 1e3 * at, on)
+        for at, (one, on) in enumerate(zip(body.channels, on_times, strict=True))
+    ]
+    model = Model(body, Schedule(tuple(pulses)))
+    drawn = [one for one in model.inputs.drawn if one.kind != "bias"]
+    biases: dict[str, np.ndarray | float] = {
+        one.name: np.full(len(drawn) + 1, one.size, dtype=complex) for one in model.inputs.drawn if one.kind == "bias"
+    }
+    draws = dict(biases)
+    for at, one in enumerate(drawn):
+        draws[one.name] = np.zeros(len(drawn) + 1, dtype=complex)
+        draws[one.name][at] = 1j * STEP * one.sigma  # type: ignore[index]
+    cases = model.cases(draws)
+
+    def parts(value: object) -> tuple[float, Vector]:
+        """Value and derivatives by one sigma."""
+        whole = np.broadcast_to(np.asarray(value, dtype=complex), len(drawn) + 1)
+        return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
+
+    (A, dA), (C, dC) = parts(cases.A), parts(cases.C)
+    rates = [parts(one) for one in cases.omega0]
+    spin, dspin = rates[2]
+    a = 1.0 - C / A
+    da = C / A**2 * dA - dC / A
+    start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
+    tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
+    pointed = start + C * spin * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
+    impulses = [[parts(part) for part in one] for one in cases.impulses]
+    begun = [parts(one) for one in cases.starts]
+    on = np.asarray(on_times)
+    torque = np.array([one[0][1] + 1j * one[1][1] for one in impulses]) / on[:, None]
+    axial = np.array([one[2][1] for one in impulses]) / on[:, None]
+    late = np.array([one[1] for one in begun])
+    delay = np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)])
+    mixed = mixing(drawn, model.groups)
+    found = Uncertain(
+        effect=np.asarray(np.array([complex(one[0][0], one[1][0]) for one in impulses]) / on, dtype=np.complex128),
+        axial=np.array([one[2][0] for one in impulses]) / on,
+        begin=np.asarray(np.array([start, pointed]) @ mixed, dtype=np.complex128),
+        rates=np.array([a * dspin + da * spin, dspin]) @ mixed,
+        torque=np.asarray(torque @ mixed, dtype=np.complex128),
+        axial_torque=axial @ mixed,
+        late=late @ mixed,
+        own=np.array([" pulse " in one.name for one in drawn], dtype=bool),
+        spin=C * dspin @ mixed,
+        delay=delay,
+        less=(dC / C + dspin / spin) @ mixed,
+    )
+    return found, tuple(drawn)
+
+
+def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
+    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required."""
+    body = planning.known(spacecraft, schemes.options_of(schemes.SCHEMES[SCHEME], options))
+    if not compliance.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
+        return
+    try:
+        search = _Search(spacecraft, body)
+    except Infeasible:
+        return
+    yield from search.plans()
+
+
+class _Search:
+    """The search for one spacecraft."""
+
+    def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
+        self.spacecraft, self.body = spacecraft, body
+        plain = commanding.plain(body) if body.thrust_laws else body
+        self.model = model_of(plain)
+        bounds = compliance.required(spacecraft)
+        parts = {bound.part: bound.most for bound in bounds}
+        aimed = compliance.aim(spacecraft) in parts or body.goal.axis is not None
+        self.equations = Equations(shift=aimed, spin=body.goal.spin is not None)
+        self.options = OptimalOptions(free_axis=not aimed)
+        self.problem = Problem(self.model.body, self.options)
+        self.program = self.problem.program()
+        if self.program.forbidden.size > LARGEST:
+            raise Infeasible("too many slots")
+        flat = self.model.body
+        spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
+        self.limits = tuple(
+            Limit(kind, most)
+            for part, kind, most in (
+                (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
+                (compliance.aim(spacecraft), 1, spin * math.sin(min(parts.get(compliance.aim(spacecraft), 0.0), 1.5))),
+                (Part.SPIN, 2, flat.inertia.C * parts.get(Part.SPIN, 0.0)),
+            )
+            if part in parts
+        )
+        first = self.program.solve()
+        longest = max((one.on_time for one in first.burns), default=0.1)
+        ons = np.array([min(max(longest, one.min_on_time, 1e-3), one.max_on_time) for one in self.program.channels])
+        flat = replace(flat, channels=self.program.channels, dispersions=body.dispersions)
+        self.uncertain, _ = uncertain(flat, ons)
+        drift = float(np.linalg.norm(self.uncertain.rates, axis=1).max())
+        last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
+        self.program.forbid(None, last, math.inf)
+        self.goal = np.zeros(5)
+        self.goal[Equations(True, True).chosen] = small_angles(flat, Equations(True, True)).goal
+        requested = spacecraft.requirement
+        self.probability = PROBABILITY
+        if requested is not None and requested.probability is not None:
+            self.probability = requested.probability
+
+    @property
+    def sigmas(self) -> float:
+        """Of a plane normal distribution, within which the share lies that is required."""
+        return math.sqrt(-2.0 * math.log(max(1.0 - self.probability, 1e-9)))
+
+    def plans(self) -> Iterator[tuple[str, Plan]]:
+        """Plans by the first margins, then by those between which the share required, or the largest, lies."""
+        seen: dict[float, float] = {}
+        for number in range(len(MARGINS) + ROUNDS):
+            margin = MARGINS[number] * self.sigmas if number < len(MARGINS) else self._next(seen)
+            seen[margin] = 0.0
+            for variant, plan, share in self.tried(margin):
+                seen[margin] = share
+                yield variant, plan
+
+    def _next(self, seen: dict[float, float]) -> float:
+        """Another margin: towards the least with which as many cases comply as must, else beside the best."""
+        enough = [margin for margin, share in seen.items() if share >= self.probability]
+        if enough:
+            least = min(enough)
+            return 0.5 * (least + max((margin for margin in seen if margin < least), default=0.0))
+        best = max(seen, key=lambda margin: seen[margin])
+        below = max((margin for margin in seen if margin < best), default=0.5 * best)
+        above = min((margin for margin in seen if margin > best), default=1.5 * best)
+        return 0.5 * (best + (below if best - below > above - best else above))
+
+    def tried(self, margin: float) -> Iterator[tuple[str, Plan, float]]:
+        """The plan of a margin, if there is one, and its share of cases that comply."""
+        made = self.made(margin)
+        if made is None:
+            return
+        plan = planning.judged(self.spacecraft, SCHEME, made, self.options)
+        if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
+            results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
+            yield f"against dispersions, {margin:.3g} σ", plan, results.met_fraction or 0.0
+
+    def _few(self, found: Sure) -> None:
+        """Forbid all slots that are not about the longest burns."""
+        program, near = self.program, np.zeros_like(self.program.forbidden)
+        for burn in sorted(found.burns, key=lambda one: -one.impulse)[:MOST]:
+            reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
+            near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
+        program.forbidden |= ~near
+
+    def made(self, margin: float) -> Schedule | None:
+        """The schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
+        allowed = self.program.forbidden.copy()
+        chance = ChanceProgram(self.program, self.uncertain, self.limits, self.goal)
+        found: Sure | None = None
+        try:
+            self._few(chance.solve(margin))
+            for _ in range(REPAIRS):
+                found = chance.solve(margin)
+                if not found.burns:
+                    return None
+                broken = next(broken_by(self.program, found.burns), None)
+                if broken is None:
+                    break
+                self.program.forbid(*broken)
+            else:
+                return None
+        finally:
+            self.program.forbidden = allowed
+        made = self.model.translate(as_pulses(self.model.body, found.burns))
+        plain = commanding.plain(self.body) if self.body.thrust_laws else self.body
+        aside = found.left[self.equations.chosen]
+        made = refine(
+            plain, made, self.equations, np.zeros(2), self.program.width, lambda one: flight.flown(plain, one), aside
+        )
+        try:
+            return schemes.as_commands(SCHEME, self.body, made, self.options) if self.body.thrust_laws else made
+        except Infeasible:
+            return None

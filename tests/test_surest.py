@@ -1,0 +1,163 @@
+"""The surest plan: first-order effects against flights, margins that hold, and never worse than what schemes plan."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import channel, cross, spinner
+from checker import violations
+from dispersed import normal
+
+from nutdamp import robust, surest
+from nutdamp.comparison import compare
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.flown import RealWidths
+from nutdamp.dispersion.sensitivity import by_differences
+from nutdamp.dispersion.study import Results, run
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.planning import plan
+from nutdamp.presentation import verdicts
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes.optimal.chance import ChanceProgram
+from nutdamp.schemes.optimal.columns import Columns
+from nutdamp.spacecraft import Limits, Requirement, Spacecraft
+from nutdamp.tolerances import Dispersions, Tolerance
+
+SAMPLES = 4_096
+
+
+def relative(size: float) -> Tolerance:
+    return Tolerance("normal", size, relative=True)
+
+
+def a_body(A: float = 120.0, C: float = 80.0, spin: float = 3.0, **changes: object) -> Spacecraft:
+    """Small nutation, so that first order is all there is; pulses short against the turns."""
+    channels = (channel("T1", 9.0, 2.0, 0.0), channel("T2", -6.0, 7.0, 0.0))
+    tolerances = Dispersions(
+        A=relative(0.005),
+        C=relative(0.005),
+        omega0=(normal(1e-4), normal(1e-4), normal(0.004)),
+        thrust={"T1": relative(0.02), "T2": relative(0.03)},
+        thrust_per_pulse=relative(0.01),
+        timing=Tolerance("uniform", 0.004),
+        timing_offset=Tolerance("triangular", 0.01),
+    )
+    requirement = Requirement(math.radians(0.05), math.radians(0.05), 0.95)
+    body = spinner(A, C, spin, 0.2, channels=channels, requirement=requirement, limits=Limits(horizon=20.0))
+    return replace(body, dispersions=replace(tolerances, **changes))  # type: ignore[arg-type]
+
+
+def at(body: Spacecraft, pulses: list[tuple[int, float, float]]) -> tuple[surest._Search, Columns, np.ndarray]:
+    """The program of a body, with given pulses (channel, centre, on-time) as its columns, and their amounts."""
+    search = surest._Search(body, body)
+    channels, times, widths = (np.array(one) for one in zip(*pulses, strict=True))
+    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
+    return search, Columns(channels, times, widths, np.full(len(times), -1)), widths / chance.unit[channels]
+
+
+@pytest.mark.parametrize("shape", [(120.0, 80.0, 3.0), (100.0, 150.0, 2.0), (120.0, 80.0, -3.0)])
+@pytest.mark.parametrize("pairs", [(), (("A", "C", 0.9), ("thrust T1", "thrust T2", -0.5))])
+def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
+    shape: tuple[float, float, float], pairs: tuple[tuple[str, str, float], ...]
+) -> None:
+    """One sigma of each input: the closed form here, the complex step of the kernel, and differences of flights."""
+    body = a_body(*shape, correlation=pairs)
+    names = [one.name for one in body.channels]
+    pulses = [(names.index(one.channel), one.t, one.on_time) for one in plan(body, "optimal").pulses]
+    assert len(pulses) >= 2
+    search, columns, amounts = at(body, pulses)
+    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
+    made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
+    model = Model(body, made)
+    names = [one.name for one in model.inputs.drawn]
+    kernel = study_of(body, made, flown=False).first_order
+    spins = body.inertia.C * abs(body.spin)
+    for kind, rows, size in ((0, slice(0, 2), spins), (1, slice(2, 4), float(np.linalg.norm(body.momentum)))):
+        shared, _, own = chance._spread(kind, columns, amounts)
+        expected = kernel.jacobian * kernel.sigmas
+        expected = expected if kernel.mixing is None else expected @ kernel.mixing
+        drawn = surest.uncertain(replace(search.model.body, channels=body.channels), np.array([0.02, 0.02]))[1]
+        once = [one.name for one in drawn if " pulse " not in one.name]
+        for index, name in enumerate(once):
+            effect = shared[[one.name for one in drawn].index(name)] * chance.scale / size
+            truth = expected[rows, names.index(name)]
+            assert abs(effect) == pytest.approx(np.linalg.norm(truth), rel=0.03, abs=3e-7), (name, kind, index)
+        together = math.sqrt((np.abs(own) ** 2).sum()) * chance.scale / size
+        each = [names.index(name) for name in names if " pulse " in name]
+        assert together == pytest.approx(np.linalg.norm(expected[rows, each]), rel=0.03)
+    flown = by_differences(model, RealWidths(model)).effects("nutation")  # central differences of real widths
+    assert flown == pytest.approx(kernel.effects("nutation"), rel=0.02, abs=1e-7)
+
+
+def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
+    body = replace(a_body(), requirement=Requirement(math.radians(0.05), None, 0.95))
+    search = surest._Search(body, body)
+    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
+    costs = []
+    for margin in (0.0, 1.0, 2.0):
+        found = chance.solve(margin)
+        assert found.excess == pytest.approx(0.0, abs=1e-9)
+        names = [one.name for one in search.program.channels]
+        columns = Columns(
+            *(
+                np.array(one)
+                for one in zip(*((names.index(b.channel.name), b.t, b.on_time, -1) for b in found.burns), strict=True)
+            )
+        )
+        amounts = columns.width / chance.unit[columns.channel]
+        shared, _, own = chance._spread(0, columns, amounts)
+        left = chance._left(columns, amounts)[0]
+        turns = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
+        along = (np.conj(turns)[:, None] * shared).real
+        alone = (np.conj(turns)[:, None, None] * own).real
+        used = (np.conj(turns) * left).real + margin * np.sqrt((along**2).sum(1) + (alone**2).sum((1, 2)))
+        assert used.max() * chance.scale == pytest.approx(search.limits[0].most, rel=0.02)
+        costs.append(sum(b.impulse for b in found.burns))
+    assert costs == sorted(costs)
+    assert costs[0] < 0.8 * body.least_impulse  # a quarter of the nutation may stay
+
+
+def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme() -> None:
+    """85.6 % of cases comply with two-pulse, and with less of any other scheme or variant."""
+    body = read_spacecraft(example_text(), "example.yaml")
+    compared = compare(body, ("two-pulse", "optimal"))
+    trials = robust.attempts(compared)
+    found = robust.compare(compared, trials, samples=SAMPLES)
+    assert found.chosen is not None
+    assert found.meets_requirement
+    assert "against dispersions" in found.chosen.variant
+    assert verdicts.robust_reason(found).startswith("at least 99.7 % of cases comply with it")
+    assert violations(body, found.chosen.plan.pulses) == []
+    usual = plan(body, "two-pulse").pulses
+    assert found.chosen.plan.pulses.propellant is not None
+    assert usual.propellant is not None
+    assert found.chosen.plan.pulses.propellant < 0.95 * usual.propellant
+    fresh = run(Results(study_of(body, found.chosen.plan.pulses, seed=77), 20_000))
+    assert fresh.interval[1] > 0.997
+    without = [one for one in found.candidates if "against dispersions" not in one.variant]
+    assert max(one.met or 0.0 for one in without) < 0.87
+
+
+def test_limits_and_windows_are_kept() -> None:
+    limits = Limits(earliest=1.0, gap=0.2, tick=0.01, max_pulses=6, blackout=((3.0, 4.5),), horizon=40.0)
+    known = tuple(
+        replace(one, thrusters=tuple(replace(t, thrust=10.0, isp=220.0, min_on_time=0.05) for t in one.thrusters))
+        for one in cross(8.0)
+    )
+    body = spinner(channels=known, limits=limits, requirement=Requirement(math.radians(0.6), None, 0.95))
+    body = replace(body, dispersions=Dispersions(A=relative(0.004), thrust={one.name: relative(0.02) for one in known}))
+    made = [made for _, made in surest.plans(body)]
+    assert made
+    for one in made:
+        assert violations(body, one.pulses) == []
+
+
+def test_nothing_where_nothing_is_required() -> None:
+    body = a_body()
+    assert list(surest.plans(replace(body, requirement=None))) == []
+    assert list(surest.plans(replace(body, dispersions=None))) == []
