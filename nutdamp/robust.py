@@ -29,6 +29,7 @@ from nutdamp.planning import Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Spacecraft
+from nutdamp.tightening import Tightening, tightening
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
@@ -95,7 +96,7 @@ class RobustComparison:
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``,
-    in closed form.
+    in closed form. ``tightening``: with which tolerances enough cases would comply with it, where too few do.
     """
 
     comparison: Comparison
@@ -109,6 +110,7 @@ class RobustComparison:
     samples: int
     seed: int
     flown: bool
+    tightening: Tightening | None = None
 
     @property
     def cost(self) -> Cost | None:
@@ -193,6 +195,7 @@ def compare(
     if equals:
         best, ground = cheapest([one.plan for one in equals])
         chosen = next(one for one in equals if one.plan is best)
+    short = chosen is not None and chosen.met is not None and chosen.met < probability and not impulses
     return RobustComparison(
         comparison,
         tuple(sorted(found.values(), key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
@@ -205,6 +208,7 @@ def compare(
         samples,
         SEED,
         not impulses,
+        tightening(chosen.plan, probability) if chosen is not None and short else None,
     )
 
 

@@ -6,6 +6,7 @@ made pulses, refined on the true motion and flown in dispersed cases; the margin
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,7 +23,7 @@ from nutdamp.dispersion.study import PROBABILITY, Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
@@ -223,6 +224,21 @@ class _Search:
             near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
         program.forbidden |= ~near
 
+    def _parted(self, found: Sure) -> bool:
+        """Whether burns overlapped, or were too near: each of the two has the time on its side of the middle then."""
+        program, gap, parted = self.program, self.program.spacecraft.limits.gap, False
+        for one, two in itertools.pairwise(found.burns):
+            end, begin = one.t + 0.5 * one.on_time, two.t - 0.5 * two.on_time
+            if begin >= end + gap - TOUCHING or one.channel is two.channel:
+                continue
+            middle = min(max(0.5 * (begin + end), one.t), two.t)
+            aside, half = 0.5 * (gap + program.width), 0.5 * two.on_time + program.width
+            before = program.forbidden.copy()
+            program.forbid(one.channel, middle - aside, max(two.t + half, end + program.width))
+            program.forbid(two.channel, min(one.t - 0.5 * one.on_time, begin) - program.width, middle + aside)
+            parted = parted or bool((before != program.forbidden).any())
+        return parted
+
     def made(self, margin: float) -> Schedule | None:
         """The schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
         allowed = self.program.forbidden.copy()
@@ -234,6 +250,8 @@ class _Search:
                 found = chance.solve(margin)
                 if not found.burns:
                     return None
+                if self._parted(found):
+                    continue
                 broken = next(broken_by(self.program, found.burns), None)
                 if broken is None:
                     break

@@ -26,6 +26,15 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
         "reason": reason,
         "meets_requirement": found.meets_requirement,
+        "tightening": None
+        if found.tightening is None
+        else {
+            "factor": found.tightening.factor,
+            "tolerances": {
+                one.tolerance: {"sigma": one.sigma, "needed": found.tightening.factor * one.sigma}
+                for one in found.tightening.inputs
+            },
+        },
         "against": None if usual is None else _candidate(usual),
         "cost": None
         if found.cost is None

@@ -34,6 +34,7 @@ def robust_screen(found: RobustComparison) -> RenderableType:
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
         Text(verdicts.robust_cost(found)),
+        *(Text(one) for one in filter(None, [verdicts.tightened(found)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"),

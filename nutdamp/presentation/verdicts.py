@@ -328,6 +328,21 @@ def robust_cost(found: RobustComparison) -> str:
     return f"Against {usual.plan.scheme}, recommended for nominal values: {gained}; it takes {spent} and ends {when}."
 
 
+def tightened(found: RobustComparison) -> str:
+    """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
+    from nutdamp.presentation.dispersion_tables import in_words, size_text
+
+    needed, chosen = found.tightening, found.chosen
+    if needed is None or chosen is None:
+        return ""
+    sizes = []
+    for one in needed.inputs:
+        less = size_text(one._replace(size=needed.factor * one.size))
+        sizes.append(f"{in_words(one.tolerance)} {less} instead of {size_text(one)}")
+    level = exact_percent(found.probability)
+    return f"{level} of cases would comply with it, one sigma of {listed(sizes)}."
+
+
 def left_name(spacecraft: Spacecraft) -> str:
     """What a plan is to leave least of."""
     return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
