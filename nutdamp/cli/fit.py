@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.estimation.fit import Fit
+    from nutdamp.estimation.outlook import Outlook
 
 
 @click.command("fit")
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=FILE, help="Write the spacecraft file with the estimates in it.")
 @click.option("--json", type=FILE, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=FILE, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
+@click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
 @quiet_option
 def command(
     telemetry: str,
@@ -36,6 +38,7 @@ def command(
     output: str | None,
     json: str | None,
     plot: str | None,
+    ahead: bool,
     quiet: bool,
 ) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
@@ -70,12 +73,21 @@ def command(
     found = fit(job.spacecraft, record)
     now = carried(found, at)
     job.warn(notes(found, now))
+    prospects = _outlook(found, at, quiet) if ahead else None
     outputs: list[Output] = [
         (output, partial(fitted_text, *job.source, spacecraft.settings, found, now)),
-        (json, partial(fit_json, found, now)),
+        (json, partial(fit_json, found, now, prospects)),
         (plot, partial(_picture, found)),
     ]
-    job.deliver(outputs, partial(fit_screen, found, at))
+    job.deliver(outputs, partial(fit_screen, found, at, prospects))
+
+
+def _outlook(found: Fit, at: float, quiet: bool) -> Outlook:
+    from nutdamp.cli.progress import working
+    from nutdamp.estimation.outlook import outlook
+
+    with working("looking ahead", quiet=quiet):
+        return outlook(found, at)
 
 
 def _picture(found: Fit) -> Figure:

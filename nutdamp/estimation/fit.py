@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
+from nutdamp.estimation import noises
 from nutdamp.estimation.guess import starts
 from nutdamp.estimation.model import Matrix, Model, Vector
-from nutdamp.estimation.record import SUN_PULSE, Record, quantisation
+from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE, Record
 from nutdamp.physics import cones
 from nutdamp.spacecraft import Spacecraft
 
@@ -36,17 +37,11 @@ EVALUATIONS = 60
 ROUNDS = 3
 """Fits in which noise and outliers are found anew."""
 
-NORMAL_MAD = 1.4826
-"""Standard deviation of normal numbers over their median magnitude."""
-
 POOR = 0.3
 """Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""
 
 PARTS = (0.5, 0.25, 0.1, 0.04)
 """Parts of the record that it then begins with."""
-
-ROUNDING = 1e-7
-"""Noise that a signal has at least, as a share of its largest value: no telemetry has more digits."""
 
 SEEN = 4.5
 """Standard deviations of |ω| from which on there is a nutation."""
@@ -57,8 +52,11 @@ UNEQUAL = 5.0
 GROWS = 3.0
 """Standard deviations of κ from which on a body that turns out to have three moments is taken to dissipate."""
 
-TOLD, KEPT = 0.5, 0.9
-"""Share of its prior that a parameter's sigma is below where the data tell it, and above where they do not."""
+KEPT = 0.9
+"""Share of its prior above which a parameter's sigma is where the data do not tell it."""
+
+SHOW_NUTATION = {*GYROS[:2], "axis", ACCELERATION}
+"""Signals one of which there must be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +110,11 @@ class Fit:
             basis, _ = np.linalg.qr(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300))
             held = held - basis @ (basis.T @ held)
         return np.asarray(np.linalg.svd(held, compute_uv=False))
+
+    @cached_property
+    def resolved(self) -> NDArray[np.bool_]:
+        """Of each signal, whether its noise is more than its digits or its steps make anyway."""
+        return np.asarray(self.noise > noises.least(self.model) * (1.0 + 1e-9))
 
     def whiteness(self, signal: int, lags: int = 40) -> Vector:
         """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are below 1.96/√n."""
@@ -167,6 +170,11 @@ def _named(model: Model, values: Iterable[float]) -> dict[str, float]:
 
 def _expect_enough(model: Model) -> None:
     """Raises Infeasible for a record that cannot tell as much as is estimated."""
+    if not SHOW_NUTATION & set(model.signals):
+        raise Infeasible(
+            f"{' and '.join(model.signals)} do not tell the nutation (Sun pulses come once a spin turn); "
+            "omega_1 or omega_2, the axis or an acceleration would"
+        )
     free = sum(math.isinf(one.prior) for one in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
@@ -176,8 +184,6 @@ def _expect_enough(model: Model) -> None:
     period = cones.body_period(body.inertia.A, body.inertia.C, body.spin)
     if set(model.signals) == {"axis"}:
         period = body.inertial_period
-    if set(model.signals) == {SUN_PULSE}:
-        period = 0.0
     if length < 0.5 * period:
         raise Infeasible(
             f"the record is too short: {length:.3g} s are {length / period:.2g} of a nutation period ({period:.3g} s); "
@@ -244,7 +250,7 @@ def _scales(model: Model) -> Vector:
     found = []
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
-        spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+        spread = noises.NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
         found.append(0.1 * spread or {"axis": 1e-3, SUN_PULSE: 0.01 / abs(model.spacecraft.spin)}.get(name, 1e-4))
     return np.array(found)
 
@@ -306,23 +312,30 @@ def _search(
 
 def _settled(model: Model, values: Vector) -> Fit:
     """The last fits: noise and outliers found, then plain least squares over what is no outlier."""
-    floor = _least_noise(model)
-    noise = np.maximum(_robust_noise(model, _residuals(model, values)), floor)
+    floor = noises.least(model)
+    noise = np.maximum(noises.robust(model, _residuals(model, values)), floor)
     every = np.ones(len(model.measured), dtype=bool)
     values, _ = _search(model, values, noise, every, robust=True)
     used = every
     for _ in range(ROUNDS):
         left = _residuals(model, values)
-        noise = np.maximum(_robust_noise(model, left), floor)
+        noise = np.maximum(noises.robust(model, left), floor)
         used = np.abs(left) < OUTLIER * noise[model.signal]
-        noise = np.maximum(_noise(model, left, used), floor)
+        noise = np.maximum(noises.plain(model, left, used), floor)
         values, _ = _search(model, values, noise, used, robust=False)
     left, slopes = _residuals(model, values), _jacobian(model, values)
     for _ in range(ROUNDS):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = _covariance(model, scaled)
-        noise = np.maximum(_noise(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
+        noise = np.maximum(noises.plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
     return Fit(model, values, covariance, noise, used, left, slopes)
+
+
+def estimated(model: Model, values: Vector, noise: Vector) -> Fit:
+    """The fit of a record that has no samples yet: ``values`` as they are, with the covariance that they would have."""
+    slopes, count = _jacobian(model, values), len(model.measured)
+    covariance = _covariance(model, slopes / noise[model.signal, None])
+    return Fit(model, values, covariance, noise, np.ones(count, dtype=bool), np.zeros(count), slopes)
 
 
 def _covariance(model: Model, scaled: Matrix) -> Matrix:
@@ -333,39 +346,6 @@ def _covariance(model: Model, scaled: Matrix) -> Matrix:
     inverse = turned.T / np.maximum(sizes, 1e-13 * sizes[0])
     covariance = inverse @ inverse.T
     return np.asarray(covariance * np.outer(units, units))
-
-
-def _least_noise(model: Model) -> Vector:
-    """Noise that each signal has at least: that of its steps, and rounding."""
-    found = []
-    for index, name in enumerate(model.signals):
-        values = model.measured[model.signal == index]
-        step = model.record.sun_step if name == SUN_PULSE else 0.0 if name == "axis" else quantisation(values)
-        size = {"axis": 1.0, SUN_PULSE: 1.0 / abs(model.spacecraft.spin)}.get(name, float(np.abs(values).max()))
-        found.append(max(step / math.sqrt(12.0), ROUNDING * size))
-    return np.array(found)
-
-
-def _robust_noise(model: Model, left: Vector) -> Vector:
-    """One sigma of each signal by its median magnitude, which outliers hardly change."""
-    return np.array(
-        [NORMAL_MAD * float(np.median(np.abs(left[model.signal == index]))) for index in range(len(model.signals))]
-    )
-
-
-def _noise(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None) -> Vector:
-    """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit takes of each.
-
-    Of n samples with leverages that add up to p the mean of the variance is Σr²/(n - p - 2): that of its posterior,
-    so that regions made with it hold as often as they should.
-    """
-    found, signal = [], model.signal[used]
-    for index in range(len(model.signals)):
-        rows = signal == index
-        spent = 0.0 if leverage is None else float(leverage[rows].sum()) + 2.0
-        total = float(left[used][rows] @ left[used][rows])
-        found.append(math.sqrt(total / max(float(rows.sum()) - spent, 1.0)))
-    return np.array(found)
 
 
 def _shown(found: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:

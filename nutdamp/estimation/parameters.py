@@ -66,7 +66,8 @@ def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
     ratio = of_C[0] / of_A[0]
     if of_A[1] > 0.0 and of_C[1] > 0.0:
         yield Parameter("A", "kg m²", of_A[0], of_A[1], TINY * of_A[0])
-    sigma = ratio * math.hypot(of_A[1] / of_A[0], of_C[1] / of_C[0])
+    both = 2.0 * _together(spacecraft) * of_A[1] / of_A[0] * of_C[1] / of_C[0]
+    sigma = ratio * math.sqrt((of_A[1] / of_A[0]) ** 2 + (of_C[1] / of_C[0]) ** 2 - both)
     yield Parameter(RATIO, "", ratio, sigma or math.inf, TINY * ratio)
 
 
@@ -88,14 +89,23 @@ def prior(spacecraft: Spacecraft, made: Sequence[Parameter]) -> tuple[Matrix, Ve
         row = np.zeros(len(made))
         row[index] = 1.0 / one.prior
         value = one.file / one.prior if math.isfinite(one.prior) else 0.0
-        if one.name == RATIO and "A" in names:  # C = A·(C/A), to first order
-            (A, _), (C, sigma) = _of_moments(spacecraft)
-            row[index], row[names.index("A")] = A / sigma, one.file / sigma
-            value = 2.0 * C / sigma
+        if one.name == RATIO and "A" in names:
+            # What of C = A·(C/A), to first order, A does not tell.
+            (A, of_A), (C, of_C) = _of_moments(spacecraft)
+            both = _together(spacecraft)
+            left = of_C * math.sqrt(1.0 - both * both)
+            row[index], row[names.index("A")] = A / left, (one.file - both * of_C / of_A) / left
+            value = (2.0 * C - both * of_C / of_A * A) / left
         if row.any():
             rows.append(row)
             values.append(value)
     return np.array(rows).reshape(-1, len(made)), np.array(values)
+
+
+def _together(spacecraft: Spacecraft) -> float:
+    """Correlation of A and C by the file."""
+    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    return next((value for first, second, value in pairs if {first, second} == {"A", "C"}), 0.0)
 
 
 def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -9,20 +9,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import Body, Matrix, Values, Vector
 from nutdamp.estimation.parameters import RATIO, in_moments, prior_of
 from nutdamp.physics import attitude
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.spacecraft import SpinState
+from nutdamp.spacecraft import Inertia, Spacecraft, SpinState
+from nutdamp.tolerances import Dispersions, Tolerance
 
 DEG = math.pi / 180.0
 
 UNTOLD, SHARED, TOLD = "file", "both", "data"
 """Where an estimate comes from: the file's tolerances, both, or the data."""
 
-FROM_DATA, FROM_FILE = 0.5, 0.9
+FROM_DATA, FROM_FILE = 0.5, KEPT
 """Share of its prior that a sigma is below where the data tell a value, and above where they do not."""
+
+CORRELATED = 1e-3
+"""Correlations below are left out of files."""
+
+DIGITS = 9
+"""Decimals of correlations in files."""
 
 WORTH_NAMING = 0.9
 """Correlation from which on it is named."""
@@ -79,6 +86,17 @@ class Carried:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def factors(self) -> dict[str, tuple[float, float]]:
+        """Thrust factors and their sigmas by thruster."""
+        rows = zip(self.names, self.values.tolist(), self.sigmas.tolist(), strict=True)
+        return {name.removeprefix("thrust "): (value, sigma) for name, value, sigma in rows if " " in name}
+
+    @property
+    def quaternion(self) -> Vector:
+        """Attitude of the file's axes, (4,), scalar first."""
+        return attitude.multiply(self.state.quaternion, attitude.from_matrix(self.body.axes.T))
+
+    @property
     def correlation(self) -> Matrix:
         """Correlations (k, k); zero with what is exactly known."""
         sigmas = self.sigmas
@@ -116,6 +134,56 @@ def carried(found: Fit, time: float) -> Carried:
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
     return Carried(time, names, inputs(found.named), slopes @ found.covariance @ slopes.T, body, state, tilt)
+
+
+def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
+    """The ``spacecraft`` of the file with moments, motion and attitude of the estimate, and nothing else of it."""
+    return replace(
+        spacecraft,
+        inertia=Inertia(known.body.moments, known.body.axes),
+        omega0=known.state.rates,
+        attitude=None if spacecraft.attitude is None else replace(spacecraft.attitude, quaternion=known.quaternion),
+    )
+
+
+def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
+    """The dispersions of the file, those of what is estimated as they are known now."""
+    sigmas = dict(zip(known.names, known.sigmas.tolist(), strict=True))
+    of_A, of_C = (Tolerance("normal", sigmas[name]) if sigmas[name] > 0.0 else None for name in ("A", "C"))
+    first, second, third = (Tolerance("normal", sigmas[f"omega0_{number}"]) for number in (1, 2, 3))
+    made = given or Dispersions()
+    thrust = {name: Tolerance("normal", sigma / factor, True) for name, (factor, sigma) in known.factors.items()}
+    return replace(
+        made,
+        A=of_A,
+        C=of_C,
+        omega0=(first, second, third),
+        thrust={**made.thrust, **thrust},
+        attitude=made.attitude if known.tilt is None else Tolerance("normal", known.tilt),
+        correlation=correlations(known, given),
+    )
+
+
+def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of inputs and their correlations, rounded as files hold them, and together positive definite.
+
+    Those ``given`` of other inputs stay.
+    """
+    matrix = known.correlation
+    there = [index for index, sigma in enumerate(known.sigmas) if sigma > 0.0]
+    rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(there, there)]
+    apart = rounded - np.diag(np.diag(rounded))
+    made = np.eye(len(there))
+    for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
+        # What is rounded may be impossible by a hair: then all correlations are taken a hair smaller.
+        made = np.eye(len(there)) + np.round(apart * (1.0 - shrunk), DIGITS)
+        if np.linalg.eigvalsh(made)[0] > 0.5 * 10.0**-DIGITS:
+            break
+    names = [known.names[index] for index in there]
+    pairs = [(names[i], names[j], float(made[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
+    others = () if given is None else given.correlation
+    kept = [one for one in others if one[0] not in known.names and one[1] not in known.names]
+    return (*(one for one in pairs if one[2] != 0.0), *kept)
 
 
 def derivatives(found: Fit, function: Callable[[Values], Vector]) -> Matrix:
@@ -218,8 +286,8 @@ def _of_body(found: Fit) -> Iterator[Estimate]:
 
 LABELS = {
     "bias": ("bias of {}", "deg/s", 1.0 / DEG),
-    "misalignment": ("misalignment {} of the gyros", "deg", 1.0 / DEG),
-    "wobble": ("wobble tilt {}", "deg", 1.0 / DEG),
+    "misalignment": ("gyros tilted about {}", "deg", 1.0 / DEG),
+    "wobble": ("axis tilted about {}", "deg", 1.0 / DEG),
     "thrust": ("thrust factor of {}", "", 1.0),
     "delay": ("delay of {}", "ms", 1e3),
 }

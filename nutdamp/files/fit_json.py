@@ -7,12 +7,13 @@ from typing import Any
 
 from nutdamp import __version__
 from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.outlook import Outlook
 from nutdamp.estimation.results import Carried, Estimate, estimates
 from nutdamp.files.plan_json import spacecraft_json
 
 
-def fit_json(found: Fit, carried: Carried) -> dict[str, Any]:
-    """Estimates with sigmas, what the file says, the signals, and the covariance of what dispersions draw."""
+def fit_json(found: Fit, carried: Carried, ahead: Outlook | None = None) -> dict[str, Any]:
+    """Estimates with sigmas, what the file says, the signals, the covariance of what dispersions draw; prospects."""
     model = found.model
     return {
         "nutdamp": __version__,
@@ -45,6 +46,28 @@ def fit_json(found: Fit, carried: Carried) -> dict[str, Any]:
             "sigmas_SI": carried.sigmas.tolist(),
             "correlation": carried.correlation.tolist(),
         },
+        "next": None if ahead is None else _outlook(ahead),
+    }
+
+
+def _outlook(ahead: Outlook) -> dict[str, Any]:
+    longer, probe = ahead.longer, ahead.probe
+    return {
+        "scheme": ahead.scheme,
+        "longer_coast_s": None if longer is None else longer.length,
+        "probe": None if probe is None else probe.probe,
+        "prospects": [
+            {
+                "coast_s": one.length,
+                "probe": one.probe or None,
+                "on_time_s": one.on_time,
+                "sigma_C_over_A": one.ratio,
+                "sigma_thrust": one.thrust,
+                "nutation_99.7_deg": math.degrees(one.nutation),
+                "met_fraction": one.met,
+            }
+            for one in (*ahead.coasts, *ahead.probes)
+        ],
     }
 
 

@@ -14,24 +14,18 @@ import numpy as np
 
 from nutdamp.epoch import Epoch
 from nutdamp.estimation.fit import Fit
-from nutdamp.estimation.results import Carried
+from nutdamp.estimation.results import DIGITS, Carried, correlations, replaced
 from nutdamp.files.sections import KeyPath
 from nutdamp.files.settings import Setting
 from nutdamp.files.yaml_edit import edited
 from nutdamp.files.yaml_tree import Node, read_tree
 from nutdamp.physics import attitude, cones
-from nutdamp.spacecraft import Attitude, Inertia, Spacecraft
+from nutdamp.spacecraft import Spacecraft
 from nutdamp.tolerances import Tolerance
 from nutdamp.units import parse
 
 SEEN = 3.0
 """Standard deviations from which on a growth of the nutation, or a delay, counts as seen."""
-
-CORRELATED = 1e-3
-"""Correlations below are left out."""
-
-DIGITS = 9
-"""Decimals of the correlations."""
 
 Edits = Iterator[tuple[KeyPath, str]]
 
@@ -47,7 +41,7 @@ def fitted_text(text: str, name: str, settings: Sequence[Setting], found: Fit, c
         value = setting.value if isinstance(setting.value, str) else _flow(setting.node()[0].plain())
         text = edited(text, {_positions(tree, setting.path): value or "null"})
     tree = read_tree(text, name)[0]
-    made = replaced(found, carried)
+    made = replaced(found.model.spacecraft, carried)
     values = dict(_edits(tree, found, carried, made))
     rename = {"state": "omega0"} if ("state",) in values else {}
     return edited(text, values, rename)
@@ -73,17 +67,6 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
         yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
     if body.tank is not None and len(found.model.record.schedule):
         yield "tank.propellant is that before the pulses of the schedule"
-
-
-def replaced(found: Fit, carried: Carried) -> Spacecraft:
-    """The spacecraft of the file with the motion and the moments of the estimate."""
-    body = carried.body
-    return replace(
-        found.model.spacecraft,
-        inertia=Inertia(body.moments, body.axes),
-        omega0=carried.state.rates,
-        attitude=None if found.model.spacecraft.attitude is None else Attitude(_quaternion(carried)),
-    )
 
 
 def _edits(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
@@ -134,16 +117,11 @@ def _motion(tree: Node, carried: Carried, made: Spacecraft) -> Edits:
 def _attitude(tree: Node, found: Fit, carried: Carried) -> Edits:
     if tree.get("attitude") is None:
         return
-    yield ("attitude", "quaternion"), "[" + ", ".join(_number(part) for part in _quaternion(carried)) + "]"
+    yield ("attitude", "quaternion"), "[" + ", ".join(_number(part) for part in carried.quaternion) + "]"
     given = found.model.spacecraft.attitude
     if given is not None and given.epoch is not None and carried.time != 0.0:
         zone = "Z" if tree.get("attitude", "epoch") is not None else ""
         yield ("attitude", "epoch"), f"{Epoch.parse(given.epoch).plus(carried.time).text}{zone}"
-
-
-def _quaternion(carried: Carried) -> np.ndarray:
-    """Attitude of the file's axes, scalar first."""
-    return attitude.multiply(carried.state.quaternion, attitude.from_matrix(carried.body.axes.T))
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
@@ -175,18 +153,9 @@ def _goal(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
     yield ("goal", "azimuth"), _as_before(tree.get("goal", "azimuth"), azimuth, "angle", "deg")
 
 
-def _factors(carried: Carried) -> dict[str, tuple[float, float]]:
-    """Thrust factor and its sigma by thruster."""
-    return {
-        name.removeprefix("thrust "): (float(value), float(sigma))
-        for name, value, sigma in zip(carried.names, carried.values, carried.sigmas, strict=True)
-        if name.startswith("thrust ")
-    }
-
-
 def _thrusts(tree: Node, carried: Carried) -> Edits:
     """Force or torque of the thrusters times their factors."""
-    factors = _factors(carried)
+    factors = carried.factors
     entries = tree.get("thrusters")
     for index, _ in entries.children() if entries is not None else ():
         name = tree.get("thrusters", index, "name")
@@ -213,7 +182,7 @@ def _dispersions(found: Fit, carried: Carried) -> Edits:
             yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
     rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
     yield ("dispersions", "omega0"), f"[{rates}]"
-    factors, given = _factors(carried), found.model.spacecraft.dispersions
+    factors, given = carried.factors, found.model.spacecraft.dispersions
     if factors:
         before = {} if given is None else given.thrust
         parts = [f"{_quoted(name)}: {_tolerance(one)}" for name, one in before.items() if name not in factors]
@@ -223,28 +192,10 @@ def _dispersions(found: Fit, carried: Carried) -> Edits:
         yield ("dispersions", "thrust"), "{" + ", ".join(parts) + "}"
     if carried.tilt is not None:
         yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
-    pairs = list(correlations(carried))
+    pairs = correlations(carried, given)
     if pairs:
         rows = ", ".join(f"[{_quoted(one)}, {_quoted(other)}, {value:.{DIGITS}f}]" for one, other, value in pairs)
         yield ("dispersions", "correlation"), f"[{rows}]"
-
-
-def correlations(carried: Carried) -> Iterator[tuple[str, str, float]]:
-    """Pairs of inputs and their correlations as the file holds them: rounded, and together positive definite."""
-    matrix = carried.correlation
-    known = [index for index, sigma in enumerate(carried.sigmas) if sigma > 0.0]
-    rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(known, known)]
-    np.fill_diagonal(rounded, 1.0)
-    apart = rounded - np.eye(len(known))
-    for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
-        # What is rounded may be impossible by a hair: then all correlations are taken a hair smaller.
-        made = np.eye(len(known)) + np.round(apart * (1.0 - shrunk), DIGITS)
-        if np.linalg.eigvalsh(made)[0] > 0.5 * 10.0**-DIGITS:
-            break
-    for at, first in enumerate(known):
-        for other in range(at + 1, len(known)):
-            if made[at, other] != 0.0:
-                yield carried.names[first], carried.names[known[other]], float(made[at, other])
 
 
 def _tolerance(one: Tolerance) -> str:

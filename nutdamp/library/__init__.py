@@ -21,6 +21,8 @@ from nutdamp.library.calls import plan as plan
 from nutdamp.library.craft import example as example
 from nutdamp.library.craft import load as load
 from nutdamp.library.craft import read as read
+from nutdamp.library.fits import Fitted as Fitted
+from nutdamp.library.fits import fit as fit
 from nutdamp.library.reports import Report as Report
 from nutdamp.library.reports import report as report
 from nutdamp.library.studies import Budget as Budget

@@ -10,10 +10,11 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.outlook import Outlook
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import SHARED, TOLD, Estimate, correlated, estimates
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, sentence
+from nutdamp.presentation.text import MISSING, degrees, sentence
 
 SHOWN = {
     "axis": ("deg", 180.0 / math.pi),
@@ -25,19 +26,54 @@ SHOWN = {
 FAR = 4.0
 """Sigmas of the file from which on a change is remarked upon."""
 
+NOTHING = 1e-3
+"""Sigmas below which a value, or a change, is zero."""
+
 MOST_PAIRS = 6
 """Correlations that are named."""
 
 SOURCES = {TOLD: "data", SHARED: "both", "file": "file"}
 
 
-def fit_screen(found: Fit, time: float) -> RenderableType:
-    """Everything that ``fit`` shows; the motion is that at ``time`` s."""
+def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> RenderableType:
+    """Everything that ``fit`` shows; the motion is that at ``time`` s, ``ahead`` what more telemetry would give."""
     rows = estimates(found, time)
     parts: list[RenderableType] = [Text(found.model.spacecraft.name, style="bold"), Text(), _record(found), Text()]
     parts += [Text(f"Estimates; the motion is that at t = {time:g} s", style="bold"), _table(rows), Text()]
     parts += [Text(sentence(line)) for line in told(found, rows)]
+    if ahead is not None:
+        parts += [Text(), _prospects(ahead), Text(), *(Text(sentence(line)) for line in advice(ahead))]
     return Group(*parts)
+
+
+def _prospects(ahead: Outlook) -> Table:
+    """A row for each coast and probe pulse that was looked at."""
+    table = columns(
+        "coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", "nutation\n99.7 %, deg", "comply\n%"
+    )
+    for one in (*ahead.coasts, *ahead.probes):
+        probe = f"{one.probe}, {one.on_time:.3g} s" if one.probe else MISSING
+        thrust = f"{100.0 * one.thrust:.2g} %" if one.probe else MISSING
+        met = MISSING if one.met is None else f"{100.0 * one.met:.4g}"
+        length = f"{one.length:.4g}" + " (now)" * (one is ahead.now)
+        table.add_row(length, probe, f"{one.ratio:.2g}", thrust, f"{math.degrees(one.nutation):.3g}", met)
+    return table
+
+
+def advice(ahead: Outlook) -> Iterator[str]:
+    """Whether more telemetry would pay: clauses."""
+    now, longer, probe = ahead.now, ahead.longer, ahead.probe
+    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in 99.7 % of cases"
+    if longer is None:
+        last = ahead.coasts[-1]
+        yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"
+    else:
+        yield f"{today}; a coast of {longer.length:.4g} s would leave {degrees(longer.nutation)}: it pays"
+    if probe is not None:
+        pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
+        yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
+    elif ahead.probes:
+        yield "no single probe pulse of a channel of the plan pays"
 
 
 def in_shown(signal: str) -> tuple[str, float]:
@@ -58,8 +94,10 @@ def _record(found: Fit) -> Table:
         unit, factor = in_shown(name)
         count, out = int(rows.sum()), int((rows & ~found.used).sum())
         left = f", {out} outliers left out" if out else ""
-        white = "white" if found.white(index) else "NOT white: the sigmas are too small"
-        table.add_row(name, f"{count} samples{left}; noise {found.noise[index] * factor:.3g} {unit}, residuals {white}")
+        white = ", residuals white" if found.white(index) else ", residuals NOT white: the sigmas are too small"
+        if not found.resolved[index]:
+            white = ", the least that its digits or steps allow"
+        table.add_row(name, f"{count} samples{left}; noise {found.noise[index] * factor:.3g} {unit}{white}")
     return table
 
 
@@ -74,8 +112,9 @@ def _table(rows: tuple[Estimate, ...]) -> Table:
     for one in rows:
         digits = _digits(one)
         file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
-        change = MISSING if one.change is None else f"{one.change:+.2g}"
-        value, sigma = f"{one.value * one.factor:.{digits}g}", f"{one.sigma * one.factor:.2g}"
+        change = MISSING if one.change is None else f"{one.change:+.2g}" if abs(one.change) > NOTHING else "0"
+        shown = one.value if abs(one.value) > NOTHING * one.sigma else 0.0
+        value, sigma = f"{shown * one.factor:.{digits}g}", f"{one.sigma * one.factor:.2g}"
         table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
     return table
 

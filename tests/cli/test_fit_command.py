@@ -127,3 +127,55 @@ def test_settings_become_part_of_the_file(run: Run, tmp_path: Path) -> None:
     now = nutdamp.load(tmp_path / "now.yaml")
     assert now.limits.horizon == 90.0
     assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -12.0, 0.0])
+
+
+def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 6)
+    done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", columns=100)
+    assert done.returncode == 0, done.stderr
+    ahead = json.loads((tmp_path / "f.json").read_text())["next"]
+    coasts = [one for one in ahead["prospects"] if one["probe"] is None]
+    assert [one["coast_s"] for one in coasts] == pytest.approx([15.0, 30.0, 60.0, 120.0, 240.0])
+    # C/A is told to the bias of the third gyro by any of them, and the nutation that is left comes from the thrust.
+    assert ahead["longer_coast_s"] is None
+    said = " ".join(done.stdout.split())
+    assert "a coast of 240 s would leave" in said
+    assert "it does not pay" in said
+    probes = [one for one in ahead["prospects"] if one["probe"] is not None]
+    assert ahead["probe"] in {one["probe"] for one in probes}
+    assert f"One probe pulse of {ahead['probe']}" in said
+    now = coasts[2]["nutation_99.7_deg"]
+    assert min(one["nutation_99.7_deg"] for one in probes) < 0.9 * now
+    # 2 % of thrust becomes what is left of it beside A, whose scale no record tells.
+    assert all(0.0035 < one["sigma_thrust"] < 0.006 for one in probes)
+
+
+def test_the_prospect_of_the_record_as_it_is_agrees_with_its_fit(tmp_path: Path) -> None:
+    flight(tmp_path, 7)
+    found = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
+    sigma = next(one.sigma for one in found.estimates() if one.key == "C/A")
+    assert found.outlook(90.0).now.ratio == pytest.approx(sigma, rel=0.02)
+
+
+def test_the_library_gives_the_same_file(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 8)
+    assert run("fit", "flight.csv", "-q", "-o", "now.yaml", "--at", "80s", "--json", "f.json").returncode == 0
+    found = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
+    assert found.text(80.0) == (tmp_path / "now.yaml").read_text()
+    assert json.loads(json.dumps(found.to_dict(80.0))) == json.loads((tmp_path / "f.json").read_text())
+    assert found.spacecraft(80.0).omega0 == pytest.approx(nutdamp.load(tmp_path / "now.yaml").omega0, rel=1e-12)
+    with pytest.raises(nutdamp.errors.BadRequest, match="no field replaced"):
+        nutdamp.fit(tmp_path / "flight.csv", nutdamp.example().replace(mass=200.0)).text()
+
+
+def test_a_fitted_file_is_fitted_again_with_what_was_known(run: Run, tmp_path: Path) -> None:
+    """The second fit adds to the first: A keeps the sigma that two tolerances and the ratio leave it."""
+    flight(tmp_path, 9)
+    assert run("fit", "flight.csv", "-q", "-o", "now.yaml").returncode == 0
+    first = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
+    again = nutdamp.fit(tmp_path / "flight.csv", nutdamp.load(tmp_path / "now.yaml"))
+    one, other = ({row.key: row for row in found.estimates()} for found in (first, again))
+    assert one["A"].sigma == pytest.approx(0.005 * 120.0 / math.sqrt(2.0), rel=0.02)
+    assert other["A"].sigma == pytest.approx(one["A"].sigma, rel=0.01)
+    assert other["A"].value == pytest.approx(one["A"].value, abs=0.05 * one["A"].sigma)
+    assert other["C/A"].sigma == pytest.approx(one["C/A"].sigma / math.sqrt(2.0), rel=0.05)

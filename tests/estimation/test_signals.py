@@ -230,6 +230,11 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
         fit(body, record(body, np.array([0.0, 9.0])))
 
 
+def test_sun_pulses_alone_are_not_taken_for_a_nutation() -> None:
+    with pytest.raises(Infeasible, match="sun_pulse do not tell the nutation .*the axis or an acceleration would"):
+        fit(nutdamp.load(FILE), Record(np.empty(0), {}, 2.0944 * np.arange(1.0, 60.0)))
+
+
 def test_signals_need_what_explains_them_in_the_file() -> None:
     plain = nutdamp.load({name: FILE[name] for name in ("name", "inertia", "state")})
     times = np.linspace(0.0, 60.0, 100)
