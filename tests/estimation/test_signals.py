@@ -231,7 +231,7 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
 
 
 def test_sun_pulses_alone_are_not_taken_for_a_nutation() -> None:
-    with pytest.raises(Infeasible, match="sun_pulse do not tell the nutation .*the axis or an acceleration would"):
+    with pytest.raises(Infeasible, match=r"sun_pulse do not tell the nutation .*the axis or an acceleration would"):
         fit(nutdamp.load(FILE), Record(np.empty(0), {}, 2.0944 * np.arange(1.0, 60.0)))
 
 
