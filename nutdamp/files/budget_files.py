@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from nutdamp import __version__
@@ -42,6 +43,14 @@ def _numbers(held: Held) -> tuple[float | None, ...]:
     return (*map(math.degrees, held.thresholds), held.begins, *made, *bounds, lasts)
 
 
+def _other(held: Held) -> dict[str, float | None] | None:
+    """The second limit cycle, where there is one."""
+    if held.other is None:
+        return None
+    made = dict(zip(HEADER, _numbers(replace(held, cycle=held.other)), strict=True))
+    return {name: made[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
+
+
 def budget_csv(found: Budget) -> str:
     """One row for each two thresholds; what is not known stays empty."""
     rows = ([*(number(value) for value in _numbers(one)), truth(one.meets_requirement), one.why] for one in found.held)
@@ -61,7 +70,7 @@ def budget_json(found: Budget) -> dict[str, Any]:
         "meets_requirement": found.meets_requirement,
         "thresholds": [
             dict(zip(HEADER, _numbers(one), strict=True))
-            | {"meets_requirement": one.meets_requirement, "why": one.why or None}
+            | {"meets_requirement": one.meets_requirement, "why": one.why or None, "other": _other(one)}
             for one in found.held
         ],
     }

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.loop.cycles import Cycle, Map
+from nutdamp.loop.chains import Cycle
+from nutdamp.loop.cycles import Map
 from nutdamp.loop.stability import Band, dead_band, feeding, margins, too_late
 from nutdamp.loop_settings import Loop
 from nutdamp.spacecraft import Spacecraft
@@ -19,6 +20,9 @@ from nutdamp.spacecraft import Spacecraft
 DAY = 86400.0
 YEAR = 365.25 * DAY
 """s."""
+
+DIFFERENT = 0.3
+"""Share of the pulses by which one limit cycle differs from another."""
 
 STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
 """Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.
@@ -37,6 +41,8 @@ class Thresholds(NamedTuple):
 class Held:
     """The nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
 
+    It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
+
     ``begins`` s is when the loop first fires, ``band`` what the sensor and the smallest pulse allow, ``lasts`` s how
     long the propellant in the tank is enough for the limit cycle, None where that is not known.
     """
@@ -46,6 +52,7 @@ class Held:
     begins: float
     band: Band | None = None
     cycle: Cycle | None = None
+    other: Cycle | None = None
     lasts: float | None = None
     why: str = ""
 
@@ -147,10 +154,29 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
     try:
         found = replace(found, band=dead_band(body, loop))
         _expect_damping(body, loop)
-        found = replace(found, cycle=Map(body, loop, seed=seed).cycle())
+        cycle, *others = _attractors(body, loop, Map(body, loop, seed=seed))
+        found = replace(found, cycle=cycle, other=others[0] if others else None)
         return replace(found, lasts=_lasts(body, loop, seed))
     except Infeasible as reason:
         return replace(found, why=str(reason))
+
+
+def _attractors(body: Spacecraft, loop: Loop, made: Map) -> list[Cycle]:
+    """The limit cycle that the loop falls into from the nutation of the file, and others that differ from it.
+
+    There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
+    """
+    band, law = dead_band(body, loop), made.law
+    if not 0.5 * band.step > loop.stop > 0.0:
+        return [made.cycle()]
+    now = complex(law.seen(body.initial.omega))
+    starts = [now] * (body.nutation >= loop.start) + [None, complex(law.size(0.5 * band.step, body.spin))]
+    found: list[Cycle] = []
+    for z in starts:
+        for one in made.attractors(z=z):
+            if all(abs(one.pulses - each.pulses) > DIFFERENT * each.pulses for each in found):
+                found.append(one)
+    return found
 
 
 def _expect_damping(body: Spacecraft, loop: Loop) -> None:
@@ -169,7 +195,7 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
         return None
     mass, total = body.tank.propellant, 0.0
     for share, weight in STAGES:
-        rate = Map(body, loop, used=share * mass, seed=seed).cycle().propellant
+        rate = _attractors(body, loop, Map(body, loop, used=share * mass, seed=seed))[0].propellant
         if rate is None:
             return None
         total += weight / rate

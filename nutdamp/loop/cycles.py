@@ -8,14 +8,14 @@ worked out one by one. Many cycles are followed side by side, from random phases
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
 from nutdamp.limits import commandable
+from nutdamp.loop.chains import ADDED, Chains, Cycle, Rows, Sums
 from nutdamp.loop.law import Actuator, ComplexArray, Law
 from nutdamp.loop.odds import FARTHEST, Odds
 from nutdamp.loop.transfer import transfer
@@ -64,63 +64,6 @@ TOO_FAST = "the nutation grows faster than the firings damp it"
 REFINED = 4
 """Steps in which the moment of a firing is found on a continuous signal."""
 
-Rows = NDArray[np.int64]
-
-
-class Cycle(NamedTuple):
-    """What goes on in the limit cycle; rates are 1/s.
-
-    ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
-    kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
-    ``high`` as firings begin (mean), ``low`` as they have ended (geometric mean), of each cycle, and the ``largest``.
-    """
-
-    pulses: float
-    cycles: float
-    impulse: float
-    propellant: float | None
-    spin_rate: float
-    doubt: float
-    high: float
-    low: float
-    largest: float
-
-
-class Sums(NamedTuple):
-    """What a chain has added up by a moment: time (s) of the last pulse, and its largest and last |z|, rad/s."""
-
-    time: float = 0.0
-    pulses: float = 0.0
-    impulse: float = 0.0
-    propellant: float = 0.0
-    spin: float = 0.0
-    cycles: float = 0.0
-    largest: float = 0.0
-    last: float = 0.0
-
-
-ADDED = 6
-"""Columns of `Sums` of which differences count."""
-
-
-@dataclass(eq=False)
-class _Chains:
-    """Where each chain is: z at the sample ``number``, what its channels waited before, the noise of its samples.
-
-    ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
-    """
-
-    z: ComplexArray
-    number: Rows
-    active: NDArray[np.bool_]
-    fresh: NDArray[np.bool_]
-    ready: Vector
-    carried: Vector
-    white: ComplexArray
-    sums: list[Sums]
-    firings: list[list[Sums]]
-    cycles: list[list[Sums]]
-
 
 class Map:
     """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant gone.
@@ -143,6 +86,7 @@ class Map:
         self.near = self._near()
         reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
         acts = [abs(one.kick) * abs(math.sin(half * one.shortest)) / half for one in self.law.actuators]
+        self.smallest = min(acts)
         self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
         self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
         self.memory = len(self.seen.weights) if len(self.seen.weights) > 1 else 0
@@ -151,14 +95,36 @@ class Map:
     def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
         """The limit cycle; raises Infeasible where the loop does not hold the nutation."""
         at = self._begin(chains)
-        enough, going = SETTLING + cycles, np.ones(chains, dtype=bool)
+        self._follow(at, SETTLING + cycles, FIRINGS)
+        return self._summed(at)
+
+    def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
+        """The limit cycles that chains come to, by how many do: with pauses, and without.
+
+        They begin as for `cycle`, or fire already at ``z`` rad/s. Raises Infeasible as that does.
+        """
+        at = self._begin(chains)
+        if z is not None:
+            self.bound = max(self.bound, 1.1 * abs(z))
+            at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
+        # Until each has paused or fires on at the same size.
+        self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
+        at.sums = [one._replace(pulses=0.0, cycles=0.0) for one in at.sums]
+        at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
+        self._follow(at, SETTLING + CYCLES, FIRINGS)
+        parts = [[row for row, one in enumerate(at.cycles) if bool(one) is pauses] for pauses in (True, False)]
+        return tuple(self._summed(at.some(part)) for part in sorted(parts, key=len, reverse=True) if part)
+
+    def _follow(self, at: Chains, cycles: int, firings: int) -> None:
+        """Every chain until it has paused more than so many times, or fired so often."""
+        going = np.ones(len(at.z), dtype=bool)
         for _ in range(MOST_STEPS):
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
-            going = np.array([one.cycles <= enough and one.pulses < FIRINGS for one in at.sums])
+            going = np.array([one.cycles <= cycles and one.pulses < firings for one in at.sums])
             if not going.any():
-                return self._summed(at)
+                return
         raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
 
     def _near(self) -> float | None:
@@ -176,7 +142,7 @@ class Map:
         )
         return first if math.log(last / first) / (self.turn.real * seen.step) < LONGEST else None
 
-    def _begin(self, count: int) -> _Chains:
+    def _begin(self, count: int) -> Chains:
         """Coasts at half the start threshold, in random phases."""
         z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
         number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
@@ -184,7 +150,7 @@ class Map:
         firings: list[list[Sums]] = [[] for _ in range(count)]
         cycles: list[list[Sums]] = [[] for _ in range(count)]
         sums, white = [Sums() for _ in range(count)], self._drawn(count)
-        return _Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
+        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
 
     def _drawn(self, rows: int) -> ComplexArray:
         return self.seen.drawn(self.rng, rows, len(self.seen.weights))
@@ -193,7 +159,7 @@ class Map:
         """`Law.waits` of all channels, (channels, ...)."""
         return self.watch.waits(seen, np.full(seen.shape, self.spin))
 
-    def _goes(self, at: _Chains, rows: Rows, samples: Rows) -> None:
+    def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
         """Coasts go on by so many samples, and the noise of those before is forgotten."""
         at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
         at.number[rows] += samples
@@ -205,7 +171,7 @@ class Map:
         found = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
         return np.asarray(np.ceil(found - SAMPLED), dtype=np.int64)
 
-    def _wake(self, at: _Chains, rows: Rows) -> None:
+    def _wake(self, at: Chains, rows: Rows) -> None:
         """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
         now = np.abs(at.z[rows])
         if (now <= FARTHEST * self.start).any():
@@ -227,7 +193,7 @@ class Map:
                 )
                 at.white[row] += self.seen.change(at.white[row], mean / abs(mean), more * self.seen.sigma)
 
-    def _skip(self, at: _Chains, rows: Rows) -> None:
+    def _skip(self, at: Chains, rows: Rows) -> None:
         """Over the samples in which no channel can come to fire: to the first that may, or to a pause."""
         size, mean = np.abs(at.z[rows]), self.seen.mean(at.z[rows])
         waits = self._waits(mean)
@@ -258,7 +224,7 @@ class Map:
         """How long before its start a firing is decided on, s."""
         return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
 
-    def _look(self, at: _Chains, rows: Rows) -> None:
+    def _look(self, at: Chains, rows: Rows) -> None:
         """The next samples one by one, up to the first event of each."""
         step = self.seen.step
         count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
@@ -287,7 +253,7 @@ class Map:
             at.white[row] = white[index, passed : passed + white.shape[1] - count]
             at.carried[:, row], at.fresh[row] = waits[:, index, passed - 1], False
 
-    def _fires(self, at: _Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
+    def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
         """Whether one of the moments at which a channel comes to fire leads to a firing, and that firing."""
         for moment in np.flatnonzero(fires.any(axis=0)).tolist():
             time = (int(at.number[row]) + moment) * self.seen.step
@@ -318,7 +284,7 @@ class Map:
         made = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
         return start, firing.lasts, made if made.command is None else commandable(self.truth, made), actuator
 
-    def _fire(self, at: _Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
+    def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
         """The motion through a pulse, and on to the first estimate after it."""
         made = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
         level = made.magnitude / pulse.magnitude
@@ -363,7 +329,7 @@ class Map:
             self.shapes[key] = shape_factor(rate, self.spin, actuator.spin_rate, moved, 0.0, self.law.growth)
         return self.shapes[key]
 
-    def _rest(self, at: _Chains, row: int) -> None:
+    def _rest(self, at: Chains, row: int) -> None:
         """A cycle is over, if anything was fired in it: what it has added up is noted."""
         sums = at.sums[row]
         if sums.largest > 0.0:
@@ -371,7 +337,7 @@ class Map:
             at.cycles[row].append(sums)
             at.sums[row] = sums._replace(largest=0.0)
 
-    def _summed(self, at: _Chains) -> Cycle:
+    def _summed(self, at: Chains) -> Cycle:
         """Of all chains, between the first and the last cycle, or firing, that counts."""
         if all(len(one) >= SETTLING + FEW for one in at.cycles):
             counted = [one[SETTLING:] for one in at.cycles]

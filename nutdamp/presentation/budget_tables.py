@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.loop.budget import DAY, YEAR, Budget, Held
+from nutdamp.loop.chains import Cycle
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.loop_tables import described, warnings
 from nutdamp.presentation.plan_tables import header
@@ -74,6 +75,10 @@ def _warnings(found: Budget) -> Iterator[str]:
         said = [one.why] if one.why else list(warnings(replace(body, loop=pair)))
         if one.cycle is not None and one.cycle.cycles == 0.0:
             said.append("the loop never falls quiet: it fires whenever a channel comes into line")
+            if loop.sensor.noise == 0.0 and loop.stop > 0.0:
+                said.append("without noise the number of its pulses is known to a factor of two only")
+        if one.other is not None and one.cycle is not None:
+            said.append(_second(one.cycle, one.other))
         for text in said:
             if text not in seen:
                 seen.add(text)
@@ -84,6 +89,15 @@ def _warnings(found: Budget) -> Iterator[str]:
         yield f"the spin changes by up to {100.0 * worst:.3g} % a day: the figures are those of the present spin"
     if body.disturbances and found.held:
         yield "disturbances of the file are left out"
+
+
+def _second(cycle: Cycle, other: Cycle) -> str:
+    """That there is another limit cycle, and what it takes."""
+    kept, takes = ("falls quiet between firings" if one.cycles > 0.0 else "never falls quiet" for one in (cycle, other))
+    yearly = None if other.propellant is None else other.propellant * YEAR
+    takes += f", with {other.pulses * DAY:.4g} pulses a day"
+    takes += "" if yearly is None else f" and {quantity(yearly, 'kg')} a year"
+    return f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
 
 
 def _pair(one: Held) -> str:

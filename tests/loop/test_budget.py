@@ -12,7 +12,8 @@ from builders import channel, spinner
 import nutdamp
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.budget import DAY, YEAR, Thresholds, budget, reached
-from nutdamp.loop.cycles import Cycle, Map
+from nutdamp.loop.chains import Cycle
+from nutdamp.loop.cycles import Map
 from nutdamp.loop.law import Law
 from nutdamp.loop.odds import Odds
 from nutdamp.loop.run import fly
@@ -128,6 +129,23 @@ def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
     body, made = craft(channels=four(6.0, 0.1)), loop(gyro(), start=rad(1.0), stop=0.0)
     cycle = Map(body, made).cycle()
     assert cycle.high == pytest.approx(0.5 * math.atan(6.0 * 0.1 / (80.0 * 3.0)), rel=0.05)
+
+
+@pytest.mark.parametrize(("degrees", "pauses"), [(2.0, True), (2.07, False)])
+def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(degrees: float, pauses: bool) -> None:
+    """Pulses all alike, half of each above stop: what is left of the first nutation decides whether it ever pauses."""
+    made = loop(gyro(noise=rad(0.002)), law=BANG, on_time=0.1, start=rad(1.0), stop=rad(0.02))
+    body = replace(craft(tau=1000.0, channels=four(least=0.1), degrees=degrees), loop=made)
+    (held,) = budget(body).held
+    assert held.cycle is not None
+    assert held.other is not None
+    assert (held.cycle.cycles > 0.0, held.other.cycles > 0.0) == (pauses, not pauses)
+    run = fly(body, made, 3000.0, seed=2)
+    assert bool(run.quiet) is pauses
+    if not pauses:
+        later = sum(one.pulse.t > 1000.0 for one in run.fired)
+        assert held.cycle.pulses == pytest.approx(later / 2000.0, rel=0.02)
+        assert held.other.pulses < 0.01 * held.cycle.pulses
 
 
 def test_dissipation_slows_the_spin_as_in_flight() -> None:
