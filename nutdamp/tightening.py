@@ -38,10 +38,10 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
 
     None where enough do, or do not with the `MOST` of them exactly known.
     """
-    body, study = plan.spacecraft, study_of(plan.spacecraft, plan.pulses)
-    if body.dispersions is None or not compliance.required(body):
+    body, given = plan.spacecraft, plan.spacecraft.dispersions
+    if given is None or not compliance.required(body):
         return None
-    given = body.dispersions
+    study = study_of(body, plan.pulses)
 
     def complying(names: Iterable[str], factor: float) -> bool:
         changed = replace(body, dispersions=scaled(given, names, factor))
