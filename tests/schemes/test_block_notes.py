@@ -17,8 +17,9 @@ from nutdamp.outcome import left_by
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
-from nutdamp.schemes.command_block import FLOWN, Flown, Found, Search
+from nutdamp.schemes.command_block import Flown, Search
 from nutdamp.schemes.tools.block_model import BlockModel, Trial
+from nutdamp.schemes.tools.block_search import FLOWN, Found
 from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Limits, Requirement, Spacecraft
 from nutdamp.supply import Supply

@@ -13,13 +13,14 @@ import functools
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nutdamp.compliance import Left
 from nutdamp.errors import Infeasible
+from nutdamp.flight import Flight
 from nutdamp.physics import sun_train
 from nutdamp.physics.valve import Valve, spread
 from nutdamp.schemes.tools.sun_pulses import first_sun_pulse, spin_turn
@@ -92,6 +93,11 @@ class State:
     used: Any = 0.0
     cost: Any = 0.0
     fired: Mapping[str, Any] = field(default_factory=Counter)
+
+    def shifted(self, off: State) -> State:
+        """The same, with H, the nutation and the spin ``off`` by so much."""
+        here = replace(self, sun_angle=self.sun_angle + off.sun_angle, longitude=self.longitude + off.longitude)
+        return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
 
     def at(self, index: tuple[Any, ...], shape: tuple[int, ...]) -> State:
         """That of one of many, which have a ``shape``."""
@@ -252,6 +258,19 @@ class BlockModel:
             used=used,
             cost=state.cost + channel.cost_rate(by_propellant=True) * (full * given.on_time),
             fired={**state.fired, channel.name: state.fired.get(channel.name, 0) + trial.count},
+        )
+
+    def apart(self, state: State, flown: Flight) -> State:
+        """By how much the motion as it was ``flown`` is off ``state``, to be added to the states of other blocks."""
+        end, rate = flown.settled, self.rate * flown.settled.spin
+        axis = self._frame @ flown.final.momentum
+        since = float(state.sun_pulse) - flown.schedule.end
+        return State(
+            sun_angle=math.atan2(math.hypot(axis[0], axis[1]), axis[2]) - state.sun_angle,
+            longitude=(math.atan2(axis[1], axis[0]) - state.longitude + math.pi) % (2.0 * math.pi) - math.pi,
+            phasor=self.inertia.A * end.omega * cmath.exp(-1j * rate * since) - state.phasor,
+            sun_pulse=0.0,
+            spin=end.spin - state.spin,
         )
 
     def left(self, state: State) -> Left:

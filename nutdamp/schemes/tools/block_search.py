@@ -1,0 +1,329 @@
+"""The search for command blocks in closed form: which there are, and the best few of up to so many in a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import compliance, work
+from nutdamp.commands import Block, Commands
+from nutdamp.compliance import Part
+from nutdamp.limits import Windows, commandable_widths
+from nutdamp.schemes.tools.block_model import BlockModel, State, Trial, acts, evenly
+from nutdamp.spacecraft import Channel, Spacecraft
+
+Array = NDArray[np.float64]
+
+FLOWN = 12
+"""Sequences of blocks that are flown; as many more where none of them complies."""
+
+GENTLE = 10
+"""Times as many sequences of which these are those with the smallest pulses."""
+
+AROUND = (0, 1)
+"""Steps of the delay that are looked at, from the one below the best delay."""
+
+WAITS, LATER_WAITS = 24, 12
+"""Sun pulses that may pass before a first and before a later block, so that its nutation meets the one before."""
+
+MOST_WIDTHS = 24
+"""Widths that are looked at for a second and a third block, where more can be commanded."""
+
+WINDOWS = 8
+"""Blackout windows after which a block is begun, or before which one ends, at most: the first ones."""
+
+BESIDE = 0.01
+"""Share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses."""
+
+SHARES = np.linspace(0.0, 1.0, 13)[1:]
+"""Shares of the way that a first block may go, where others follow."""
+
+FIRST = 24
+"""First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
+
+BLOCKS = 3
+"""Blocks of a schedule, at most."""
+
+SURELY = 3.0
+"""Times its error by which the length of a block that ends at the target differs from the way there, at most."""
+
+LOWER = 0.98
+"""Share of the nutation above which it does not count as lowered."""
+
+LOOKED = 2e-6
+"""Units of `work` of a block that is looked at."""
+
+
+class Found(NamedTuple):
+    """Blocks, the motion after them in closed form, and how good that is: the less, the better.
+
+    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
+    ``share``: the share.
+    """
+
+    blocks: tuple[Block, ...]
+    state: State
+    rank: tuple[float, float, float]
+    share: float = math.inf
+
+
+class BlockSearch:
+    """The blocks of one spacecraft: which there are, and how good they are in closed form."""
+
+    def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
+        self.body, self.channels, self.commands = spacecraft, channels, commands
+        self.model = BlockModel(spacecraft)
+        self.bounds = [self._lowered(bound) for bound in compliance.bounds(spacecraft)]
+        self.looked = 0
+        limits = spacecraft.limits
+        self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
+        self.pause = math.ceil(limits.gap / self.model.turn)
+        self.dark = Windows(spacecraft).dark
+        self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
+
+    def _lowered(self, bound: compliance.Bound) -> compliance.Bound:
+        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
+        if bound.part is not Part.NUTATION or self.body.goal.axis is not None:
+            return bound
+        return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
+
+    def best(self, most: int) -> list[Found]:
+        """The best few sequences of up to ``most`` blocks, those that are flown."""
+        start = Found((), self.model.start, (math.inf, math.inf, math.inf))
+        found = self._single(start)
+        firsts: list[Found] = []
+        for number in range(2, most + 1):
+            if min((one.rank for one in found), default=(1.0,))[0] <= 0.0 or work.exhausted():
+                break
+            if number == 2:
+                small = self.behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
+                firsts = [*_promising(found, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
+            else:
+                firsts = _promising(firsts, FIRST // 2)
+            firsts = [more for first in firsts for more in self.behind(first, self._rest(first), few=4)]
+            found += firsts
+        # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
+        # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
+        ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
+        clear = sorted(ranked, key=lambda one: one.share)[: FLOWN // 2]
+        each = {len(one.blocks): one for one in reversed(ranked)}.values()
+        first = {one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}
+        # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
+        gentle = sorted(sorted(ranked, key=lambda one: one.share)[: GENTLE * FLOWN], key=self._largest_pulse)
+        more = {one.blocks: one for one in (*of_each_kind(ranked)[:FLOWN], *gentle) if one.blocks not in first}
+        return [*first.values(), *islice(more.values(), 2 * FLOWN)]
+
+    def _largest_pulse(self, found: Found) -> float:
+        """The most by which one of its pulses turns H, rad."""
+        named = {one.name: one for one in self.channels}
+        spin = self.body.spin
+        return max(float(self.model.turned_by(named[one.channel], one.width, spin)) for one in found.blocks)
+
+    def behind(
+        self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN, off: State | None = None
+    ) -> Iterator[Found]:
+        """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``.
+
+        ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
+        """
+        number = 1
+        for block in before.blocks[-1:]:
+            number = block.first + (block.count - 1) * block.every + 1
+        tank = self.body.tank
+        for channel, trial in trials:
+            state = self.model.after(before.state, channel, trial)
+            left = self.model.left(state if off is None else state.shifted(off))
+            shape = np.shape(left.nutation)
+            self.looked += int(np.prod(shape))
+            work.spend(LOOKED * float(np.prod(shape)))
+            severity = np.max(np.broadcast_arrays(*(self.share(bound, left) for bound in self.bounds)), axis=0)
+            over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
+            over = over | self._dark(before.state, channel, trial, state)
+            over = over if tank is None else over | (state.used > tank.propellant)
+            severity = np.where(np.isnan(severity) | over, np.inf, severity)
+            cost = np.broadcast_to(state.cost, shape)
+            failed = np.where(severity <= 1.0, 0.0, severity).ravel()
+            chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
+            for index in dict.fromkeys(chosen):
+                if math.isfinite(failed[index]):
+                    at = np.unravel_index(index, shape)
+                    wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
+                    interval = every if count > 1 else self.commands.every[0]
+                    block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, interval)
+                    here = state.at(at, shape)
+                    rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
+                    yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
+
+    def share(self, bound: compliance.Bound, left: compliance.Left) -> Array:
+        """Share of a ``bound`` that is ``left``: 1 or less keeps it."""
+        return np.asarray(compliance.left_of(bound.part, left, self.body) / bound.most)
+
+    def _spaced(self, every: int) -> bool:
+        """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
+        return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
+
+    def _counts(self, start: State, every: int) -> NDArray[np.int64]:
+        """Numbers of pulses up to the horizon."""
+        most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
+        if not self._spaced(every):
+            return np.arange(0)
+        return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
+
+    def _single(self, start: Found) -> list[Found]:
+        """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
+
+        What surely ends worse than the best ones found is left out: see `_short_by`.
+        """
+        short = [
+            (channel, every, self._short_by(start.state, channel, every))
+            for channel in self.channels
+            for every in self.commands.every
+        ]
+        most = max((one.max() for _, _, one in short if one.size), default=0.0)
+        within = SURELY
+        while True:
+            trials = (
+                (channel, trial)
+                for channel, every, lacks in short
+                for trial in self._chosen(start.state, channel, every, np.argwhere(lacks <= within))
+            )
+            found = sorted(self.behind(start, trials), key=lambda one: one.rank)
+            enough = SURELY * max(found[0].rank[0], 1.0) if found else math.inf
+            if enough <= within or within >= most or work.exhausted():
+                return found
+            within = min(enough, 10.0 * within, most)
+
+    def _short_by(self, state: State, channel: Channel, every: int) -> Array:
+        """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
+
+        With a target the length of the rhumb line: a block that is longer or shorter than the way ends no nearer than
+        a third of the difference. Without one the nutation, which they can lower by the sum of their kicks at most.
+        """
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
+        bounds = {bound.part: bound.most for bound in self.bounds}
+        if self.body.goal.axis is None:
+            trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
+            kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
+            left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
+            return np.asarray(np.maximum(left, 0.0) / bounds[Part.NUTATION])
+        way = float(self.model.course(state)[1])
+        full, _ = self.model.full_pulses(state, channel, widths, counts)
+        length = full * self.model.turned_by(channel, widths, self.body.spin)
+        return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
+
+    def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
+        """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
+        if len(index):
+            widths = commandable_widths(self.commands, channel)[index[:, 0]]
+            counts = self._counts(state, every)[index[:, 1]]
+            for wait in self._waits(state, self.earliest, WAITS if abs(state.phasor) > 0.0 else 1):
+                yield self._at_delays(state, channel, wait, widths, counts, every)
+
+    def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
+        """Blocks that go the rest of the way, or take the nutation that is left."""
+        state, least = before.state, self.pause if before.blocks else self.earliest
+        _, way = self.model.course(state)
+        for channel in self.channels:
+            widths = evenly(commandable_widths(self.commands, channel), MOST_WIDTHS)
+            if not len(widths):
+                continue
+            step = self.model.turned_by(channel, widths, float(state.spin))
+            near = self.model.pulses(state, channel, widths, float(way) / step, self.commands.max_count)
+            near = np.rint(near)[:, None] + np.arange(-1, 2)
+            few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
+            counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
+            for every in self.commands.every:
+                if not self._spaced(every):
+                    continue
+                for wait in self._waits(state, least, LATER_WAITS):
+                    yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
+
+    def _parts(self, start: Found) -> Iterator[Found]:
+        """First blocks that go a part of the way to the target."""
+        heading, way = self.model.course(start.state)
+        every = next((one for one in self.commands.every if self._spaced(one)), None)
+        if self.body.goal.axis is None or every is None:
+            return
+        for channel in self.channels:
+            widths = evenly(commandable_widths(self.commands, channel), 3)
+            for width in widths.tolist():
+                step = float(self.model.turned_by(channel, width, float(start.state.spin)))
+                delay = self.commanded(self.model.delay(channel, heading, width))
+                first = float(start.state.sun_pulse) + float(delay) + float(acts(channel, width).over)
+                fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
+                counts = np.rint([*SHARES * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
+                for count in np.unique(counts.clip(1, self.commands.max_count).astype(int)).tolist():
+                    for wait in self._waits(start.state, self.earliest, 1):
+                        trial = Trial(wait, delay, width, count, every)
+                        yield from self.behind(start, iter([(channel, trial)]), few=1)
+
+    def _waits(self, state: State, least: int, few: int) -> list[int]:
+        """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
+        after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
+        later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
+        return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
+
+    def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
+        """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
+        shape = np.shape(after.sun_pulse)
+        found = np.zeros(shape, dtype=bool)
+        if not len(self.dark[0]):
+            return found
+        work.spend(LOOKED * found.size * len(self.dark[0]))
+        turn = self.model.turn
+        first = state.sun_pulse + trial.wait * turn
+        interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
+        interval = np.where(np.asarray(trial.count) > 1, interval, turn)
+        aside, lasts = BESIDE * turn, acts(channel, trial.width).over
+        for begins, ends in zip(*self.dark, strict=True):
+            low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
+            high = np.floor((ends + aside - first - trial.delay) / interval)
+            found |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
+        return found
+
+    def _at_delays(
+        self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
+    ) -> Trial:
+        """The blocks at the delays that serve the heading best, and at those that serve the nutation best."""
+        widths, counts = np.broadcast_arrays(widths, counts)
+        chosen = []
+        if self.body.goal.axis is not None:
+            heading, _ = self.model.course(state)
+            chosen.append(self.model.delay(channel, heading, widths))
+        if abs(state.phasor) > 0.0:
+            chosen.append(self.model.damping_delay(state, channel, Trial(wait, 0.0, widths, counts, every)))
+        if not chosen:
+            chosen.append(np.zeros(widths.shape))
+        steps = np.concatenate(
+            [np.floor(delay / self.commands.delay_step)[..., None] + AROUND for delay in chosen], axis=-1
+        )
+        delay = self.commanded(steps * self.commands.delay_step)
+        return Trial(wait, delay, widths[..., None], counts[..., None], every)
+
+    def commanded(self, delay: Array) -> Array:
+        """The nearest delay that can be commanded."""
+        step = self.commands.delay_step
+        most = math.floor(self.commands.delay_max / step * (1.0 + 1e-12))
+        return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
+
+
+def of_each_kind(ranked: Iterable[Found]) -> list[Found]:
+    """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
+    kinds: dict[tuple[tuple[str, int], ...], Found] = {}
+    for one in ranked:
+        kinds.setdefault(tuple((block.channel, block.every) for block in one.blocks), one)
+    return list(kinds.values())
+
+
+def _promising(found: Iterable[Found], most: int) -> list[Found]:
+    """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
+    ranked, front = sorted(found, key=lambda one: one.rank), list[Found]()
+    for one in ranked:
+        if not front or one.rank[1] < front[-1].rank[1]:
+            front.append(one)
+    return list({one.blocks: one for one in (*ranked[:most], *front[:most])}.values())
