@@ -62,6 +62,7 @@ CASES = {
     "two-pulse": spinner(degrees=2.0, channels=cross(8.0, max_on_time=0.9), limits=Limits(horizon=200.0)),
     "four-pulse": short_pulses(),
     "rhumb-line": aimed(short_pulses(0.0), 1.0, 40.0),
+    "half-cone": aimed(short_pulses(0.0), 0.5, 40.0),
     "optimal": short_pulses(),
 }
 """The scheme up to the comma, and a body in which it leaves no nutation."""
