@@ -96,7 +96,8 @@ class Search(BlockSearch):
         made = fired(self.body, found.blocks)
         left = left_by(flight.flown(self.body, made))
         share = max(float(self.share(bound, left)) for bound in self.bounds)
-        rank = not keeps_limits(self.body, made), share if share > 1.0 else 0.0, made.cost, made.end
+        missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
+        rank = not keeps_limits(self.body, made), missed, made.cost, made.end
         return Flown(rank, made, found)
 
     def nearer(self, flights: Sequence[Flown]) -> list[Found]:
