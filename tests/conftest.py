@@ -16,6 +16,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from planned_once import Planner
 from process import Run, apart, within
+from samples import mark_few
 
 from nutdamp import schemes
 
@@ -35,8 +36,13 @@ settings.register_profile("project", deadline=None, derandomize=True, suppress_h
 settings.load_profile("project")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Orekit's Java machine and the solver do not share a process well: its tests run when they are requested."""
+    """What the marks ``few`` and ``orekit`` say.
+
+    Orekit's Java machine and the solver do not share a process well: its tests run when they are requested.
+    """
+    mark_few(items)
     if "orekit" in config.getoption("markexpr"):
         return
     for item in items:

@@ -121,6 +121,7 @@ def between(body: Spacecraft, share: float) -> Array:
 TURNING = aimed(spinner(80.0, 120.0, degrees=0.2, channels=cross(8.0, max_on_time=0.3)), 12.0, 30.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", some(["optimal", "rhumb-line"]))
 def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     free = planning.plan(cones(TURNING), scheme)
@@ -195,6 +196,7 @@ def enters(seed: int) -> bool | None:
     return any(attitude.angle_between(path, keep.direction).min() < keep.least - 1e-6 for keep in body.keep)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", some([(9, 10), *(range(first, first + 10) for first in range(0, 200, 10))], always=1))
 def test_in_random_cases_the_axis_never_enters_a_cone(seeds: Sequence[int]) -> None:
     found = [enters(seed) for seed in seeds]

@@ -97,6 +97,7 @@ def pulse(t: float, on_time: float, *torque: float) -> Pulse:
     return Pulse(t, on_time, "by hand", np.array(torque) * on_time, np.array(torque))
 
 
+@pytest.mark.few(5)
 @pytest.mark.basilisk
 @pytest.mark.parametrize("scheme", ["two-pulse", "four-pulse"])
 @pytest.mark.parametrize("name", BODIES)
@@ -183,6 +184,7 @@ def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, fl
     assert difference(body, overlapping(), 5.0, fly(body, overlapping(), 5.0)) <= FOUND
 
 
+@pytest.mark.few(5)
 @pytest.mark.basilisk
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(

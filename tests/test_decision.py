@@ -252,6 +252,7 @@ def test_the_table_of_schemes_is_that_of_the_json(run: Run, tmp_path: Path) -> N
         assert row["met_fraction"] == ""
 
 
+@pytest.mark.slow
 def test_the_table_of_schemes_has_the_cases_that_comply_and_what_is_infeasible(run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text(run("init", "-").stdout.replace("max_on_time: 2 s", "max_on_time: 21 ms"))
     done = run("plan", "-q", "--robust", "--table", "-", "a.yaml", "--set", "limits.horizon=9s")

@@ -330,6 +330,7 @@ def test_after_spin_reversal_the_nutation_counts_from_the_same_end_of_the_body()
 STABLE = {"prolate": (120.0, 100.0, 80.0), "oblate": (80.0, 70.0, 120.0)}
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("degrees", [0.01, 10.0, 35.0])
 @pytest.mark.parametrize("phase", some([0.0, 0.4, 0.5 * math.pi, 2.5], always=2))
 @pytest.mark.parametrize("spin", [2.0, -2.0])
@@ -348,6 +349,7 @@ def test_nutation_of_three_different_moments_is_the_largest_of_the_motion(
     assert flight.flown(spacecraft, Schedule()).residual.nutation == pytest.approx(largest, rel=1e-4)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("spin", some([2.0, -2.0]))
 @pytest.mark.parametrize("moments", STABLE.values(), ids=STABLE)
 def test_nutation_beyond_the_separatrix_is_the_largest_of_the_motion(

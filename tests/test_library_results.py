@@ -109,6 +109,7 @@ def dispersed(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_studies_have_the_numbers_of_the_commands(run: Run, dispersed: Path) -> None:
     craft = nutdamp.load(dispersed / "spacecraft.yaml")
     chosen = nutdamp.compare(craft).recommended
@@ -148,6 +149,7 @@ def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
         assert mine == its
 
 
+@pytest.mark.slow
 def test_a_report_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text(TILTED)
     chosen = ("--scheme", "two-pulse", "--set", "limits.horizon=100 s")
@@ -232,6 +234,7 @@ def test_notebooks_show_small_tables() -> None:
         assert repr(shown).startswith(f"<{type(shown).__name__}")
 
 
+@pytest.mark.slow
 def test_comparisons_and_plans_draw_themselves(craft: nutdamp.Spacecraft) -> None:
     compared = nutdamp.compare(craft, ["two-pulse", "four-pulse"])
     for figure in (compared.figure(), compared.figure("schemes")):

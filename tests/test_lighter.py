@@ -120,6 +120,7 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(
     assert by_impulses(craft, made).motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("growth", [None, 40.0])
 def test_verify_confirms_it_with_and_without_dissipation(growth: float | None) -> None:
     craft = replace(body(SHED["A and C"]), dissipation=growth)
@@ -160,6 +161,7 @@ def test_what_cases_leave_out_is_of_second_order() -> None:
     assert missed(0.025) < 0.3 * missed(0.05)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", "optimal"])
 def test_plans_leave_nothing_and_without_falling_moments_they_would(scheme: str) -> None:
     craft = body((3000.0, 3000.0, 1500.0))

@@ -272,6 +272,7 @@ JETS = (
 )
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("scheme", CLASSIC)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(scheme: str, spin: float) -> None:

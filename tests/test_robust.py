@@ -128,6 +128,7 @@ def test_how_far_it_is_can_be_watched() -> None:
     assert reported == list(range(len(trials)))
 
 
+@pytest.mark.slow
 def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
     """Four pulses of the example cost less, but turn H more; two pulses bring it back."""
     example = read_spacecraft(example_text(), "example.yaml")

@@ -310,6 +310,7 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert not compliance.unaided(replace(calm, inertia=Inertia((122.0, 118.0, 80.0))))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("A", "C", "degrees", "horizon", "kept"), [(120, 80, 2, 60, False), (120, 80, 2, 2, True)])
 @pytest.mark.parametrize("turned", [False, True])
 def test_the_spin_that_dissipation_changes_counts(

@@ -46,6 +46,7 @@ def tilted() -> Spacecraft:
     )
 
 
+@pytest.mark.slow
 def test_dop853_in_the_axes_of_the_file_confirms_the_flight() -> None:
     for spacecraft in (EXAMPLE, tilted()):
         made = planning.plan(spacecraft, "two-pulse").pulses
@@ -163,6 +164,7 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does() -> None:
     assert calm["disturbances"].nutation == alone.nutation > 1e-5
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("changes", "scheme"),
     [
@@ -203,6 +205,7 @@ def test_dissipation_keeps_the_momentum_and_drains_energy() -> None:
     assert slopes[1] / slopes[0] == pytest.approx(math.exp(30 / 600), rel=1e-11)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (123.0, 117.0, 80.0)])
 @pytest.mark.parametrize("spin", some([3.0, -3.0], always=1))
 def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(

@@ -34,12 +34,14 @@ def test_a_budget_is_shown_and_written(run: Run, tmp_path: Path) -> None:
         assert text in picture
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_budget(run: Run) -> None:
     one, same, other = (run("budget", STAGE, "-q", "--csv", "-", "--seed", seed).stdout for seed in ("3", "3", "4"))
     assert one == same
     assert one != other
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("changed", "said"),
     [

@@ -155,6 +155,7 @@ def test_a_recommended_plan_that_does_not_damp_is_flown_with_a_warning(run: Run,
     assert "warning" not in run("disperse", "body.yaml", "--samples", "9", "--quiet").stderr
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
     pytest.importorskip("matplotlib")
@@ -253,6 +254,7 @@ def test_the_default_number_of_cases_is_that_of_the_other_commands(run: Run, bod
     assert (data["samples"], data["seed"], data["flown"]) == (20_000, 1, True)
 
 
+@pytest.mark.slow
 @pytest.mark.plans_anew
 def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path: Path) -> None:
     """`disperse`, `plan --robust` and `report` of the built-in example, 20,000 cases of seed 1."""
@@ -294,6 +296,7 @@ def test_one_case_and_all_cases_show_the_same_nominal_one(run: Run) -> None:
     assert json.loads(run("disperse", "--case", "7", "--json", "-").stdout)["flown"] is True
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("model", [(), ("--impulses", "--force")])
 def test_it_says_where_the_nominal_case_ends_and_where_it_should(
     run: Run, tmp_path: Path, model: tuple[str, ...]

@@ -156,6 +156,7 @@ def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> Non
     assert "noise, bias and steps of the sensor" in shown
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("sensor", ["{kind: gyro}", "{kind: accelerometer, rate: 20 Hz, position: [1, 0, 0]}"])
 def test_pictures(run: Run, file: str, tmp_path: Path, sensor: str) -> None:
     done = run("loop", file, "--set", f"loop.sensor={sensor}", "--plot", "l.svg", "--map", "m.svg")

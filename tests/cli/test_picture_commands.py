@@ -19,6 +19,7 @@ def left(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
     done = run("plan", "--plot", f"motion.{ending}")
@@ -57,12 +58,14 @@ def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> N
     assert "no plan" in (tmp_path / "none.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: Path) -> None:
     named = ("--scheme", "two-pulse", "--robust", "--impulses", "--force", "-q")
     run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes")
     assert "complying cases, %" in (tmp_path / "schemes.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
     common = ("disperse", "--scheme", "two-pulse", "--impulses", "--force", "--samples", "200", "-q")
     said = {"cases": "cases beyond, %", "momentum": "H towards you, x of N to the right", "budget": "A, 0.6 kg m²"}
@@ -159,6 +162,7 @@ def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, a
     assert left(tmp_path) == []
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("output", some(["report.html", "-"], always=1))
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
 def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str, package: str) -> None:

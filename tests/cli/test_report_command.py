@@ -29,6 +29,7 @@ def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
+@pytest.mark.slow
 def test_trade_may_come_without_a_number(run: Run, tmp_path: Path) -> None:
     """A file may follow it, and a number of points."""
     (tmp_path / "craft.yaml").write_text(run("init", "-").stdout)
@@ -188,6 +189,7 @@ def test_what_the_browser_prints_is_the_file(monkeypatch: pytest.MonkeyPatch, tm
     assert pdf.printed("<p>ω", "report.pdf") == "<p>ω".encode()
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "cases"),
     [

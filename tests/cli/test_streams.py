@@ -33,6 +33,7 @@ def odd(tmp_path: Path) -> str:
     return "odd.yaml"
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "command",
     [
@@ -64,6 +65,7 @@ def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
         assert not [line for line in run(*command).stdout.splitlines() if line != line.rstrip()]
 
 
+@pytest.mark.few(2)
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("command", ["plan --quiet", "check --quiet", "plan --quiet --json -", "--help", "explain"])
 def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
@@ -75,6 +77,7 @@ def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str
     assert "No space left" in done.stderr
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(os.name != "posix", reason="closes a descriptor as a shell does")
 @pytest.mark.parametrize("command", ["plan --quiet", "plan --quiet --csv -"])
 def test_a_process_without_standard_output_does_its_work(tmp_path: Path, command: str) -> None:

@@ -74,6 +74,7 @@ def check(model: Model, fly: Fly, *, by_sum: bool = False) -> None:
                 assert (least, largest) == pytest.approx((one.least, one.largest), abs=1e-6)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", REAL)
 def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
     check(REAL[name], RealWidths(REAL[name]))
@@ -184,6 +185,7 @@ def keeper(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> None:
     done = run("disperse", str(keeper), "--scheme", "rhumb-line", "--samples", "2000", "--json", "-")
     found = json.loads(done.stdout)
@@ -200,6 +202,7 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> 
     assert "least from Sun, deg" in alone
 
 
+@pytest.mark.slow
 def test_a_robust_plan_keeps_the_cone_in_most_cases(keeper: Path) -> None:
     body = load(keeper)
     compared = comparison.compare(body, ("rhumb-line", "half-cone"))

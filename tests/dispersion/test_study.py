@@ -139,6 +139,7 @@ def damaged(whole: bytes, random: np.random.Generator) -> bytes:
             return whole[:place] + bytes([whole[place] ^ 1 << int(random.integers(8))]) + whole[place + 1 :]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(5, 9)))
 def test_a_damaged_study_file_is_read_as_it_was_or_refused(tmp_path: Path, seed: int) -> None:
     study, path = a_study(), tmp_path / "study.npz"

@@ -95,6 +95,7 @@ def flown(body: Spacecraft, made: Loop, cycles: int, seeds: int) -> tuple[float,
     return pulses / time, impulse / time, count
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", QUICK)
 def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
     body, made = QUICK[name]
@@ -117,6 +118,7 @@ def test_with_noise_a_budget_is_that_of_many_long_flights(name: str) -> None:
     assert cycle.impulse == pytest.approx(impulse, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_loop_below_the_noise_fires_without_end_as_often_as_one_that_is_flown() -> None:
     body, made = craft(), loop(gyro(noise=rad(0.6)))
     cycle = Map(body, made).cycle()
@@ -125,6 +127,7 @@ def test_a_loop_below_the_noise_fires_without_end_as_often_as_one_that_is_flown(
     assert cycle.pulses * DAY > 1e5
 
 
+@pytest.mark.slow
 def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
     body, made = craft(channels=four(6.0, 0.1)), loop(gyro(), start=rad(1.0), stop=0.0)
     cycle = Map(body, made).cycle()
@@ -236,6 +239,7 @@ def test_propellant_follows_from_impulse_and_isp() -> None:
     assert held_by(craft(channels=four(isp=None))).propellant is None
 
 
+@pytest.mark.slow
 def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     body = replace(craft(), loop=loop(gyro()), cold=Cold(0.5, 10.0))
     steady = replace(body, tank=Tank(2.0, 22e5, 8e5, 0.0))
@@ -251,6 +255,7 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
 
 
+@pytest.mark.slow
 def test_pairs_of_thresholds_are_rows() -> None:
     body = replace(craft(), loop=loop(gyro()), requirement=Requirement(nutation=rad(0.6)))
     found = budget(body, [Thresholds(rad(0.5), rad(0.05)), Thresholds(rad(1.0), rad(0.05))])

@@ -190,6 +190,7 @@ def test_faults_stop_each_case_on_its_own() -> None:
     assert results.settled == 20 - sum(count for stop, count in results.stops.items() if stop is not Stop.END)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ["tensor", "disturbed", "continuous"])
 def test_cases_that_cannot_fly_together_fly_one_by_one(kind: str) -> None:
     body = craft()
@@ -283,6 +284,7 @@ def test_what_a_loop_draws_is_correlated_as_the_file_says() -> None:
     assert changed == ["C", "sensor scale 1", "sensor scale 2"]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("law", [{}, BANGS], ids=["proportional", "bang"])
 @pytest.mark.parametrize("name", NOISY)
 def test_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, object]) -> None:

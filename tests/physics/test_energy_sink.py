@@ -84,11 +84,13 @@ def assert_is_motion(one: Body, until: float, tolerance: float) -> None:
         assert reference.turned(motion.rotation, turned[row]) < tolerance
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", some(BODIES, always=3))
 def test_200_s_agree_with_dop853(name: str) -> None:
     assert_is_motion(BODIES[name], 200.0, 1e-9)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("one", some(random_bodies(12), always=6))
 def test_random_bodies_agree_with_dop853(one: Body) -> None:
     assert_is_motion(one, 50.0, 1e-9)

@@ -35,6 +35,7 @@ def ends(pieces: list[rigid.Piece], time: float) -> tuple[Array, Array]:
     return rates[0], attitude.matrix(quaternion[0])
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "torque", [(0.0, 0.0, 0.0), (20.0, -10.0, 0.0), (3.0, 8.0, -15.0), (500.0, 0.0, 300.0)], ids=str
 )

@@ -203,6 +203,7 @@ def test_disturbances_and_dissipation(moments: tuple[float, float, float], const
         assert reference.turned(rotation, attitude.matrix(quaternion[:, number])) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moments", some([SYMMETRIC, OBLATE], always=1))
 def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: tuple[float, float, float]) -> None:
     growth = math.copysign(1 / 40, moments[0] - moments[2])

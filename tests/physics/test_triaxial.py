@@ -105,6 +105,7 @@ def test_jacobi_functions_are_those_of_scipy() -> None:
         assert triaxial._quarter(1.0 - m) == pytest.approx(float(ellipk(m)), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_hundred_periods_to_every_digit() -> None:
     moments, rates0 = [1.0, 1.5, 2.375], [0.5, -0.25, 0.75]
     times = np.linspace(0.0, 100.0, 11)[1:] * triaxial.nutation_period(moments, rates0)
@@ -114,6 +115,7 @@ def test_hundred_periods_to_every_digit() -> None:
     assert turned(triaxial.free_attitude(moments, rates0, START, 0.2 * times), attitudes) < 4e-13
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("nudge", [1e-2, -1e-4, 1e-8, -1e-12, 2.0**-52, -(2.0**-52)])
 def test_near_the_separatrix(nudge: float) -> None:
     """3·1·ω3² = 1.5·0.5·ω1² on it."""
@@ -125,6 +127,7 @@ def test_near_the_separatrix(nudge: float) -> None:
     assert 20.0 < period < 500.0
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, 1), (1, 0, -1)])
 def test_on_the_separatrix(signs: tuple[int, int, int]) -> None:
     moments, rates0 = [1.5, 2.0, 3.0], [0.5 * signs[0], 0.375 * signs[1], 0.25 * signs[2]]
@@ -140,6 +143,7 @@ def test_on_the_separatrix(signs: tuple[int, int, int]) -> None:
     assert moments[1] * abs(end[1]) == pytest.approx(np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "moments", [(2.0, 3.0, 4.0), (4.0, 3.0, 2.0), (3.0, 4.0, 2.0), (1.0, 1.9, 1.8), (2.0, 2.0, 3.0)]
 )
@@ -263,6 +267,7 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
         assert rate == pytest.approx((first - axial) / first * spin, rel=1e-15 + 5 * apart)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-12, 2.0**-52])
 def test_nearly_a_sphere_and_nearly_equal_to_the_spin_axis(apart: float) -> None:
     times = np.array([5.0, 20.0])

@@ -55,6 +55,7 @@ def facts(tree: Node, title: str) -> dict[str, str]:
     return {row[0]: row[1] for row in table(tree, title)}
 
 
+@pytest.mark.slow
 def test_the_limits_are_those_of_the_readme() -> None:
     readme = (ROOT / "README.md").read_text("utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
     assert guide.limits() == tuple(" ".join(part.split()) for part in f"\n{readme}".split("\n- ") if part.strip())
@@ -142,6 +143,7 @@ def test_equations_and_symbols_are_those_of_the_guide() -> None:
     assert facts(ace(), "Symbols")["J_v"] == "impulse of pulse v, J1 + i J2, N m s"
 
 
+@pytest.mark.slow
 def test_configuration_control_is_written_as_given() -> None:
     tree = ace(title="ACE <1>", document="ND-7", issue='2 "b"', author="M. Ö", date="2026-03-01")
     assert tree.all("h1")[0].text == "ACE <1>"
@@ -172,6 +174,7 @@ def test_the_date_is_that_of_the_build_where_none_is_given(
     assert "SOURCE_DATE_EPOCH = 'yesterday': expected a number of seconds" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path) -> None:
     """And so do screen, Markdown and JSON, in the same words."""
     done = run("report", "--disperse", "2e3", "-o", "page.html")
@@ -192,6 +195,7 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
     assert (tmp_path / "page.md").read_text("utf-8").count(said) == 3  # verdict, tile, dispersion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some(["page.md", "page.html"]))
 def test_the_same_input_gives_the_same_bytes(run: Run, tmp_path: Path, name: str) -> None:
     contents = []
@@ -237,6 +241,7 @@ def cards(tree: Node) -> dict[str, list[str]]:
     return {tile.all("dt")[0].text: [one.text for one in tile.all("dd")] for tile in tiles}
 
 
+@pytest.mark.slow
 def test_impulses_are_compared_with_what_the_symbols_explain() -> None:
     heads, row, *_ = table(turned("300 s"), "What each scheme costs")
     shown = dict(zip(heads, row, strict=True))

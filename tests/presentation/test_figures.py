@@ -103,6 +103,7 @@ def numbers(axes: Axes) -> list[int]:
 # --- what is drawn ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", ["wide pulses", "oblate, reversed", "ideal impulses", "three moments"])
 def test_path_and_pulses_together_are_the_track_in_degrees(case: str) -> None:
     made, track = flown(case)
@@ -138,7 +139,7 @@ def test_the_target_is_marked_where_h_ends() -> None:
 
 @pytest.mark.parametrize(
     ("name", "case"),
-    [slow(*one) if number % 2 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
+    [slow(*one) if number % 4 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
 )
 def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str) -> None:
     for axes in drawn(name, case).axes:
@@ -166,6 +167,7 @@ def test_the_pole_curve_shows_where_the_channels_push() -> None:
     assert {note.get_text() for note in few.texts if note.get_text().startswith("T")} == used
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", ["wide pulses", "oblate, reversed", "blackouts"])
 def test_few_pulses_are_all_numbered(case: str) -> None:
     every = list(range(1, len(flown(case)[0].schedule) + 1))
@@ -246,7 +248,7 @@ def test_of_a_very_long_time_the_axis_says_how_much_is_drawn() -> None:
 # --- the spherical view ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", [slow(case) if number % 2 else case for number, case in enumerate(CASES)])
+@pytest.mark.parametrize("case", [slow(case) if number % 4 else case for number, case in enumerate(CASES)])
 def test_what_is_magnified_says_so(case: str) -> None:
     made, track = flown(case)
     looked = sphere.view(made, track)
@@ -283,7 +285,7 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
 
 
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")  # of the name in another script
-@pytest.mark.parametrize(("name", "case"), [slow(*one) if number % 2 else one for number, one in enumerate(LAID_OUT)])
+@pytest.mark.parametrize(("name", "case"), [slow(*one) if number % 4 else one for number, one in enumerate(LAID_OUT)])
 def test_no_text_is_cut_or_covers_another(name: str, case: str) -> None:
     check_layout(drawn(name, case))
 

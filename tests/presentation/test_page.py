@@ -75,6 +75,7 @@ def scripts(tree: Node) -> list[Node]:
     return [node for node in tree.all("script") if "type" not in node.attributes]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["example", "nasty"])
 def test_it_is_well_formed_and_needs_no_network(name: str, request: pytest.FixtureRequest) -> None:
     text = request.getfixturevalue(name)
@@ -153,6 +154,7 @@ def test_no_other_script_may_run(example: str) -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.plans_anew
 def test_the_same_input_gives_the_same_page(example: str) -> None:
     assert page(example_text(), pictured=True) == example
@@ -227,6 +229,7 @@ def test_valves_and_tank_are_among_what_the_spacecraft_is() -> None:
         assert said in text
 
 
+@pytest.mark.slow
 def test_with_valves_commanded_and_effective_on_times_are_told_apart() -> None:
     """In the columns of both tables, and above the picture, whose bars are the effective ones."""
     valve = "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"
@@ -255,6 +258,7 @@ def test_without_a_feasible_plan_the_page_says_why() -> None:
     assert "the file names no thrusters" in tree.text
 
 
+@pytest.mark.slow
 def test_without_nutation_there_is_nothing_to_fire() -> None:
     text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n", pictured=True)
     assert "No pulse is needed." in text
@@ -286,6 +290,7 @@ def test_markdown_holds_the_same_tables_and_nothing_of_html() -> None:
         assert re.fullmatch(r"\|( (:---|---:) \|)+", table.splitlines()[1])
 
 
+@pytest.mark.slow
 def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_marked() -> None:
     found = compared(example_text())
     fronts = trade(found.spacecraft, 3).fronts
@@ -312,6 +317,7 @@ dispersions: {A: {normal: SIGMA}}
 """
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("sigma", "good"), [("0.1 %", True), ("5 %", False)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))

@@ -56,6 +56,7 @@ def drawn(name: str, which: str = "shift") -> Figure:
 # --- dispersed cases -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("which", ["shift", "target"])
 @pytest.mark.parametrize("name", NAMES)
 def test_studies_are_drawn_whole_and_say_what_is_met(name: str, which: str) -> None:
@@ -132,6 +133,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     assert (left >= 1e-6) == bool(bias)
 
 
+@pytest.mark.slow
 def test_the_tornado_says_what_its_bars_are_of() -> None:
     for name in ("budget", "overview"):
         titles = [" ".join(axes.get_title().split()) for axes in drawn(name).axes[-2:]]
@@ -258,6 +260,7 @@ def test_dots_stand_at_the_numbers_of_the_comparison() -> None:
             assert (f"{left:.4g}" if left >= 1e-9 else "< 1e-9") in shown
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("required", [True, False])
 def test_schemes_that_fall_short_are_not_taken_for_the_cheapest(required: bool) -> None:
     """They stand at the foot under another mark, and say so: half of a schedule takes half of the impulse."""
@@ -294,6 +297,7 @@ def test_complying_cases_end_at_all_of_them() -> None:
     assert 100.0 < axes.get_xlim()[1] < 105.0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("kilograms", "unit", "shown"), [((1.593, 0.654), "kg", "0.654"), ((0.0128,), "g", "12.8")])
 def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], unit: str, shown: str) -> None:
     plans = [
@@ -363,6 +367,7 @@ def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
 # --- colours ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_studies_can_be_seen_on_white_and_in_the_dark() -> None:
     for name in NAMES:
         check_colours(drawn(name))

@@ -53,6 +53,7 @@ def turns(body: Spacecraft, *blocks: Block) -> tuple[float, float]:
     return float(model.left(state).aim), left_by(flight.flown(body, fired(body, blocks))).aim
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("valve", [SLOW, UNEVEN, Trapezoid(0.015, 0.005, 0.004, 0.02)])
 @pytest.mark.parametrize("width", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize(("name", "channel"), [("lunar-prospector", "+M2"), ("ace", "N1")])
@@ -117,6 +118,7 @@ def flown_through(body: Spacecraft, made: Schedule) -> tuple[float, float]:
     return reference.angle(momentum, body.goal.axis), nutation
 
 
+@pytest.mark.slow
 def test_a_valve_without_delays_changes_no_block() -> None:
     body = aimed(at_rest("lunar-prospector"), 8.5, 40.0)
     plain, valved = (

@@ -115,6 +115,7 @@ def ace(one: Campaign) -> Spacecraft:
     return replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("date", CAMPAIGNS)
 def test_campaigns_of_ace_end_at_the_sun_angle_reported_after_the_time_reported(date: str, side: float) -> None:
@@ -137,6 +138,7 @@ def test_campaigns_of_ace_end_at_the_sun_angle_reported_after_the_time_reported(
     assert 0.0 < one.took - spins < 2.0 * model.turn
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("date", CAMPAIGNS)
 def test_three_thrusters_of_ace_take_the_propellant_reported(date: str) -> None:
     """Within 13 %: few pulses took more each, as the first ones are colder and longer."""
@@ -154,6 +156,7 @@ def sun_of(body: Spacecraft) -> Vector:
     return body.sun
 
 
+@pytest.mark.slow
 def test_ace_is_planned_with_about_the_pulses_reported() -> None:
     """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, with a way of 16 deg past the Sun: 99 pulses were flown."""
     body = at_rest("ace", 5.0832)

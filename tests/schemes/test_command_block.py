@@ -154,6 +154,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
     return best
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", some(range(12), always=3))
 def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
     body = some_body(seed, target=seed % 4 != 3)
@@ -184,12 +185,14 @@ def outcome(seed: int) -> tuple[float, float]:
     return body.to_turn, abs(off - float(plan.left.aim))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", some(range(100), always=2))
 def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: int) -> None:
     turn, off = outcome(seed)
     assert off < 1e-3 * turn
 
 
+@pytest.mark.slow
 def test_more_blocks_where_one_does_not_do() -> None:
     """Tight bounds: one block leaves more than is required; two or three do better, and --max-blocks keeps to one."""
     body = replace(some_body(2), requirement=Requirement(math.radians(0.05), math.radians(0.05)))
@@ -199,6 +202,7 @@ def test_more_blocks_where_one_does_not_do() -> None:
     assert plan.severity <= single.severity
 
 
+@pytest.mark.slow
 def test_blocks_behind_cheap_first_ones_are_looked_for_too() -> None:
     """Three blocks of two pulses each meet the requirement; a first block of 73 that leaves a little less is no better.
 
@@ -274,6 +278,7 @@ def test_blocks_keep_the_limits_on_earliest_start_number_and_gap() -> None:
         assert plan.meets_requirement
 
 
+@pytest.mark.slow
 def test_with_disturbances_the_sun_pulses_are_those_of_the_disturbed_motion() -> None:
     body = replace(a_turn(), disturbances=(Disturbance(0.003 + 0.0j, 0.002),))
     plan = planning.plan(body, "command-block")
@@ -282,6 +287,7 @@ def test_with_disturbances_the_sun_pulses_are_those_of_the_disturbed_motion() ->
     assert [one.start for one in again] == [one.start for one in plan.pulses]
 
 
+@pytest.mark.slow
 def test_a_looser_requirement_is_met_as_well() -> None:
     """Damping: blocks lower the nutation, though it is no more than is required already."""
     body = commanded(
@@ -294,6 +300,7 @@ def test_a_looser_requirement_is_met_as_well() -> None:
         assert plan.left.nutation < min(math.radians(most), body.nutation)
 
 
+@pytest.mark.slow
 def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
     """Where another was taken because it does better when flown, the note says no more than that."""
     body = a_turn()
@@ -341,6 +348,7 @@ def test_blocks_keep_out_of_blackout_windows() -> None:
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
 
 
+@pytest.mark.slow
 def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     """The blocks of all legs count their Sun pulses from t = 0: fired anew they are the same pulses."""
     straight = a_turn()
@@ -403,6 +411,7 @@ def test_where_a_blackout_leaves_no_block_the_reason_says_so() -> None:
     assert "outside the blackout windows" in remarks.infeasibility(plan)
 
 
+@pytest.mark.slow
 def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
     free, ticked = (planning.plan(a_turn(**limits), "command-block") for limits in ({}, {"tick": 0.0173}))
     assert ticked.feasible, remarks.infeasibility(ticked)

@@ -106,6 +106,7 @@ def made_by(scheme: str, body: Spacecraft) -> Schedule:
     return found.pulses
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("valve", [LATE, SLOW], ids=["late", "slow"])
 @pytest.mark.parametrize("scheme", CASES)
 def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, valve: Trapezoid) -> None:
@@ -119,6 +120,7 @@ def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, 
     assert left(fired, late) > 1000.0 * MICRODEGREE
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("valve", VALVES.values(), ids=VALVES)
 @pytest.mark.parametrize("scheme", CASES)
 def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valve) -> None:
@@ -191,6 +193,7 @@ def test_a_requested_on_time_is_a_command() -> None:
     assert all(0.027 - 0.0005 <= on_time <= 0.033 + 1e-9 for on_time in on_times)  # what closes the train differs
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("valve", [None, SLOW], ids=["cold alone", "through valves"])
 @pytest.mark.parametrize("scheme", CASES)
 def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
@@ -210,6 +213,7 @@ def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
     assert np.hypot(ends.momentum[0], ends.momentum[1]) / ends.momentum[2] == pytest.approx(0.0, abs=MICRODEGREE)
 
 
+@pytest.mark.slow
 def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     body = replace(through(SLOW, short_pulses()), cold=Cold(0.9, 4.0))
     made = made_by("optimal", body)
@@ -231,6 +235,7 @@ def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_w
         assert all(pulse.loaded[1] > 0.0 and pulse.on_time >= 0.1 for pulse in made.pulses)
 
 
+@pytest.mark.slow
 def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     """Oblate, strong thrusters, and a valve that closes so late that a tick already gives 141 ms of thrust."""
     M, tick = 1072.4242912066034, 0.05652980755265212
@@ -245,6 +250,7 @@ def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     assert all(pulse.magnitude > 0.0 for pulse in made.pulses)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("moments", [(123.0, 117.0, 80.0), (130.0, 110.0, 80.0), (95.0, 105.0, 150.0)])
 @pytest.mark.parametrize(("degrees", "on_time"), [(0.0, 0.03), (0.0, 0.04), (0.05, 0.03)])
 def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(

@@ -172,6 +172,7 @@ def test_the_first_order_least_knows_dissipation() -> None:
         assert left_by_reference(one)[0] < 1e-9
 
 
+@pytest.mark.slow
 def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
     """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without end."""
     names = {"+M1": (400.0, 0.0, 0.0), "-M1": (-400.0, 0.0, 0.0), "+M2": (0.0, 400.0, 0.0)}
@@ -189,6 +190,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
 # --- files that went wrong -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "options", "status"),
     [

@@ -53,6 +53,7 @@ def test_pulses_come_a_quarter_of_the_body_period_apart(A: float, C: float, spin
     assert order == [turn[(start + index) % 4] for index in range(len(order))]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("spin", SPINS)
 @pytest.mark.parametrize(("A", "C"), BODIES)
 def test_coarse_pulses_leave_at_most_half_a_pulse(A: float, C: float, spin: float) -> None:

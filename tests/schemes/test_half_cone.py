@@ -80,6 +80,7 @@ def test_a_nutation_is_taken_along(degrees: float, tilt: float, azimuth: float) 
         assert plan.pulses.total_impulse >= max(spacecraft.least_impulse, spacecraft.turning_impulse)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("cones", [1, 2, 5])
 @pytest.mark.parametrize("degrees", [0.0, 5.0])
 def test_channels_wait_for_their_phase(degrees: float, cones: int) -> None:

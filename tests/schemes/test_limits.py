@@ -131,6 +131,7 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         assert len(plan.pulses) == 2
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("block", some(range(10), always=1))
 def test_whatever_the_limits(block: int, requested: tuple[str, Options]) -> None:
@@ -161,6 +162,7 @@ HARD = {
 }
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize("requested", some(REQUESTED.values(), always=2), ids=REQUESTED)
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, requested: tuple[str, Options]) -> None:
@@ -208,12 +210,14 @@ def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, 
             check(spinner(120.0, C, spin, degrees, steerable=Steerable(torque)), *requested)
 
 
+@pytest.mark.slow
 def test_many_channels() -> None:
     body = spinner(channels=fan(24, 4.0))
     for requested in REQUESTED.values():
         check(body, *requested)
 
 
+@pytest.mark.few(16)
 @pytest.mark.parametrize("requested", [REQUESTED[name] for name in ("one-pulse", "two-pulse", "two-pulse, literal")])
 @pytest.mark.parametrize("torque", [30.0, 100.0])
 @pytest.mark.parametrize("moments", [(120.0, 100.0, 80.0), (80.0, 70.0, 120.0)], ids=["prolate", "oblate"])

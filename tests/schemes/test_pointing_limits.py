@@ -61,6 +61,7 @@ def test_whatever_the_limits(block: int, scheme: str) -> None:
             raise
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("scheme", some(SCHEMES, always=1))
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, scheme: str) -> None:
@@ -68,6 +69,7 @@ def test_awkward_limits(hard: Limits, scheme: str) -> None:
         check(aimed(spinner(limits=hard, **requested), 10.0, 45.0), scheme, Options())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("spin", some([3.0, -3.0], always=1))
 def test_most_unlimited_cases_end_on_the_target(scheme: str, spin: float) -> None:
@@ -90,6 +92,7 @@ TRUE_BODIES = {
 }
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("true_body", TRUE_BODIES.values(), ids=TRUE_BODIES)
 def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
@@ -99,6 +102,7 @@ def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: 
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
 @pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
 def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:

@@ -48,6 +48,7 @@ def ends_on_the_target(plan: planning.Plan) -> None:
     assert off_target(plan.spacecraft, plan.pulses) < 1e-9
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 35.0)])
 @pytest.mark.parametrize("per_turn", [1, 2])
@@ -63,6 +64,7 @@ def test_a_nutation_goes_along_or_first(degrees: float) -> None:
         ends_on_the_target(train(aimed(spinner(degrees=degrees, channels=channels), 25.0, -60.0)))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("on_time", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("torque", [40.0, 10.0])
 def test_arc_efficiency(torque: float, on_time: float) -> None:
@@ -124,6 +126,7 @@ def test_an_on_time_is_kept_exactly_or_the_nearest_that_works_is_named() -> None
     assert named > 1
 
 
+@pytest.mark.slow
 def test_fewer_pulses_than_close_by_themselves_are_trimmed_to_close() -> None:
     """The example to 14 deg: 53 pulses of 0.1328 s were made of 0.2 s before, where 42 do."""
     example = read_spacecraft(example_text(), "example.yaml")
@@ -150,6 +153,7 @@ def test_lengths_that_no_pulse_can_have(actuators: dict[str, Any], on_time: floa
     assert said in why
 
 
+@pytest.mark.slow
 def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
     """What is left is the rounding of starts: by 10 ms a pulse is turned by 1.7 deg, of its 0.7 deg."""
     limits = Limits(horizon=400.0, tick=0.01)
@@ -186,6 +190,7 @@ def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
     assert len({pulse.channel for pulse in made}) == per_turn
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 93.0)])
 def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float, C: float) -> None:
     """(angle per pulse)/|sin πa|, and the count chosen closes: flown by the reference integrator."""
@@ -237,6 +242,7 @@ def test_limits_are_kept() -> None:
 # --- fixed Sun phase -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", some(range(20), always=5))
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     """Small steps on the course as it is at each point end on the target after the way reported at first."""

@@ -56,6 +56,7 @@ def test_on_times_of_a_nanosecond_are_fired_at_moments_of_their_own(scheme: str)
     assert all(two > one for one, two in itertools.pairwise(moments))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
 def test_no_more_pulses_are_laid_than_anybody_commands(scheme: str) -> None:
     body = spinner(channels=cross(8.0, max_on_time=1e-4), limits=Limits(horizon=1e7))
@@ -164,6 +165,7 @@ def test_near_a_right_angle_of_nutation_there_is_an_answer(scheme: str) -> None:
     assert plan.feasible == (None not in figures)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", some([89.9, 89.999], always=1))
 def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
     for body in (spinner(degrees=degrees, channels=cross(5e3)), spinner(degrees=degrees, steerable=Steerable(1e4))):

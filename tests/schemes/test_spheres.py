@@ -62,6 +62,7 @@ def bodies(moments: tuple[float, float, float]) -> list[Spacecraft]:
     return [*plain, *(aimed(body, 10.0, 30.0) for body in plain)]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("scheme", [*CLASSIC, "half-cone", "rhumb-line"])
 @pytest.mark.parametrize("off", some([1e-15, 0.9e-9, 1.1e-9, 1e-12, 1e-8], always=2))
 def test_on_either_side_of_the_tolerance_every_scheme_answers(off: float, scheme: str) -> None:

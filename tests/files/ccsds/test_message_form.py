@@ -48,6 +48,7 @@ def test_texts_are_capitals_of_ascii() -> None:
     assert comment("a\nb" + 300 * "é") == "a b" + 243 * "e"
 
 
+@pytest.mark.few(8)
 @CASES
 @pytest.mark.parametrize("form", ["apm", "aem"])
 def test_lines_are_short_printable_ascii(case: str, form: str) -> None:
@@ -80,6 +81,7 @@ def test_keywords_stand_in_the_order_of_the_tables(case: str) -> None:
     ]
 
 
+@pytest.mark.few(4)
 @CASES
 def test_both_notations_hold_the_same(case: str) -> None:
     plan = messages.planned(case)

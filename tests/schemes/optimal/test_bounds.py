@@ -314,6 +314,7 @@ def small_angle_optimum(spacecraft: Spacecraft, points: int, *, lasting: bool) -
     return math.inf if found.fun is None else float(found.fun) * spacecraft.least_impulse
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("lasting", [False, True])
 @pytest.mark.parametrize("first", some([0, 20]))
 def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(first: int, lasting: bool) -> None:

@@ -73,6 +73,7 @@ def test_small_angle_optima(A: float, C: float, spin: float, horizon: float, nam
     assert len(found.burns) <= 4
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("A", "C", "spin", "horizon", "names", "cost"), PUBLISHED)
 def test_flown_schedules_leave_nothing_at_that_cost(
     A: float, C: float, spin: float, horizon: float, names: str, cost: float
@@ -104,6 +105,7 @@ def dense(spacecraft: Spacecraft, costs: np.ndarray, points: int) -> float:
     return float(found.fun)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", some(range(12), always=5))
 def test_the_optimum_is_that_of_a_dense_grid(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -146,6 +148,7 @@ def test_no_pair_or_triple_of_a_brute_search_is_cheaper() -> None:
     assert found.cost <= cheapest * 1.001
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("degrees", [1.0, 5.0, 15.0])
 @pytest.mark.parametrize(("A", "C", "spin"), [(120.0, 80.0, 3.0), (120.0, 80.0, -3.0), (90.0, 120.0, 2.0)])
 def test_real_thrusters_keep_their_limits_and_leave_nothing(A: float, C: float, spin: float, degrees: float) -> None:
@@ -239,6 +242,7 @@ def flies(seed: int, dearest: float) -> None:
     assert made.pulses.propellant <= dearest * bounds.first_order
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", some(range(16), always=6))
 def test_random_layouts_are_planned(seed: int) -> None:
     flies(seed, 1.03)
@@ -258,6 +262,7 @@ KNOWN = {
 """Propellant, kg, of layouts as commit b69e7e0 plans them: by linear programs alone, which another solver solved."""
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", KNOWN)
 def test_layouts_cost_no_more_than_by_linear_programs_alone(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The schedule found, and the one that ends earlier and is taken in its place, within what counts as equal."""
@@ -292,6 +297,7 @@ def test_many_random_layouts_are_planned(seed: int) -> None:
     flies(seed, 1.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "degrees"), [(0, 1.0), slow(1, 5.0)])
 def test_no_flown_schedule_of_a_brute_search_is_cheaper(seed: int, degrees: float) -> None:
     brute_search(seed, degrees, 40)

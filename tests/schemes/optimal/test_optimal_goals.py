@@ -32,6 +32,7 @@ def thrusters() -> tuple[Channel, ...]:
     return cross(8.0, min_on_time=0.02, max_on_time=2.0)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("A", "C", "spin"), [(120.0, 80.0, 3.0), (120.0, 80.0, -3.0), (90.0, 120.0, 2.0)])
 @pytest.mark.parametrize(
     ("tilt", "azimuth", "degrees"), [slow(2.0, 0.0, 5.0), (10.0, 200.0, 5.0), slow(15.0, 60.0, 0.0)]
@@ -62,6 +63,7 @@ def spin_thrusters() -> tuple[Channel, ...]:
     return (*thrusters(), *pair)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize("factor", some([0.7, 1.0, 1.02, 1.4], always=2))
 def test_the_spin_ends_as_asked(spin: float, factor: float) -> None:

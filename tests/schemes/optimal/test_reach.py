@@ -40,6 +40,7 @@ def test_by_so_much_the_goal_may_be_missed() -> None:
     assert reach.supplies(most, goal, 0.41)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", some([0.05, 0.02]))
 def test_the_shortest_horizon_is_that_of_the_program(torque: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """By bisection with the linear program alone, and with what is known without it."""

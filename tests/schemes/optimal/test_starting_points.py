@@ -48,6 +48,7 @@ def task_of(spacecraft: Spacecraft, equations: Equations | None = None) -> Task:
     return Task(spacecraft, equations or Equations(), spacecraft.channels, costs)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", some(BEATEN, always=3))
 def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
     spacecraft = load_spacecraft(case(f"{name}.yaml"))
@@ -84,6 +85,7 @@ def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
     assert max(flown.nutation, flown.shift) < TEN_NANODEGREE
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "limits",
     [
@@ -118,6 +120,7 @@ def test_on_times_are_none_or_at_least_the_least() -> None:
     assert made.pulses.total_impulse >= plan(free, "optimal").pulses.total_impulse * (1.0 - 1e-6)
 
 
+@pytest.mark.slow
 def test_h_may_end_off_its_target_and_that_saves() -> None:
     spacecraft = strong(5.0, 1.0)
     kept = plan(spacecraft, "optimal").pulses.total_impulse
@@ -129,6 +132,7 @@ def test_h_may_end_off_its_target_and_that_saves() -> None:
     assert free * (1.0 - 1e-6) <= loose.pulses.total_impulse < 0.99 * kept
 
 
+@pytest.mark.slow
 def test_the_same_plan_every_time() -> None:
     one, two = (plan(strong(), "optimal").pulses for _ in range(2))
     assert [(pulse.start, pulse.on_time) for pulse in one] == [(pulse.start, pulse.on_time) for pulse in two]

@@ -39,6 +39,7 @@ def floor(spacecraft: Spacecraft) -> float:
 # --- steerable -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), BODIES)
 @pytest.mark.parametrize(("tilt", "azimuth"), TARGETS)
@@ -52,6 +53,7 @@ def test_any_axis_from_any_nutation_by_the_reference_integrator(
         assert off_target(spacecraft, made) < 1e-9
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("degrees", [0.0, 1.0, 5.0, 20.0, 40.0, 60.0])
 @pytest.mark.parametrize("tilt", [0.5, 1.0, 5.0, 20.0, 60.0, 120.0])
 def test_cost_is_never_below_the_floor(tilt: float, degrees: float) -> None:
@@ -162,6 +164,7 @@ def test_ticks_leave_no_more_than_their_resolution() -> None:
 # --- body-fixed ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), BODIES[:2])
 @pytest.mark.parametrize(("degrees", "tilt", "azimuth"), [(0.0, 5.0, 70.0), (5.0, 10.0, 45.0), (20.0, 40.0, -120.0)])
