@@ -115,6 +115,15 @@ def test_results_under_other_disturbances_are_not_taken_up(tmp_path: Path) -> No
     assert load_results(path, a_study(disturbances=(leak,)), 200).done == 100
 
 
+def test_nor_those_with_other_dissipation(tmp_path: Path) -> None:
+    path = str(tmp_path / "study.npz")
+    save_results(path, run(Results(a_study(dissipation=3600.0), 100)))
+    for dissipation in (None, 1800.0):
+        with pytest.raises(BadRequest, match="another study"):
+            load_results(path, a_study(dissipation=dissipation), 200)
+    assert load_results(path, a_study(dissipation=3600.0), 200).done == 100
+
+
 @pytest.mark.parametrize("content", [b"", b"not a study", b"PK\x03\x04 broken"])
 def test_what_is_no_study_file_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "study.npz"
