@@ -108,6 +108,11 @@ def fan(count: int, torque: float, first: float = 0.3) -> tuple[Channel, ...]:
     )
 
 
+def pulse(t: float, on_time: float, impulse: Vector, name: str = "T") -> Pulse:
+    """A rectangular pulse, or with no on-time an ideal impulse."""
+    return Pulse(t, on_time, name, impulse, None if on_time == 0.0 else impulse / on_time)
+
+
 def events(made: Schedule | tuple[Pulse, ...]) -> list[reference.Push | reference.Kick]:
     """What the reference integrator flies for a schedule."""
     return [

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import spinner
+from builders import pulse, spinner
 from cases_dir import CASES
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_flight import pulse, schedules, symmetric_spinners, triaxial_spinners
+from test_flight import schedules, symmetric_spinners, triaxial_spinners
 
 from nutdamp import dynamics, flight, planning, work
 from nutdamp.dynamics import Dynamics, make_dynamics

@@ -81,35 +81,29 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
     assert {(end, cost) for end, cost in crossed.tolist()} == failing
 
 
+def near_each_other(count: int, *, later: float, cheaper: float) -> list[fronts.Point]:
+    """Points of which each ends ``later`` s after the one before, and costs so much less."""
+    point = traded()[0].points[0]
+    close = []
+    for step in range(count):
+        pulses = tuple(
+            replace(one, t=one.t + later * step, impulse=one.impulse * (1.0 - cheaper * step))
+            for one in point.plan.pulses
+        )
+        close.append(point._replace(plan=replace(point.plan, schedule=replace(point.plan.pulses, pulses=pulses))))
+    return close
+
+
 def test_points_close_together_keep_numbers_that_can_be_read() -> None:
     """Eighty schedules of which each costs a little less, a little later."""
-    (strict, _) = traded()
-    point = strict.points[0]
-    assert point.plan.schedule is not None
-    close = []
-    for step in range(80):
-        pulses = tuple(
-            replace(one, t=one.t + 0.006 * step, impulse=one.impulse * (1.0 - 0.0022 * step))
-            for one in point.plan.schedule
-        )
-        made = replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))
-        close.append(point._replace(plan=made))
+    close = near_each_other(80, later=0.006, cheaper=0.0022)
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
     check_layout(figure, crowded=True)
     assert {str(count) for count in range(1, 81)} <= {text.get_text() for text, _ in texts(figure)}
 
 
 def test_numbers_of_points_close_together_are_nearest_to_their_own_or_joined_to_them() -> None:
-    (strict, _) = traded()
-    point = strict.points[0]
-    assert point.plan.schedule is not None
-    close = []
-    for step in range(5):
-        pulses = tuple(
-            replace(one, t=one.t + 0.4 * step, impulse=one.impulse * (1.0 - 0.004 * step))
-            for one in point.plan.schedule
-        )
-        close.append(point._replace(plan=replace(point.plan, schedule=replace(point.plan.schedule, pulses=pulses))))
+    close = near_each_other(5, later=0.4, cheaper=0.004)
     figure = figures.trade_figure(BODY, (fronts.Front(0.0, tuple(close)),))
     check_layout(figure)
     (axes,) = figure.axes

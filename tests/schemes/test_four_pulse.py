@@ -4,33 +4,25 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 
 import pytest
 from builders import Outcome, channel, cross, fan, spinner, within
-from checker import violations
+from planned import feasible_by, left
 
-from nutdamp import flight, planning
+from nutdamp import planning
 from nutdamp.errors import SenselessOption
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schemes import Options
 from nutdamp.schemes.options import FourPulseOptions
-from nutdamp.spacecraft import Limits, Spacecraft
+from nutdamp.spacecraft import Limits
 
 NANODEGREE = math.radians(1e-9)
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 10.0), (100.0, 190.0)]
 SPINS = [3.0, -3.0]
 
 
-def feasible(spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
-    plan = planning.plan(spacecraft, "four-pulse", options)
-    assert plan.feasible, infeasibility(plan)
-    assert violations(spacecraft, plan.pulses) == []
-    return plan
-
-
-def left(plan: planning.Plan) -> flight.Residual:
-    assert plan.flown is not None
-    return plan.flown
+feasible = partial(feasible_by, "four-pulse")
 
 
 def transverse_rate_after(plan: planning.Plan) -> float:

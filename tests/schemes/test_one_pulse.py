@@ -6,10 +6,11 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from builders import Outcome, channel, cross, fan, spinner, transverse
-from checker import violations
+from planned import feasible_by, left
 
 from nutdamp import flight, planning
 from nutdamp.remarks import infeasibility, remarks
@@ -20,16 +21,7 @@ SPINS = [3.0, -3.0]
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 20.0)]
 
 
-def feasible(spacecraft: Spacecraft) -> planning.Plan:
-    plan = planning.plan(spacecraft, "one-pulse")
-    assert plan.feasible, infeasibility(plan)
-    assert violations(spacecraft, plan.pulses) == []
-    return plan
-
-
-def left(plan: planning.Plan) -> flight.Residual:
-    assert plan.flown is not None
-    return plan.flown
+feasible = partial(feasible_by, "one-pulse")
 
 
 def infeasible(spacecraft: Spacecraft) -> str:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 from builders import Outcome, channel, cross, fan, spinner, transverse, within
 from checker import violations
+from planned import feasible_by, left
 
 from nutdamp import flight, planning
 from nutdamp.physics import damping
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import Options
-from nutdamp.spacecraft import Limits, Spacecraft, Steerable
+from nutdamp.spacecraft import Limits, Steerable
 
 NANODEGREE = math.radians(1e-9)
 SPINS = [3.0, -3.0]
@@ -23,16 +25,7 @@ RATIOS = [round(a, 1) for a in np.arange(-0.9, 0.91, 0.1)]
 """a from -0.9 to 0.9, the sphere included."""
 
 
-def feasible(spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
-    plan = planning.plan(spacecraft, "two-pulse", options)
-    assert plan.feasible, infeasibility(plan)
-    assert violations(spacecraft, plan.pulses) == []
-    return plan
-
-
-def left(plan: planning.Plan) -> flight.Residual:
-    assert plan.flown is not None
-    return plan.flown
+feasible = partial(feasible_by, "two-pulse")
 
 
 # --- steerable -------------------------------------------------------------------------------------------------------
