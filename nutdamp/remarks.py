@@ -23,19 +23,19 @@ TELLING = math.radians(1e-6)
 CUT = "the search ended at its limit of work"
 
 
-def remarks(plan: Plan) -> tuple[str, ...]:
-    """All of them; what the scheme says comes first."""
+def remarks(plan: Plan, *, cones: bool = True) -> tuple[str, ...]:
+    """All of them, what the scheme says first; without ``cones`` where those that are broken are named elsewhere."""
     notes = plan.pulses.notes
     if plan.cut:
         notes = (*notes, f"{CUT}: this is the best schedule found so far")
     if plan.flown is None or not len(plan.pulses):
         return notes
-    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan), *_cones(plan))
+    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan), *(_cones(plan) if cones else ()))
 
 
-def _cones(plan: Plan) -> Iterator[str]:
+def _cones(plan: Plan) -> tuple[str, ...]:
     """Cones that a plan without a target does not keep: it is not its task to."""
-    yield from (f"warning: {strays(one)}" for one in plan.aspects if not one.kept)
+    return tuple(f"warning: {strays(one)}" for one in plan.aspects if not one.kept)
 
 
 def infeasibility(plan: Plan) -> str:

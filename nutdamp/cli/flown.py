@@ -82,10 +82,11 @@ def compared_with(job: Job, names: Sequence[str], options: Options) -> Compariso
         return compare(job.spacecraft, names, options)
 
 
-def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False) -> Plan:
+def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:
     """What a command flies, as a plan; raises Infeasible where there is none.
 
     ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
+    ``judged``: a verdict on the screen names the cones that are broken.
     """
     from nutdamp.errors import Infeasible
     from nutdamp.remarks import infeasibility, remarks
@@ -94,10 +95,10 @@ def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = Fal
         return _read(job, flown.schedule, options)
     if flown.blocks is not None:
         return _fired(job, flown.blocks, options, jitter=jitter)
-    plan = _recommended(job, options) if flown.scheme is None else _planned(job, flown.scheme, options)
+    plan = _recommended(job, options, judged=judged) if flown.scheme is None else _planned(job, flown.scheme, options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
-    for text in remarks(plan):
+    for text in remarks(plan, cones=flown.scheme is not None and not judged):
         job.remark(text)
     return plan
 
@@ -122,8 +123,8 @@ def _planned(job: Job, scheme: str, options: Options) -> Plan:
         return planning.plan(job.spacecraft, scheme, options)
 
 
-def _recommended(job: Job, options: Options) -> Plan:
-    """The plan that is recommended; raises Infeasible where there is none."""
+def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
+    """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
     from nutdamp.presentation import verdicts
 
@@ -132,7 +133,7 @@ def _recommended(job: Job, options: Options) -> Plan:
     show_failures(compared)
     if plan is not None:
         job.remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
-    job.warn(verdicts.warnings(compared))
+    job.warn(verdicts.warnings(compared, beside_verdict=judged))
     if plan is None:
         raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
     return plan

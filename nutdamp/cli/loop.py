@@ -113,4 +113,4 @@ def _map(body: Spacecraft, drawn: bool) -> str | Figure:
         return map_csv(found)
     from nutdamp.presentation.figures.loop import map_figure
 
-    return map_figure(found, body.inertia.C / body.inertia.A)
+    return map_figure(found, body)

@@ -66,13 +66,14 @@ def command(
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
-    breaks a cone of keep. SPACECRAFT is a YAML file, or - for standard input; without it spacecraft.yaml in this
-    folder, else the built-in example. A FILE of - is standard output, for --schedule standard input.
+    breaks a cone of keep; 0 for free motion, which is no plan to judge. SPACECRAFT is a YAML file, or - for standard
+    input; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for
+    --schedule standard input.
     """
     if drawn and "-" in (csv, json, plot):
         raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
-    plan = plan_or_read(job, flown, options, jitter=True)
+    plan = plan_or_read(job, flown, options, jitter=True, judged=not job.silent)
 
     from nutdamp.presentation.geometry import shown_until
     from nutdamp.presentation.verdicts import model_warnings

@@ -192,3 +192,18 @@ def test_a_cone_that_is_broken_is_as_bad(run: Run, tmp_path: Path) -> None:
     )
     assert (kept.returncode, broken.returncode) == (0, 4)
     assert json.loads((tmp_path / "end.json").read_text())["decision"]["met"] is False
+
+
+def test_a_broken_cone_is_said_once(run: Run) -> None:
+    """By the verdict on the screen; as a remark where the results take the place of the screen."""
+    text = (
+        "name: Keeper\ninertia: {A: 120, C: 80}\nstate: {spin: 30 rpm, nutation: 5 deg}\n"
+        "steerable: {torque: 60 N m}\nrequirement: {nutation: 1 deg}\n"
+        "attitude: {frame: EME2000, quaternion: [1, 0, 0, 0]}\n"
+        "keep: [{name: star, direction: [0, 89 deg], min: 5 deg}]\n"
+    )
+    for named in (("--scheme", "two-pulse"), ()):
+        for outputs in ((), ("--json", "-")):
+            done = run("simulate", "-", *named, *outputs, stdin=text)
+            said = done.stderr + done.stdout * (not outputs)
+            assert " ".join(said.split()).count("the spin axis comes to") + said.count("The spin axis comes to") == 1

@@ -313,8 +313,26 @@ def test_on_a_phone_nothing_to_decide_on_has_to_be_scrolled(tab: Browse) -> None
         assert first["x"] >= 0.0
         assert first["x"] == box.bounding_box()["x"]
     with tab(DISPERSED, 800) as page:
-        assert page.evaluate(VISIBLE, ".apart svg") == []
+        assert page.evaluate(VISIBLE, ".whole:not(.triple) ~ .apart svg") == []
         assert len(page.evaluate(VISIBLE, ".whole svg")) >= 2
+
+
+@pytest.mark.parametrize("width", [721, 800, 959, 961])
+def test_between_phone_and_desk_text_in_pictures_is_read(tab: Browse, width: int) -> None:
+    """Three panels beside each other, as those of a far track of H, have 6.7 px at 721 px of width."""
+    with tab(DISPERSED, width) as page:
+        assert (page.evaluate(VISIBLE, ".triple ~ .apart svg") != []) == (width <= 960)
+        letters = [row for _, texts in page.evaluate(LETTERED) for row in texts if row[2] <= -1.0]
+    assert len(letters) > 100
+    assert min(height for _, height, _, _ in letters) >= 9.0
+
+
+def test_a_number_stays_with_its_unit(tab: Browse) -> None:
+    """In the tiles, where a line is short."""
+    with tab("ace", 1280) as page:
+        tiles = page.eval_on_selector_all(".figures dd:not(.note)", "all => all.map((one) => one.textContent)")
+    assert any("\N{NO-BREAK SPACE}deg" in one for one in tiles)
+    assert not [one for one in tiles if re.search(r"\d (?:deg|rpm|rad/s|s|g|kg)\b", one)]
 
 
 LETTERED = """() => [...document.querySelectorAll("figure svg")]

@@ -19,8 +19,7 @@ from nutdamp.errors import BadRequest, CannotWrite
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import history, sphere, style
-from nutdamp.presentation.figures.legends import legend
-from nutdamp.presentation.figures.motion import short_name
+from nutdamp.presentation.figures.legends import legend, short_name
 from nutdamp.presentation.figures.style import INK, MOTION
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -277,7 +276,7 @@ class Scene:
             for number, pulse in enumerate(self.flight.schedule, start=1)
             if pulse.start <= now <= pulse.end + HELD * self.timed.pace
         ]
-        return f"{short_name(self.flight)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
+        return f"{short_name(self.flight.spacecraft)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
 
     @property
     def _digits(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nutdamp.loop.budget import DAY, YEAR, Budget, Held
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 
 if TYPE_CHECKING:
@@ -21,6 +21,8 @@ LINES = ((MOTION, "-"), (PULSE, "--"), (MOMENTUM, "-."), (GREY, ":"))
 
 WIDE = 30.0
 """Ratio of the longest bar to the shortest from which on their axis is logarithmic."""
+
+HEAD = "nutation by itself, and held between thresholds by the loop"
 
 PERIODS = 4.0
 """Cycles that are drawn of the longest."""
@@ -37,6 +39,7 @@ def budget_figure(found: Budget) -> Figure:
         alone = figure.subplots()
         _courses(alone, found, held)
         legend(figure, [alone])
+        heading(figure, found.spacecraft, HEAD)
         return figure
     grid = figure.add_gridspec(2, 2, height_ratios=[3.0, 0.9 + 0.22 * len(held)])
     courses = figure.add_subplot(grid[0, :])
@@ -51,6 +54,7 @@ def budget_figure(found: Budget) -> Figure:
     else:
         _bars(mass, [""] * len(held), [(one or 0.0) * YEAR for one in known], "propellant, kg a year")
     legend(figure, [courses])
+    heading(figure, found.spacecraft, HEAD)
     return figure
 
 

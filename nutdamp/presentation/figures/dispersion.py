@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +16,7 @@ from nutdamp.physics import attitude
 from nutdamp.presentation import geometry
 from nutdamp.presentation.dispersion_tables import budget_rows
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.verdicts import cases_verdict, exact_percent
 from nutdamp.spacecraft import Vector
@@ -25,9 +24,6 @@ from nutdamp.spacecraft import Vector
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
-
-LETTERS = 11.0
-"""Of the title that have room in an inch."""
 
 BINS = 80
 
@@ -65,11 +61,10 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     study = results.study
     figure = DRAWN[name](results)
     how = "real pulse widths" if study.flown else "impulse sum (17)"
-    heading = f"{study.model.spacecraft.name}: {scheme} by {how}, {results.done:,} dispersed cases"
+    shown = f"{scheme} by {how}, {results.done:,} dispersed cases"
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
-    letters = int(LETTERS * figure.get_figwidth())
-    figure.suptitle("\n".join(fill(line, letters) for line in (heading + verdict).split("\n")))
+    heading(figure, study.model.spacecraft, shown + verdict)
     style.settle(figure)
     return figure
 

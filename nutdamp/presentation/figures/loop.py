@@ -13,9 +13,11 @@ from nutdamp.loop.stability import Map
 from nutdamp.loop_settings import GYRO
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.history import TIME, firings
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
+from nutdamp.presentation.figures.motion import title
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
-from nutdamp.spacecraft import Vector
+from nutdamp.presentation.loop_tables import described
+from nutdamp.spacecraft import Spacecraft, Vector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,6 +50,8 @@ def loop_figure(plan: LoopPlan) -> Figure:
     firings(fired, run.flight, run.until, brief=True)
     fired.set_xlabel(TIME)
     legend(figure, [signal, nutation])
+    figure.suptitle(f"{title(run.flight)}\n{described(run.loop, thresholds=False)}")
+    style.settle(figure)
     return figure
 
 
@@ -108,8 +112,8 @@ def _nutation(axes: Axes, plan: LoopPlan) -> None:
 
 
 @style.styled
-def map_figure(found: Map, ratio: float) -> Figure:
-    """Where the loop damps and where it feeds, over unforeseen delay and C/A; ``ratio`` is that of the file."""
+def map_figure(found: Map, spacecraft: Spacecraft) -> Figure:
+    """Where the loop damps and where it feeds, over unforeseen delay and C/A."""
     from matplotlib.colors import BoundaryNorm
 
     figure = style.sheet(7.4, 4.8)
@@ -118,9 +122,12 @@ def map_figure(found: Map, ratio: float) -> Figure:
     norm = BoundaryNorm(levels, 256, extend="max")
     mesh = axes.pcolormesh(found.delays, found.ratios, found.factor, cmap="RdBu_r", norm=norm, shading="nearest")
     axes.contour(found.delays, found.ratios, found.factor, levels=[1.0], colors=INK, linewidths=1.2)
+    ratio = spacecraft.inertia.C / spacecraft.inertia.A
     axes.axhline(ratio, color=INK, linewidth=0.9, linestyle="--", label="C/A of the file")
     axes.set_xlabel("delay that the law does not compensate, s")
     axes.set_ylabel("C/A")
-    figure.colorbar(mesh, ax=axes, label="nutation left by a firing and a period: below 1 it damps")
+    said = "nutation after a firing and a period,\nover that before; below 1 it damps"
+    figure.colorbar(mesh, ax=axes, label=said)
+    heading(figure, spacecraft, "where the loop damps (blue) and where it feeds the nutation (red)")
     legend(figure, [axes])
     return figure

@@ -9,8 +9,9 @@ import numpy as np
 
 from nutdamp.loop.study import LoopResults
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, MOTION, PULSE
+from nutdamp.presentation.verdicts import cases_verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,6 +41,9 @@ def loop_cases_figure(results: LoopResults) -> Figure:
         largest.axvline(degrees * required.nutation, color=PULSE, linewidth=1.4, label="required")
     _histogram(propellant, results, "propellant", 1e3, "propellant, g")
     legend(figure, [quiet, largest])
+    share = results.met_fraction
+    verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
+    heading(figure, study.spacecraft, f"closed loop, {results.done:,} dispersed cases{verdict}")
     return figure
 
 

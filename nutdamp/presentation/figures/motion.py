@@ -12,7 +12,7 @@ from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.end_tables import direction_text
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import legend, short_name
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, Meant
 from nutdamp.presentation.text import degrees, moment
 from nutdamp.spacecraft import Channel, Vector
@@ -33,9 +33,6 @@ MANY = 12
 
 SPARSE = 40
 """Pulses of which each has a dot."""
-
-LONGEST_NAME = 40
-"""Characters of a name that fit above a picture."""
 
 
 def motion(flight: Flight, track: Track) -> Figure:
@@ -68,13 +65,7 @@ def title(flight: Flight) -> str:
         if goal is None
         else f"H turned {degrees(flight.spacecraft.to_turn)} to the target, {direction_text(flight.spacecraft, goal)}\n"
     )
-    return f"{short_name(flight)}: {how}, {pulses}\n{turn}{result}, {aim} {degrees(left.axis_error)}"
-
-
-def short_name(flight: Flight) -> str:
-    """The name of the spacecraft, cut where it is too long for a heading."""
-    name = " ".join(flight.spacecraft.name.split())
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
+    return f"{short_name(flight.spacecraft)}: {how}, {pulses}\n{turn}{result}, {aim} {degrees(left.axis_error)}"
 
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:

@@ -14,7 +14,7 @@ from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import in_degrees
 from nutdamp.presentation.verdicts import percent
@@ -78,7 +78,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
     if chosen is not None and chosen.standing is Standing.MISSES:
         verdict += f" ({_short(chosen)})"
-    figure.suptitle(f"{compared.spacecraft.name}: schemes by real pulse widths\n{verdict}")
+    heading(figure, compared.spacecraft, f"schemes by real pulse widths\n{verdict}")
     style.settle(figure)
     return figure
 

@@ -12,7 +12,7 @@ import numpy as np
 from nutdamp.fronts import Front, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
 from nutdamp.spacecraft import Spacecraft
@@ -50,7 +50,7 @@ def trade_figure(
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
     names = ", ".join(schemes_of(found))
-    figure.suptitle(f"{spacecraft.name}: what time costs, by {names}, flown by real pulse widths")
+    heading(figure, spacecraft, f"what time costs, by {names}, flown by real pulse widths")
     reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, found))
     points = [point for _, _, point in numbered(found)]
     if not points:

@@ -66,6 +66,10 @@ class Points:
     rows: tuple[str, ...]
 
 
+LONG = 550.0
+"""Units of a drawing of which text of 7.5 units is 9 px high on a page of 720 px."""
+
+
 @dataclass(frozen=True, slots=True)
 class Picture:
     """An ``<svg>`` element, its title, a caption, and what it shows in words for those who do not see it.
@@ -81,6 +85,11 @@ class Picture:
     narrow: str = ""
     name: str = ""
     views: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def long(self) -> bool:
+        """Whether its text is too small to read where the page is little wider than a narrow screen."""
+        return float(self.svg.split('viewBox="', 1)[1].split()[2]) > LONG
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,8 +51,8 @@ def _part(name: str) -> str:
 
 
 def _phrases(value: str) -> list[str]:
-    """The parts of a number to read first, which breaks at commas and arrows only."""
-    return re.split(r"(?<=[→,]) ", value)
+    """The parts of a number to read first, which breaks at commas and arrows; never between a number and its unit."""
+    return re.split(r"(?<=[→,]) ", re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", value))
 
 
 def _css(text: str) -> str:
