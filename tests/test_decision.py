@@ -165,7 +165,7 @@ def test_the_warning_names_the_plans_that_keep_the_cones() -> None:
     assert page.verdict.count("the spin axis comes to") == 1
     assert page.verdict.endswith("Plans that keep all cones: one-pulse.")
     assert verdicts.warnings(compare(body, ["one-pulse"]))[0].startswith("one-pulse does not meet the requirement.")
-    assert verdicts.reason(compared) == "least propellant of the 2 plans that meet the requirement"
+    assert verdicts.reason(compared) == "least propellant of the 2 plans that meet the requirement at the end"
 
 
 FILE = """
