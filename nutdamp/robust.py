@@ -34,6 +34,9 @@ from nutdamp.tightening import Tightening, tightening
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
 
+WIDEST = 1.3
+"""Largest margin of a front, over the sigmas of the probability required."""
+
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
 
@@ -159,6 +162,26 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         if base.scheme == surest.SCHEME:
             found.append(partial(surest.plans, body, options))
     return found
+
+
+def trials_of_front(comparison: Comparison, points: int) -> list[Attempt]:
+    """What the front of propellant against probability is of: the plans compared, and ``points`` margins."""
+    body, found = comparison.spacecraft, list[Attempt]()
+    found += [partial(list, [("as planned", base)]) for base in comparison.plans if base.failure is None]
+    for number in range(points):
+        margin = WIDEST * (number + 1) / points
+        found.append(partial(surest.plans, body, None, [margin]))
+    return found
+
+
+def front(found: RobustComparison) -> tuple[Candidate, ...]:
+    """The candidates that no other beats in cost and in the share that complies, the cheapest first."""
+    best, kept = -1.0, []
+    for one in sorted(found.candidates, key=lambda one: (one.plan.pulses.cost, -(one.met or 0.0))):
+        if one.met is not None and one.met > best:
+            kept.append(one)
+            best = one.met
+    return tuple(kept)
 
 
 def compare(

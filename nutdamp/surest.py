@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -126,8 +126,13 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Inpu
     return found, tuple(drawn)
 
 
-def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
-    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required."""
+def plans(
+    spacecraft: Spacecraft, options: Options | None = None, margins: Sequence[float] = ()
+) -> Iterator[tuple[str, Plan]]:
+    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required.
+
+    ``margins`` in the sigmas of the probability required; those that lead to it by default.
+    """
     body = planning.known(spacecraft, schemes.options_of(schemes.SCHEMES[SCHEME], options))
     if not compliance.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
@@ -135,7 +140,10 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
         search = _Search(spacecraft, body)
     except Infeasible:
         return
-    yield from search.plans()
+    if margins:
+        yield from ((name, plan) for one in margins for name, plan, _ in search.tried(one * search.sigmas))
+    else:
+        yield from search.plans()
 
 
 class _Search:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from nutdamp import __version__
 from nutdamp.compliance import aim
-from nutdamp.files.plan_json import final_json, plan_json, target_json
-from nutdamp.robust import Candidate, RobustComparison
+from nutdamp.files.output import csv_text, number
+from nutdamp.files.plan_json import final_json, plan_json, spacecraft_json, target_json
+from nutdamp.robust import Candidate, RobustComparison, front
 
 
 def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
@@ -45,6 +47,33 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
             "nutation_deg": math.degrees(found.cost.nutation),
         },
     }
+
+
+HEADER = ("point", "propellant_kg", "total_impulse_Nms", "met_fraction", "end_s", "pulses", "scheme", "variant")
+
+
+def front_json(found: RobustComparison) -> dict[str, Any]:
+    """The front of ``trade --robust``, the cheapest first, with plans as ``plan --json`` gives them."""
+    numbered = enumerate(front(found), start=1)
+    return {
+        "nutdamp": __version__,
+        "spacecraft": spacecraft_json(found.comparison.spacecraft),
+        "probability": found.probability,
+        "samples": found.samples,
+        "seed": found.seed,
+        "points": [{"point": at, **_candidate(one), "plan": plan_json(one.plan)} for at, one in numbered],
+    }
+
+
+def front_csv(found: RobustComparison) -> str:
+    """One row a point of the front, the cheapest first."""
+    return csv_text(HEADER, (_row(at, one) for at, one in enumerate(front(found), start=1)))
+
+
+def _row(index: int, one: Candidate) -> list[str]:
+    pulses = one.plan.pulses
+    numbers = (pulses.propellant, pulses.total_impulse, one.met, pulses.end)
+    return [str(index), *map(number, numbers), str(len(pulses)), one.plan.scheme, one.variant]
 
 
 def _candidate(one: Candidate) -> dict[str, Any]:

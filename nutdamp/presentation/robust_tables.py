@@ -13,7 +13,7 @@ from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
 from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.remarks import infeasibility
-from nutdamp.robust import RobustComparison
+from nutdamp.robust import RobustComparison, front
 
 MOST_ROWS = 12
 """Candidates that the table names."""
@@ -43,6 +43,34 @@ def robust_screen(found: RobustComparison) -> RenderableType:
     if len(decided.plan.pulses):
         parts += [Text(), pulse_table(decided.plan)]
     return Group(*parts)
+
+
+def front_screen(found: RobustComparison) -> RenderableType:
+    """Everything that ``trade --robust`` shows: what it costs that more cases comply."""
+    body, rows = found.comparison.spacecraft, front(found)
+    propellant = all(one.plan.pulses.propellant is not None for one in rows)
+    heads = (
+        "point\n",
+        "propellant\ng" if propellant else "impulse\nN m s",
+        "cases that\ncomply",
+        "more than\nthe first",
+    )
+    table = columns(*heads, "ends at\ns", "pulses\n", "plan\n", text=("plan\n",))
+    for number, one in enumerate(rows, start=1):
+        pulses = one.plan.pulses
+        spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse
+        more = f"{100.0 * (pulses.cost / rows[0].plan.pulses.cost - 1.0):.1f} %"
+        cells = f"{spent:.4g}", verdicts.percent(one.met or 0.0, found.probability), more, f"{pulses.end:.3f}"
+        enough = "bold" if (one.met or 0.0) >= found.probability else ""
+        table.add_row(Text(str(number), style=enough), *cells, str(len(pulses)), f"{one.plan.scheme}, {one.variant}")
+    level, cases = verdicts.exact_percent(found.probability), f"{found.samples:,} dispersed cases of each plan"
+    heading = Text(f"What it costs that more cases comply ({level} required)", style="bold")
+    note = Text(
+        f"{cases}, flown through real widths, seed {found.seed}; plans that cost more with no more cases that "
+        f"comply are left out.",
+        style="dim",
+    )
+    return Group(Text(body.name, style="bold"), Text(), heading, table, note)
 
 
 def _why(plan: Plan) -> str:
