@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.aspect import Aspect
+from nutdamp.compliance import NEGLIGIBLE
 from nutdamp.hindrance import Hindrance, Obstacle
 from nutdamp.limits import Breach, Limit, breaches
 from nutdamp.planning import Plan
@@ -64,9 +65,10 @@ def strays(found: Aspect) -> str:
         if found.too_near
         else (found.largest, found.largest_at, f"max = {math.degrees(keep.most):.6g}°")
     )
+    seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
     if math.isinf(at):
-        return f"the target is {math.degrees(angle):.4g}° from {keep.name} ({bound})"
-    return f"the spin axis comes to {math.degrees(angle):.4g}° from {keep.name} at {at:.4g} s ({bound})"
+        return f"the target is {seen} from {keep.name} ({bound})"
+    return f"the spin axis comes to {seen} from {keep.name} at {at:.4g} s ({bound})"
 
 
 def said(plan: Plan) -> tuple[str, ...]:

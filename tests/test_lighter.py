@@ -11,11 +11,14 @@ import pytest
 import reference
 from builders import channel, spinner
 from scipy.integrate import solve_ivp
+from spinners import FILE as SPINNER
 
 from nutdamp import planning
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.agreement import lightening_error
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
-from nutdamp.errors import FaultyFile, Infeasible
+from nutdamp.errors import FaultyFile, Unsuitable
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import by_impulses, flown
 from nutdamp.lightening import lightened
@@ -23,8 +26,11 @@ from nutdamp.loop.run import fly
 from nutdamp.physics.feed import Tank
 from nutdamp.physics.valve import Trapezoid
 from nutdamp.schedule import Schedule, channel_pulse, on_command
+from nutdamp.schemes.tools import block_notes
+from nutdamp.schemes.tools.block_model import BlockModel
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.supply import supplied
+from nutdamp.tolerances import Dispersions, Tolerance
 from nutdamp.verification import verify
 
 SLOW = Trapezoid(0.015, 0.012, 0.005, 0.010)
@@ -187,7 +193,7 @@ def test_the_loop_refuses_moments_that_fall() -> None:
     loop = "loop: {sensor: {kind: gyro, rate: 100 Hz}, law: four-pulse, start: 0.3 deg, stop: 0.1 deg}\n"
     craft = read_spacecraft(f"{FILE}, inertia_per_kg: {{A: 1, C: 1}}}}\n{loop}", "sat.yaml")
     assert craft.loop is not None
-    with pytest.raises(Infeasible, match="inertia_per_kg"):
+    with pytest.raises(Unsuitable, match="inertia_per_kg"):
         fly(craft, craft.loop)
 
 
@@ -241,3 +247,29 @@ def test_without_blowdown_the_tank_is_empty_sooner(per_kg: tuple[float, float, f
     expected = flown(steady, Schedule((*fires[:-1], replace(fires[-1], propellant=part)))).residual
     assert row.nutation == pytest.approx(expected.nutation, rel=1e-6)
     assert row.momentum_shift == pytest.approx(expected.momentum_shift, rel=1e-6)
+
+
+def test_how_far_cases_of_falling_moments_err_is_said() -> None:
+    def said(per_kg: tuple[float, float, float] | None) -> str:
+        craft = replace(body(per_kg), dispersions=Dispersions(A=Tolerance("normal", 0.01, relative=True)))
+        jets = [one.of(valve=None, max_on_time=2.0) for one in craft.channels]
+        craft = replace(craft, channels=tuple(jets), tank=replace(craft.tank or TANK, propellant=0.02))
+        made = Schedule(supplied(craft, [on_command(one, 0.7 + 3.0 * at, 1.2) for at, one in enumerate(jets)]))
+        return lightening_error(study_of(craft, made))
+
+    assert said(None) == ""
+    assert said((1.0, 1.0, 0.5)) == ""
+    assert "in the nominal one that errs by " in said(SHED["A and C"])
+
+
+def test_no_cure_of_blocks_is_promised_where_moments_fall() -> None:
+    craft = read_spacecraft(SPINNER, "f.yaml")
+    tank = Tank(10.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.3, 0.3, 0.2))
+    said = [
+        block_notes.cures(BlockModel(one), one.channels, {}, Schedule(), [])
+        for one in (craft, replace(craft, tank=tank))
+    ]
+    assert [text.partition(":")[0] for text in said] == [
+        "to leave less",
+        "what limits these blocks, if the moments of inertia did not fall",
+    ]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 
 from nutdamp.commands import Block
+from nutdamp.epoch import Epoch
 from nutdamp.errors import nearest
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.table import Cells, Table
 from nutdamp.flight import Flight
+from nutdamp.schemes.tools.sun_pulses import fired, spin_turn
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.units import shown
 
@@ -78,8 +81,8 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
 
     Needed are channel, first_sun_pulse, count, delay_s and width_s; delay_counts and width_counts do for the last two
-    where the spacecraft file has the steps. every is 1 where it is left out. What else `HEADER` names is not looked at.
-    Raises CannotRead, and FaultyFile with every fault of the file.
+    where the spacecraft file has the steps. every is 1 where it is left out. A first_utc must be that of a first
+    pulse. Raises CannotRead, and FaultyFile with every fault of the file.
     """
     table = Table(path, HEADER, "blocks")
     times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
@@ -101,7 +104,35 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
         fired = sum(block.count for block in blocks)
         table.fault(1, "count", f"the blocks fire {fired} pulses; expected at most {MOST_FIRED}")
     table.check()
+    _expect_utc(table, spacecraft, blocks)
     return tuple(blocks), table.warned
+
+
+def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
+    """Faults of a first_utc that is no time, or more than a spin turn from when the first pulse of its block begins.
+
+    So much may a delay be edited by. Without an epoch only its form is looked at.
+    """
+    given = [(line, row[table.header.index("first_utc")]) for line, row in table.rows if "first_utc" in table.header]
+    parsed: dict[int, Epoch] = {}
+    for line, text in given:
+        try:
+            if text.strip():
+                parsed[line] = Epoch.parse(text.strip())
+        except ValueError:
+            table.fault(line, "first_utc", f"{shown(text)} is no date and time; expected 2026-03-01T12:00:00Z")
+    table.check()
+    place = spacecraft.attitude
+    if not parsed or place is None or place.epoch is None:
+        return
+    pulses, epoch, number = fired(spacecraft, blocks).pulses, Epoch.parse(place.epoch), 0
+    for (line, _), block in zip(given, blocks, strict=True):
+        begins = pulses[number].loaded[0]
+        number += block.count
+        if line in parsed and abs(parsed[line].since(epoch) - begins) > spin_turn(spacecraft):
+            cure = "correct first_sun_pulse, or leave first_utc empty"
+            table.fault(line, "first_utc", f"its first pulse begins at {spacecraft.utc(begins)}; {cure}")
+    table.check()
 
 
 TIMES = ("delay", "width")

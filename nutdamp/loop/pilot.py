@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.lightening import shed
 from nutdamp.limits import commandable
 from nutdamp.loop.diagnosis import Diagnosis, Glimpse, Stop
@@ -70,7 +70,8 @@ class Pilot:
         self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
     ) -> None:
         if shed(truth) is not None:
-            raise Infeasible("the loop flies with constant moments of inertia; leave tank.inertia_per_kg out")
+            problem = "a loop flies with constant moments of inertia; leave this out"
+            raise Unsuitable(("tank", "inertia_per_kg"), problem)
         self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
         self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)

@@ -15,6 +15,7 @@ from spinners import FILE
 from nutdamp.errors import FaultyFile
 from nutdamp.files.blocks_csv import HEADER, read_blocks
 from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.schemes.tools.sun_pulses import fired
 
 CRAFT = read_spacecraft(FILE, "f.yaml")
 TOP = "channel,first_sun_pulse,delay_s,width_s,count\n"
@@ -215,3 +216,21 @@ def test_the_screen_has_what_an_operator_compares_before_and_after(run: Run, tmp
         assert " g of 30 kg; 29.98" in rows["propell"]
         assert "mass 300 kg to 299.98" in rows["propell"]
         assert any(row.startswith("|ΔV|") and row.endswith(" m/s") for row in shown)
+
+
+def test_a_first_utc_that_is_none_or_another_is_a_fault_with_its_place(tmp_path: Path) -> None:
+    top, row = TOP.strip() + ",first_utc\n", "T1,3,1.0,0.1,4,{}\n"
+    (found,) = problems(top + row.format("yesterday"), tmp_path)
+    assert found.startswith("2: first_utc: 'yesterday' is no date and time")
+    (found,) = problems(top + row.format("1998-01-07T13:00:00Z"), tmp_path)
+    begins = CRAFT.utc(fired(CRAFT, read_blocks(edited(tmp_path, top + row.format("")), CRAFT)[0]).pulses[0].loaded[0])
+    assert found == (
+        f"2: first_utc: its first pulse begins at {begins}; correct first_sun_pulse, or leave first_utc empty"
+    )
+    assert not read_blocks(edited(tmp_path, top + row.format(begins)), CRAFT)[1]
+
+
+def edited(folder: Path, text: str) -> Path:
+    path = folder / "edited.csv"
+    path.write_text(text)
+    return path

@@ -9,6 +9,7 @@ import numpy as np
 
 from nutdamp.commands import Commands
 from nutdamp.compliance import Left, Part
+from nutdamp.lightening import shed
 from nutdamp.limits import OFF_TICK, commandable_widths
 from nutdamp.schedule import Schedule
 from nutdamp.schemes.tools.block_model import BlockModel
@@ -50,6 +51,8 @@ def cures(
 ) -> str:
     """What of the file keeps the blocks ``made`` from leaving less, besides ``more``; ``missed``: bounds, rad."""
     named = [*more, *too_coarse(model, channels, missed), *used_up(model.body, made)]
+    if shed(model.body) is not None:  # with other blocks the moments fall otherwise: no cure is sure to help
+        return "what limits these blocks, if the moments of inertia did not fall: " + listed(named or [ANY])
     return "to leave less: " + listed(named or [ANY])
 
 
