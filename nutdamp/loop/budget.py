@@ -21,6 +21,10 @@ DAY = 86400.0
 YEAR = 365.25 * DAY
 """s."""
 
+NOISY, WIDENED = 0.1, 0.2
+"""Noise of what is seen (one sigma), over the start threshold, above which firings are more than the map has, and the
+share by which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start."""
+
 DIFFERENT = 0.3
 """Share of the pulses by which one limit cycle differs from another."""
 
@@ -42,6 +46,7 @@ class Held:
     """The nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
 
     It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
+    ``noisy``: its noise is above `NOISY` of start.
 
     ``begins`` s is when the loop first fires, ``band`` what the sensor and the smallest pulse allow, ``lasts`` s how
     long the propellant in the tank is enough for the limit cycle, None where that is not known.
@@ -54,6 +59,7 @@ class Held:
     cycle: Cycle | None = None
     other: Cycle | None = None
     lasts: float | None = None
+    noisy: bool = False
     why: str = ""
 
     @property
@@ -154,7 +160,10 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
     try:
         found = replace(found, band=dead_band(body, loop))
         _expect_damping(body, loop)
-        cycle, *others = _attractors(body, loop, Map(body, loop, seed=seed))
+        made = Map(body, loop, seed=seed)
+        cycle, *others = _attractors(body, loop, made)
+        if made.seen.sigma > NOISY * made.start:
+            found, cycle = replace(found, noisy=True), cycle._replace(doubt=max(cycle.doubt, WIDENED))
         found = replace(found, cycle=cycle, other=others[0] if others else None)
         return replace(found, lasts=_lasts(body, loop, seed))
     except Infeasible as reason:

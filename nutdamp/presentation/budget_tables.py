@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.loop.budget import DAY, YEAR, Budget, Held
+from nutdamp.loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, Held
 from nutdamp.loop.chains import Cycle
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.loop_tables import described, warnings
@@ -77,6 +77,11 @@ def _warnings(found: Budget) -> Iterator[str]:
             said.append("the loop never falls quiet: it fires whenever a channel comes into line")
             if loop.sensor.noise == 0.0 and loop.stop > 0.0:
                 said.append("without noise the number of its pulses is known to a factor of two only")
+        if one.noisy:
+            said.append(
+                f"the noise of the sensor is above {100.0 * NOISY:g} % of loop.start: the loop fires more often than "
+                f"the figures say, which are known to {100.0 * WIDENED:g} % only"
+            )
         if one.other is not None and one.cycle is not None:
             said.append(_second(one.cycle, one.other))
         for text in said:
@@ -112,7 +117,7 @@ def _table(found: Budget) -> Table:
         "stop\ndeg",
         "pulses\na day",
         "propellant\nkg a year",
-        "a cycle\ntakes",
+        "cycle\n",
         "low\ndeg",
         "high\ndeg",
     ]

@@ -57,10 +57,10 @@ def better(decision: Decision) -> str:
     return f"more cases comply with {shares} than with {decision.plan.scheme} ({verdicts.percent(own, probability)})."
 
 
-def decision_table(decision: Decision) -> Table:
-    """One row a part of the requirement, and one for the share of cases that comply."""
+def decision_table(decision: Decision, values: str = "nominal") -> Table:
+    """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads what is left."""
     cases = decision.cases
-    heads = ["requirement", "limit", "nominal"]
+    heads = ["requirement", "limit", values]
     if cases is not None:
         heads.append(f"{verdicts.exact_percent(cases.probability)} of cases")
     table = columns(*heads, "margin", "verdict", text=("verdict",))

@@ -103,7 +103,8 @@ def beside(value: float, largest: float) -> str:
         return "0"  # but for rounding
     if not 1e-5 <= largest < 1e6:
         return f"{value:.2e}"
-    return f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
+    shown = f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
+    return shown if float(shown) else shown.lstrip("-")
 
 
 def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:

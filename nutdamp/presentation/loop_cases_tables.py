@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.dispersion.statistics import Array
+from nutdamp.dispersion.statistics import Array, Exact
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.presentation import verdicts
@@ -34,7 +34,7 @@ NAMES = {
     "nutation": ("largest, deg", 180.0 / math.pi),
     "momentum_shift": ("shift of H, deg", 180.0 / math.pi),
     "axis_error": ("axis error, deg", 180.0 / math.pi),
-    "spin_change": ("spin, mrad/s", 1e3),
+    "spin_change": ("spin off, mrad/s", 1e3),
     "propellant": ("propellant, g", 1e3),
     "firings": ("firings", 1.0),
 }
@@ -69,6 +69,8 @@ def _percentiles(results: LoopResults) -> Table:
     for output, plan in zip(OUTPUTS, results.study.nominal.tolist(), strict=True):
         name, scale = NAMES[output]
         found = results.distribution(output)
+        if found is not None and output == "spin_change":  # up or down, the largest change is the worst
+            found, plan = Exact(np.abs(results.of(output))), abs(plan)
         if found is None:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
@@ -95,8 +97,9 @@ def _share(results: LoopResults, count: int, of: int) -> str:
 
 
 def _settled(results: LoopResults) -> Iterator[RenderableType]:
-    yield Text.assemble(("Falls quiet ", "bold"), f"in {_share(results, results.settled, results.done)}.")
     stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Stop.END]
+    lasting = "and is not stopped, " if stopped else ""
+    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results, results.settled, results.done)}.")
     said = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
     never = results.done - results.settled - sum(count for _, count in stopped)
     if never:

@@ -45,7 +45,7 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
     else:
         parts += list(requirement(decision))
     parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
-    parts += [Text(), decision_table(decision), Text(), _outcome(plan)]
+    parts += [Text(), decision_table(decision, "nominal" if run.case is None else "this case"), Text(), _outcome(plan)]
     if run.fired:
         parts += [Text(), _firings(run)]
         if len(run.fired) > SHOWN:

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from process import Run
 
+from nutdamp.presentation.dispersion_tables import beside
+
 BODY = """
 name: Upper
 inertia: {A: 100 kg m^2, C: 70 kg m^2}
@@ -120,6 +122,19 @@ def test_a_loop_that_is_never_quiet_misses_the_requirement_alone_as_in_a_study(r
     assert (done.returncode, "never: loop.stop is 0" in done.stdout) == (0, True)
     still = run("loop", file, "--set", "omega0=[0, 0, 3]").stdout
     assert "it never shows the start threshold" in " ".join(still.split())
+
+
+def test_a_dispersed_case_is_headed_so_and_changes_of_spin_have_no_sign(run: Run, file: str) -> None:
+    spread = ("--set", "dispersions={A: {normal: 1 %}}", "--until", "20s")
+    head = next(line for line in run("loop", file, *spread, "--case", "2").stdout.splitlines() if " limit " in line)
+    assert "this case" in head
+    assert "nominal" not in head
+    shown = run("disperse", file, "--loop", *spread, "--samples", "50").stdout
+    (row,) = (line for line in shown.splitlines() if line.startswith("spin off, mrad/s"))
+    assert "-" not in row.removeprefix("spin off, mrad/s")
+    assert beside(-1e-9, 1.0) == "0.000"
+    stopped = run("disperse", file, "--loop", *spread, "--samples", "50", "--set", "loop.faults.reversed=[+M1]").stdout
+    assert "Falls quiet and is not stopped, in" in " ".join(stopped.split())
 
 
 def test_a_cone_that_is_broken_on_the_way_is_no_met_requirement(run: Run, file: str, tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ from builders import channel, spinner
 
 import nutdamp
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.loop.budget import DAY, YEAR, Thresholds, budget, reached
+from nutdamp.loop.budget import DAY, YEAR, Budget, Thresholds, budget, reached
 from nutdamp.loop.chains import Cycle
 from nutdamp.loop.cycles import Map
+from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
 from nutdamp.loop.odds import Odds
 from nutdamp.loop.run import fly
@@ -22,6 +23,7 @@ from nutdamp.loop.transfer import Transfer, transfer
 from nutdamp.loop_settings import BANG, ONE_PULSE, Loop, Sensor
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Trapezoid
+from nutdamp.presentation.budget_tables import _warnings
 from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft
 
 
@@ -252,6 +254,26 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     assert falling.lasts == pytest.approx(one.lasts, rel=0.6)
     assert falling.lasts != pytest.approx(one.lasts, rel=0.01)
     assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
+
+
+@pytest.mark.slow
+def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> None:
+    made = loop(gyro())
+    body = replace(craft(degrees=0.4), loop=made, tank=Tank(0.15, 22e5, 8e5, 1.0))
+    (held,) = budget(body).held
+    assert held.lasts is not None
+    run = fly(body, made, 1.2 * held.lasts, seed=3)
+    assert (run.stop, len(run.fired) > 400) == (Stop.EMPTY, True)
+    assert run.fired[-1].pulse.t - run.fired[0].pulse.t == pytest.approx(held.lasts, rel=0.02)
+
+
+def test_noise_above_a_tenth_of_start_widens_what_is_known() -> None:
+    start = Law(craft(), loop(gyro())).size(rad(0.5), 3.0)
+    for share, noisy in ((0.05, False), (0.2, True)):
+        (held,) = budget(replace(craft(), loop=loop(gyro(noise=share * start)))).held
+        assert held.cycle is not None
+        assert (held.noisy, held.cycle.doubt >= 0.2) == (noisy, noisy)
+        assert ("above 10 % of loop.start" in " ".join(_warnings(Budget(held.spacecraft, None, (held,))))) is noisy
 
 
 @pytest.mark.slow
