@@ -79,6 +79,7 @@ def test_steerable_torquer_too_weak_for_one_pulse_fires_a_train(A: float, C: flo
     spacecraft = spinner(A, C, spin, 8.0, steerable=Steerable(torque))
     plan = feasible(spacecraft)
     assert len(plan.pulses) > 5
+    assert max(pulse.on_time for pulse in plan.pulses) <= 0.25 * plain.body_period * (1.0 + 1e-9)  # 10 % lost to width
     assert left(plan).nutation < NANODEGREE
     # The last of a train of equal impulses stands against what is then left of ω, like all before it.
     assert Outcome(spacecraft, plan.pulses).nutation < NANODEGREE
