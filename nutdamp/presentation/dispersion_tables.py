@@ -14,6 +14,7 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.aspect import aspects
 from nutdamp.compliance import Part
+from nutdamp.demands import Keep
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.correlation import together
@@ -296,6 +297,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         "nutation\ndeg",
         "shift of H\ndeg",
         "axis error\ndeg",
+        *(f"{which} from\n{keep.name}, deg" for keep in study.model.spacecraft.keep for which in _bounded(keep)),
         "what counts most, in sigmas",
         text=("what counts most, in sigmas",),
     )
@@ -308,9 +310,22 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
         names = [in_words(entry.name) for entry in study.model.inputs.drawn]
         drawn = ", ".join(f"{names[row]} {sigmas[row]:+.1f}" for row in order if sigmas[row])
-        table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), drawn)
+        angles = [f"{math.degrees(angle):.4g}" for angle in _nearest_cones(study, draws)]
+        table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), *angles, drawn)
     again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
+
+
+def _bounded(keep: Keep) -> list[str]:
+    """Which of the angles to the direction of a cone are bounded: the least, the largest."""
+    return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
+
+
+def _nearest_cones(study: Study, draws: Mapping[str, float]) -> Iterator[float]:
+    """The angles of one case that are `_bounded`, rad, cone after cone."""
+    found, names = study.aspects_of(draws), ("least", "largest")
+    for keep, angles in zip(study.model.spacecraft.keep, () if found is None else found.tolist(), strict=False):
+        yield from (angles[names.index(which)] for which in _bounded(keep))
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:

@@ -8,7 +8,7 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.decisions import figures, requirement
+from nutdamp.presentation.decisions import KEPT, figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
 from nutdamp.presentation.text import MISSING, in_degrees
@@ -82,7 +82,8 @@ def _candidates(found: RobustComparison) -> RenderableType:
     counted = compliance.judged(found.comparison.spacecraft)
     propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
     cost = "propellant\ng" if propellant else "impulse\nN m s"
-    heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg")
+    cones = bool(found.comparison.spacecraft.keep)
+    heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg", *["nominal\ncones"] * cones)
     table = columns(*heads, *["cases that\ncomply"] * counted, text=("variant\n",))
     named = list(found.candidates[:MOST_ROWS])
     named += [one for one in (found.chosen, found.usual) if one is not None and one not in named]
@@ -95,6 +96,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
             *(in_degrees(angle) for angle in (one.nominal, one.left)),
+            *[KEPT[plan.kept is not False]] * cones,
             *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * counted,
         )
     what = verdicts.left_name(found.comparison.spacecraft)

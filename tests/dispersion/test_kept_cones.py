@@ -198,6 +198,10 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> 
     screen = run("disperse", str(keeper), "--scheme", "rhumb-line", "--samples", "2000").stdout
     text = " ".join(screen.split())
     assert f"Axis at least 5 deg from Sun broken in {100 * cone['broken_fraction']:.1f} % of cases; " in text
+    worst = found["worst"][0]
+    row = next(line.split() for line in screen.splitlines() if line.split()[:1] == [str(worst["case"])])
+    assert "least from" in screen
+    assert row[4] == f"{worst['aspects'][0]['least_deg']:.4g}"
     alone = run("disperse", str(keeper), "--scheme", "rhumb-line", "--case", "1").stdout
     assert "least from Sun, deg" in alone
 
