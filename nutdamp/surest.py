@@ -44,6 +44,12 @@ STEP = 1e-30
 MARGINS = (1.0, 0.75, 0.5, 1.3)
 """Over the sigmas of the probability required: margins that are tried first."""
 
+LESSER = (1.0, 0.8, 0.6)
+"""The same over the largest that can be kept, where that is not enough."""
+
+KEPT, HALVINGS = 1e-2, 6
+"""Share of a limit by which it may be passed while that is looked for, and steps of it."""
+
 TRIED = 4_096
 """Cases in which a plan is tried while its margin is adapted, of a seed of its own."""
 
@@ -196,12 +202,24 @@ class _Search:
     def plans(self) -> Iterator[tuple[str, Plan]]:
         """Plans by the first margins, then by those between which the share required, or the largest, lies."""
         seen: dict[float, float] = {}
-        for number in range(len(MARGINS) + ROUNDS):
-            margin = MARGINS[number] * self.sigmas if number < len(MARGINS) else self._next(seen)
+        first = self._first()
+        for number in range(len(first) + ROUNDS):
+            margin = first[number] if number < len(first) else self._next(seen)
             seen[margin] = 0.0
             for variant, plan, share in self.tried(margin):
                 seen[margin] = share
                 yield variant, plan
+
+    def _first(self) -> list[float]:
+        """The margins to begin with: about that of the probability, or up to the largest that can be kept."""
+        chance = ChanceProgram(self.program, self.uncertain, self.limits, self.goal)
+        low, high = 0.0, max(MARGINS) * self.sigmas
+        if chance.solve(high).excess <= KEPT:
+            return [factor * self.sigmas for factor in MARGINS]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if chance.solve(middle).excess <= KEPT else (low, middle)
+        return [self.sigmas, *(factor * low for factor in LESSER if low > 0.0)]
 
     def _next(self, seen: dict[float, float]) -> float:
         """Another margin: towards the least with which as many cases comply as must, else beside the best."""
