@@ -216,6 +216,7 @@ keep: [{name: pole star, direction: [10 deg, 86 deg], min: 2 deg}]
 """
 
 
+@pytest.mark.slow
 def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path) -> None:
     shown = run("plan", "-", "--target", "10deg,80deg", "--scheme", "rhumb-line", "--json", "plan.json", stdin=FILE)
     assert shown.returncode == 0, shown.stderr

@@ -317,7 +317,7 @@ dispersions: {A: {normal: SIGMA}}
 """
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("sigma", "good"), [("0.1 %", True), ("5 %", False)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))

@@ -185,7 +185,7 @@ def outcome(seed: int) -> tuple[float, float]:
     return body.to_turn, abs(off - float(plan.left.aim))
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(100), always=2))
 def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: int) -> None:
     turn, off = outcome(seed)
@@ -390,6 +390,7 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
     assert nearest > keep.least - 1e-4
 
 
+@pytest.mark.slow
 def test_a_way_that_only_fits_around_a_window_is_gone_in_two_blocks() -> None:
     free = planning.plan(a_turn(), "command-block").pulses
     window = (free.pulses[8].start - 1.0, free.pulses[8].start + 1.0)
