@@ -296,3 +296,37 @@ def test_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, o
 @pytest.mark.parametrize("name", NOISY)
 def test_ten_thousand_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, object]) -> None:
     check_dead_band(name, law, 10_000)
+
+
+SIX: dict[str, tuple[float, float, str, dict[str, object]]] = {
+    "prolate": (80.0, 3.0, "noise, bias, steps", {}),
+    "oblate": (150.0, 3.0, "noise, bias, steps", {}),
+    "reversed": (80.0, -3.0, "noise, bias, steps", {}),
+    "oblate, reversed, bang": (150.0, -3.0, "noise, bias, steps", BANGS),
+    "prolate, accelerometer": (60.0, 3.0, "accelerometer", {}),
+    "oblate, reversed, accelerometer": (160.0, -3.0, "accelerometer", {}),
+}
+
+
+def check_six(name: str, count: int) -> None:
+    C, spin, sensor, law = SIX[name]
+    loop = Loop(NOISY[sensor], start=rad(0.3), stop=rad(0.1), **law)  # type: ignore[arg-type]
+    starts = Dispersions(omega0=(Tolerance("uniform", 0.03), Tolerance("uniform", 0.03), None))
+    body = replace(spinner(C=C, spin=spin, degrees=1.0, channels=FOUR), loop=loop, dispersions=starts)
+    results = run(LoopResults(study(body, 200.0), count))
+    fired = results.of("quiet")
+    assert len(fired) >= 0.9 * count
+    assert results.within >= 0.99 * len(fired)
+    assert results.settled >= 0.999 * count
+    assert set(results.stops) == {Stop.END}
+
+
+@pytest.mark.parametrize("name", SIX)
+def test_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
+    check_six(name, 300)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SIX)
+def test_ten_thousand_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
+    check_six(name, 10_000)
