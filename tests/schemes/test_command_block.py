@@ -244,12 +244,6 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     check_flown_ones_are_not_beaten(seed, Requirement(*map(math.radians, required)))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(25))
-def test_nutation_on_the_way_in_random_cases(seed: int) -> None:
-    check_flown_ones_are_not_beaten(seed, Requirement(math.radians(0.1), math.radians(0.05)))
-
-
 def test_without_commands_the_scheme_says_which_keys_it_needs() -> None:
     plan = planning.plan(aimed(spinner(channels=cross(8.0)), 5.0, 0.0), "command-block")
     assert not plan.feasible
