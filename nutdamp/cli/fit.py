@@ -10,6 +10,7 @@ import click
 from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
 from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, Quantity
+from nutdamp.cli.progress import working
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +71,8 @@ def command(
         job.warn(warnings)
     record, warnings = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
     job.warn(warnings)
-    found = fit(job.spacecraft, record)
+    with working("fitting", quiet=quiet):
+        found = fit(job.spacecraft, record)
     now = carried(found, at)
     job.warn(notes(found, now))
     prospects = _outlook(found, at, quiet) if ahead else None
@@ -83,7 +85,6 @@ def command(
 
 
 def _outlook(found: Fit, at: float, quiet: bool) -> Outlook:
-    from nutdamp.cli.progress import working
     from nutdamp.estimation.outlook import outlook
 
     with working("looking ahead", quiet=quiet):

@@ -40,6 +40,9 @@ ROUNDS = 3
 POOR = 0.3
 """Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""
 
+STARTS = 3
+"""Starts that are searched from at most."""
+
 PARTS = (0.5, 0.25, 0.1, 0.04)
 """Parts of the record that it then begins with."""
 
@@ -232,13 +235,18 @@ def _grown(model: Model, share: float, values: Vector) -> tuple[Vector, float]:
 
 
 def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, float]:
-    """The best of searches from several starts; of many starts those of the least cost."""
+    """Values from the start of least cost; where these are poor, the best from the three starts of least cost."""
     scales, every = _scales(model), np.ones(len(model.measured), dtype=bool)
     vectors = [np.array([one[each.name] for each in model.parameters]) for one in begins]
-    if len(vectors) > 2:
+    if len(vectors) > 1:
         costs = [float(np.abs(_residuals(model, one) / scales[model.signal]).sum()) for one in vectors]
-        vectors = [vectors[index] for index in np.argsort(costs)[:3]]
-    return min((_search(model, one, scales, every, robust=True) for one in vectors), key=lambda one: one[1])
+        vectors = [vectors[index] for index in np.argsort(costs)[:STARTS]]
+    found = []
+    for one in vectors:
+        found.append(_search(model, one, scales, every, robust=True))
+        if _size(model, found[-1][0]) < POOR:
+            break
+    return min(found, key=lambda one: one[1])
 
 
 def _residuals(model: Model, values: Vector) -> Vector:
@@ -305,7 +313,7 @@ def _search(
 
     loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
     found = least_squares(
-        errors, values / units, derivatives, loss=loss, max_nfev=EVALUATIONS, x_scale=1.0, xtol=1e-12, ftol=1e-12
+        errors, values / units, derivatives, loss=loss, max_nfev=EVALUATIONS, x_scale=1.0, xtol=1e-10, ftol=1e-10
     )
     return found.x * units, float(found.cost)
 

@@ -27,6 +27,9 @@ BIAS = math.radians(0.02)
 TILT = math.radians(1.0)
 """Standard deviation of each tilt of the gyros, and of the observed axis, from the principal axes, rad."""
 
+THRUST = 0.5
+"""Standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise."""
+
 DELAY = 0.05
 """Standard deviation of what a channel's thrust is late, s."""
 
@@ -176,18 +179,22 @@ def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Thrust factor and delay of each channel that fired."""
-    given = spacecraft.dispersions
-    known = {channel.name: channel for channel in spacecraft.channels}
     for name in dict.fromkeys(pulse.channel for pulse in record.schedule):
-        sigma, mean = math.inf, 1.0
-        if given is not None and name in known:
-            sizes = [given.thrust.get(one.name) for one in known[name].thrusters]
-            priors = [prior_of(one, 1.0) for one in sizes if one is not None]
-            if priors:
-                mean = math.fsum(one for one, _ in priors) / len(sizes) + (1.0 - len(priors) / len(sizes))
-                sigma = math.hypot(*(one for _, one in priors)) / len(sizes) or math.inf
-        yield Parameter(f"thrust {name}", "", mean, sigma, TINY)
+        mean, sigma = thrust_prior(spacecraft, name)
+        yield Parameter(f"thrust {name}", "", mean, max(sigma, THRUST), TINY)
         yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
+
+
+def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:
+    """Thrust factor of a channel by the file, and its standard deviation; that is infinite without a tolerance."""
+    given = spacecraft.dispersions
+    channel = next((one for one in spacecraft.channels if one.name == name), None)
+    if given is None or channel is None:
+        return 1.0, math.inf
+    sizes = [given.thrust.get(one.name) for one in channel.thrusters]
+    priors = [prior_of(one, 1.0) for one in sizes if one is not None]
+    mean = 1.0 + math.fsum(one - 1.0 for one, _ in priors) / len(sizes)
+    return mean, math.hypot(*(one for _, one in priors)) / len(sizes) or math.inf
 
 
 def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import Body, Matrix, Values, Vector
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, thrust_prior
 from nutdamp.physics import attitude
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.spacecraft import Inertia, Spacecraft, SpinState
@@ -30,6 +30,9 @@ CORRELATED = 1e-3
 
 DIGITS = 9
 """Decimals of correlations in files."""
+
+LEAST_THRUST = 0.05
+"""Thrust factor down to which a channel counts as one that did not fire: it is not calibrated by that."""
 
 WORTH_NAMING = 0.9
 """Correlation from which on it is named."""
@@ -111,7 +114,7 @@ def carried(found: Fit, time: float) -> Carried:
     factors: dict[str, str] = {}
     for one in model.parameters:
         kind, _, name = one.name.partition(" ")
-        if kind == "thrust" and name in channels:
+        if kind == "thrust" and name in channels and _calibrated(found, name):
             factors |= {f"thrust {member.name}": one.name for member in channels[name].thrusters}
     names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *factors)
 
@@ -134,6 +137,12 @@ def carried(found: Fit, time: float) -> Carried:
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
     return Carried(time, names, inputs(found.named), slopes @ found.covariance @ slopes.T, body, state, tilt)
+
+
+def _calibrated(found: Fit, channel: str) -> bool:
+    """Whether a channel fired, and the data tell its thrust better than the file."""
+    value, sigma = _at(found, f"thrust {channel}")
+    return value > LEAST_THRUST and sigma < thrust_prior(found.model.spacecraft, channel)[1]
 
 
 def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
@@ -303,7 +312,8 @@ def _of_others(found: Fit) -> Iterator[Estimate]:
         if which == "acceleration":
             unit, factor = "m/s²", 1.0
         value, sigma = _at(found, one.name)
-        prior = one.prior if math.isfinite(one.prior) else None
+        known = thrust_prior(found.model.spacecraft, which)[1] if kind == "thrust" else one.prior
+        prior = known if math.isfinite(known) else None
         yield Estimate(one.name, label.format(which), unit, factor, value, sigma, one.file, prior)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from nutdamp.epoch import Epoch
 from nutdamp.estimation.fit import Fit
-from nutdamp.estimation.results import DIGITS, Carried, correlations, replaced
+from nutdamp.estimation.results import DIGITS, LEAST_THRUST, Carried, correlations, replaced
 from nutdamp.files.sections import KeyPath
 from nutdamp.files.settings import Setting
 from nutdamp.files.yaml_edit import edited
@@ -62,6 +62,11 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
         if abs(found.values[at]) > SEEN * found.sigmas[at]:
             channel = name.removeprefix("delay ")
             yield f"the delay of {channel}, {1e3 * found.values[at]:.3g} ms, is not written: see the key valve"
+    for name in (one.name for one in found.model.parameters if one.name.startswith("thrust ")):
+        if found.named[name] <= LEAST_THRUST:
+            channel = name.removeprefix("thrust ")
+            share = f"{channel} gave {100.0 * found.named[name]:.2g} % of its thrust"
+            yield f"{share}: did it fire? Its force stays as it was"
     limits = body.limits
     if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
         yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"

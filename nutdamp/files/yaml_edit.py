@@ -28,7 +28,7 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
     """The text with ``values``, each a flow value by its path, and keys of the first level ``renamed``.
 
     A key that is not there is added, at the end of the mapping it belongs to, which must be there but for the first
-    level. Raises BadRequest for what an alias stands for: it would change where its anchor is.
+    level. Raises BadRequest for an alias, and for what has one: a change would show in the other place too.
     """
     for path, value in values.items():
         text = _with(text, path, value)
@@ -45,6 +45,11 @@ def _with(text: str, path: KeyPath, value: str) -> str:
         key, node = _find(root, path[:length])
         if key is not None and node is not None and node.start_mark.index < key.end_mark.index:
             raise BadRequest(f"{dotted(path[:length])} is an alias: write its value out, for it to be changed")
+        anchor = None if node is None or not length else re.match(r"&(\S+)", text[node.start_mark.index :])
+        if anchor and f"*{anchor[1]}" in text:
+            raise BadRequest(
+                f"{dotted(path[:length])} has the alias *{anchor[1]}: write that out, for it to be changed"
+            )
     for length in range(len(path), 0, -1):
         _, node = _find(root, path[:length])
         if node is None:

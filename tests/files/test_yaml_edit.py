@@ -68,6 +68,12 @@ def test_what_an_alias_stands_for_is_refused() -> None:
         edited("a: &x {k: 1}\nb: *x\n", {("b", "k"): "2"})
 
 
+def test_what_has_an_alias_is_refused_and_an_anchor_without_one_is_no_hindrance() -> None:
+    with pytest.raises(BadRequest, match=r"a has the alias \*x: write that out"):
+        edited("a: &x 1\nb: *x\n", {("a",): "2"})
+    assert edited("a: &x 1\nb: 3\n", {("a",): "2"}) == "a: 2\nb: 3\n"
+
+
 def test_the_built_in_example_keeps_every_other_line() -> None:
     text = example_text()
     made = edited(text, {("inertia", "A"): "121 kg m^2"}).splitlines()
