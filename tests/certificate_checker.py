@@ -41,6 +41,12 @@ def check(text: str) -> float:
         q = (np.tensordot(y, adds(np.array([burn["t_s"]])), 1) / costs)[0, order.index(burn["channel"])]
         assert abs(q - burn["q"]) < 1e-9, "another price at a firing"
         assert q > 0.998, "fires below the price"
+    reached = np.zeros(len(goal))
+    for burn in c["burns"]:
+        at = order.index(burn["channel"])
+        wide = 0.0 if once[at] else burn["on_time_s"]
+        reached += adds(burn["t_s"] + wide * np.linspace(-0.5, 0.5, 65))[:, :, at].mean(axis=1) * burn["on_time_s"]
+    assert np.linalg.norm(reached - goal) <= c["off_Nms"] + 0.01 * np.linalg.norm(goal), "the burns miss the goal"
     spent = sum(costs[order.index(burn["channel"])] * burn["on_time_s"] for burn in c["burns"])
     assert np.isclose(spent, c["burns_cost"], rtol=1e-9)
     assert c["bound"] <= spent * (1.0 + 1e-9) <= c["bound"] * 1.005, "the program costs more than the bound"
