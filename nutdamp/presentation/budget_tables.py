@@ -115,13 +115,13 @@ def _table(found: Budget) -> Table:
     names = [
         "start\ndeg",
         "stop\ndeg",
-        "pulses\na day",
-        "propellant\nkg a year",
+        "pulses\n1/day",
+        "propellant\nkg/year",
         "cycle\n",
         "low\ndeg",
         "high\ndeg",
     ]
-    names += ["max\ndeg", "spin\n% a day", *["tank\ndays"] * tank, *["verdict\n"] * required]
+    names += ["max\ndeg", "spin\n%/day", *["tank\ndays"] * tank, *["verdict\n"] * required]
     table = columns(*names, text=("verdict\n",))
     for one in found.held:
         cycle, spin = one.cycle, found.spacecraft.spin
