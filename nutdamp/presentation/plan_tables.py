@@ -228,7 +228,7 @@ def _cone(at: int, name: str, limit: str) -> tuple[str, Cell]:
         found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == limit)
         return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in found)
 
-    return f"  axis from {name} {limit}", lambda plan: cell(plan) if plan.feasible else MISSING
+    return f"  from {name} {limit}", lambda plan: cell(plan) if plan.feasible else MISSING
 
 
 def _angle(left: Residual | None, name: str) -> str:
