@@ -149,16 +149,18 @@ def test_blocks_need_a_sun_pulse(run: Run, tmp_path: Path) -> None:
 
 
 def test_everything_that_keeps_blocks_from_being_fired_is_listed(run: Run) -> None:
-    """Sun along the axis, delay longer than a spin, no width, a cone that nothing keeps; a blind sensor."""
+    """Sun along the axis, delay longer than a spin, no width, rising pressure, min > max of a cone; a blind sensor."""
     bad = FILE.replace("sun: epoch", "sun: [0 deg, 90 deg]").replace("delay_max: 4.9 s", "delay_max: 6 s")
     bad = bad.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: []")
-    done = run("plan", "-", stdin=bad + "keep: [{name: Moon, direction: [10 deg, 5 deg], min: 20 deg, max: 4 deg}]\n")
+    bad += "keep: [{name: Moon, direction: [10 deg, 5 deg], min: 20 deg, max: 4 deg}]\n"
+    done = run("plan", "-", stdin=bad + "tank: {propellant: 30 kg, pressure: 8 bar, final_pressure: 22 bar}\n")
     assert done.returncode == 2
     for text in (
         "sun: lies along the spin axis at t = 0",
         "commands.delay_max: 6 s is not less than a spin turn of 5 s",
         "commands.width: empty",
         "keep[0].min: 20 deg exceeds max",
+        "tank.final_pressure: 22 bar exceeds pressure",
     ):
         assert text in done.stderr
     blind = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, elevation: 60 deg, half_width: 20 deg}")

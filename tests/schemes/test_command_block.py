@@ -135,7 +135,10 @@ def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
 
 
 def scanned(body: Spacecraft) -> tuple[float, float]:
-    """How good the best single block of the whole grid is in closed form: share of a bound used up, then cost."""
+    """How good the best single block of the whole grid is in closed form: share of a bound used up, then cost.
+
+    Of those that carry H the shorter way round the Sun.
+    """
     model, bounds, commands = BlockModel(body), compliance.bounds(body), body.commands
     assert commands is not None
     best = (math.inf, math.inf)
@@ -144,9 +147,12 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
         trial = Trial(
             wait, delays[:, None, None], commands.widths[:, None], np.arange(1, commands.max_count + 1), every
         )
-        left = model.left(model.after(model.start, one, trial))
+        after = model.after(model.start, one, trial)
+        left = model.left(after)
         shares = np.max([compliance.left_of(bound.part, left, body) / bound.most for bound in bounds], axis=0)
-        shares = np.where(np.isnan(shares), np.inf, shares)
+        goal = math.atan2(model.goal[1], model.goal[0])
+        round_sun = np.zeros(1) if body.goal.axis is None else np.abs(after.longitude - goal)
+        shares = np.where(np.isnan(shares) | (round_sun > math.pi), np.inf, shares)
         cost = np.broadcast_to(trial.width * trial.count * one.strength, shares.shape)
         failed = np.where(shares <= 1.0, 0.0, shares)
         index = np.lexsort((cost.ravel(), failed.ravel()))[0]
@@ -155,8 +161,9 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
 
 
 @pytest.mark.few(2)
-@pytest.mark.parametrize("seed", some(range(12), always=3))
+@pytest.mark.parametrize("seed", range(136))
 def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
+    """In 102 cases with a target 1 to 60 deg away, and 34 of damping alone; one in three of the former nutates."""
     body = some_body(seed, target=seed % 4 != 3)
     body = body if seed % 4 != 3 else replace(body, omega0=np.array([0.02, 0.01, 1.0]) * body.spin)
     commands = body.commands
@@ -173,16 +180,22 @@ def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -
 
 
 def outcome(seed: int) -> tuple[float, float]:
-    """Turn, and how far the reference is from what the plan says, rad; asserts that the pulses are the same."""
+    """Turn, and how far H and nutation of the reference are from what the plan says, rad; the pulses are the same."""
     body = replace(some_body(seed), requirement=Requirement(math.radians(1.0), math.radians(0.3)))
     plan = planning.plan(body, "command-block")
     assert plan.feasible, remarks.infeasibility(plan)
     assert 1 <= len(plan.pulses.blocks) <= 3
     motion, starts = flown_by_reference(body, plan.pulses.blocks)
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
-    off = reference.angle(reference.momentum(body.inertia.moments, motion), body.target_axis)
+    momentum = reference.momentum(body.inertia.moments, motion)
     assert plan.left is not None
-    return body.to_turn, abs(off - float(plan.left.aim))
+    nutation = reference.nutation(body.inertia.moments, motion.rates, math.copysign(1.0, body.spin))
+    off = (
+        reference.angle(momentum, plan.flight.final.momentum),
+        reference.angle(momentum, body.target_axis) - float(plan.left.aim),
+        nutation - float(plan.left.nutation),
+    )
+    return body.to_turn, max(map(abs, off))
 
 
 @pytest.mark.slow

@@ -226,9 +226,12 @@ class BlockModel:
     def course(self, state: State) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""
         goal_angle = math.atan2(math.hypot(self.goal[0], self.goal[1]), self.goal[2])
+        return sun_train.rhumb_course(state.sun_angle, goal_angle, self.ahead(state))
+
+    def ahead(self, state: State) -> Any:
+        """By how much the target axis is ahead of H about the Sun the shorter way round, rad, -π to π."""
         goal_longitude = math.atan2(self.goal[1], self.goal[0])
-        ahead = (goal_longitude - state.longitude + math.pi) % (2.0 * math.pi) - math.pi
-        return sun_train.rhumb_course(state.sun_angle, goal_angle, ahead)
+        return (goal_longitude - state.longitude + math.pi) % (2.0 * math.pi) - math.pi
 
     def after(self, state: State, channel: Channel, trial: Trial) -> State:
         """The motion after blocks of a ``channel`` from ``state``."""

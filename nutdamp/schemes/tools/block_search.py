@@ -143,7 +143,7 @@ class BlockSearch:
             work.spend(LOOKED * float(np.prod(shape)))
             severity = np.max(np.broadcast_arrays(*(self.share(bound, left) for bound in self.bounds)), axis=0)
             over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
-            over = over | self._dark(before.state, channel, trial, state)
+            over = over | self._dark(before.state, channel, trial, state) | self._longer_round(before.state, state)
             over = over if tank is None else over | (state.used > tank.propellant)
             severity = np.where(np.isnan(severity) | over, np.inf, severity)
             cost = np.broadcast_to(state.cost, shape)
@@ -267,6 +267,12 @@ class BlockSearch:
         after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
+
+    def _longer_round(self, before: State, after: State) -> NDArray[np.bool_]:
+        """Whether H has gone round the Sun the longer way to the target, or once more: far for a few degrees."""
+        if self.body.goal.axis is None:
+            return np.zeros((), dtype=bool)
+        return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
 
     def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
         """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
