@@ -158,6 +158,9 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
     if origin is Annotated:
         return _ruled(parts[0], parts[1:], value, problems, path)
     if origin in (Union, UnionType):
+        if (expected := _either(parts)) and not isinstance(value, list | dict):
+            problems.append((path, _mismatch(value, expected)))
+            return None
         return _read(_meant(parts, value), value, problems, path)
     if origin is Literal:
         return _chosen(parts, value, problems, path)
@@ -196,6 +199,14 @@ def _meant(parts: tuple[Any, ...], value: Any) -> Any:
     """The type of a union that a value is of: a section for a mapping, else the other; None is for what is left out."""
     types = [part for part in parts if part is not NoneType]
     return next((one for one in types if isinstance(value, dict) == (section_of(one) is one)), types[0])
+
+
+def _either(parts: tuple[Any, ...]) -> str:
+    """What a union of a list and a mapping expects; empty where it is another."""
+    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts if part is not NoneType]
+    if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {"dict", list}:
+        return f"{_WORDS[list]} or {_WORDS[dict]}"
+    return ""
 
 
 def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyPath) -> Any:

@@ -70,7 +70,7 @@ BAD: list[tuple[dict[str, Any], tuple[str | int, ...], str]] = [
     ({"named": {}}, ("named",), "empty; expected an entry"),
     ({"named": {"a": {}}}, ("named", "a", "t"), "missing; time of it, s"),
     ({"either": {"t": "x"}}, ("either", "t"), "'x' is not a time"),
-    ({"either": "x"}, ("either",), "expected a list [value, …], got 'x'"),
+    ({"either": "x"}, ("either",), "expected a list [value, …] or a mapping {key: value, …}, got 'x'"),
     ({"inner": 3}, ("inner",), "expected a mapping {key: value, …}, got 3"),
     ({"inners": [{"t": 1}, {"t": [1]}]}, ("inners", 1, "t"), "expected a time (a number in s"),
 ]

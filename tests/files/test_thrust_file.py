@@ -109,6 +109,10 @@ def test_cold_nozzles() -> None:
             TANK.replace("}", ", isp: [[1 bar, 215 s], [2 bar, 228 s]]}"),
             "9:73: tank.isp: 1 bar to 2 bar leave out",
         ),
+        (
+            TANK.replace("}", ", inertia_per_kg: 0.4}"),
+            "9:84: tank.inertia_per_kg: expected a list [value, …] or a mapping {key: value, …}, got 0.4",
+        ),
         (TANK + "mass: 20 kg\n", "9:20: tank.propellant: 30 kg is not less than the mass, 20 kg"),
         (TANK.replace("30 kg", "0"), "9:20: tank.propellant: 0 is out of range"),
     ],
