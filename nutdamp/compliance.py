@@ -6,6 +6,7 @@ One home for what complies, for one plan or for many dispersed cases: every func
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -150,11 +151,20 @@ def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
     return nutation if spacecraft.goal.axis is None else np.maximum(nutation, aim)
 
 
-def severity(spacecraft: Spacecraft, left: Left) -> Any:
+def severity(spacecraft: Spacecraft, left: Left, used: Sequence[Any] = ()) -> Any:
     """The largest share of a bound that is `required` which is used up: 1 or less complies.
 
-    Without such bounds what is `missed`, rad.
+    Without such bounds what is `missed`, rad. Where more than all of a cone, or of the propellant, is ``used`` (shares)
+    on the way, it is no less than that.
     """
+    found = np.asarray(_severity_at_end(spacecraft, left), dtype=float)
+    if not len(used):
+        return found
+    worst = np.maximum.reduce(np.broadcast_arrays(*used))
+    return np.where(worst > 1.0, np.maximum(worst, found), found)
+
+
+def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:
     limits = required(spacecraft)
     if not limits:
         return missed(spacecraft, left.nutation, left.aim)

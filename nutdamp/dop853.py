@@ -26,13 +26,14 @@ Push = tuple[Vector, Vector | None]
 
 
 class Equations:
-    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far.
+    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
 
     A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
     the propellant used too, kg.
     """
 
-    def __init__(self, spacecraft: Spacecraft) -> None:
+    def __init__(self, spacecraft: Spacecraft, most: int = EVALUATIONS) -> None:
+        self.most = most
         self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
         self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
         self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)
@@ -75,7 +76,7 @@ class Equations:
         """What solve_ivp gives from ``state`` at ``start`` to ``end`` s, with its interpolant where it is ``dense``.
 
         ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
-        together take more than `EVALUATIONS`.
+        together take more than ``most``.
         """
         from scipy.integrate import solve_ivp
 
@@ -90,8 +91,8 @@ class Equations:
 
         def derivative(t: float, y: Vector) -> Vector:
             self.evaluations += 1
-            if self.evaluations > EVALUATIONS:
-                raise Infeasible(f"the motion takes more than {EVALUATIONS} evaluations of Euler's equations")
+            if self.evaluations > self.most:
+                raise Infeasible(f"the motion takes more than {self.most} evaluations of Euler's equations")
             body, q = y[:3], y[3:7]
             tensor, inverse = self._body(y[7:])
             momentum = tensor @ body

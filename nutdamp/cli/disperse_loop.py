@@ -92,5 +92,4 @@ def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
     from nutdamp.presentation.loop_cases_tables import loop_case_screen
 
     flown = study.fly([study.case(case)])
-    found = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
-    job.deliver([(json, partial(loop_case_json, study, case, *found))], partial(loop_case_screen, study, case, *found))
+    job.deliver([(json, partial(loop_case_json, study, case, flown))], partial(loop_case_screen, study, case, flown))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import compliance, flight
+from nutdamp.aspect import aspects
 from nutdamp.compliance import Left
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.cases import DispersedCases, Model
@@ -24,6 +25,7 @@ from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure
 from nutdamp.dispersion.rounds import Round
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
+from nutdamp.dispersion.watched import cones_used
 from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
 
@@ -114,6 +116,12 @@ class Study:
         fly = flight.flown if self.flown else flight.by_impulses
         return fly(self.model.spacecraft, self.model.schedule)
 
+    @property
+    def nominal_aspects(self) -> Array:
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone in that flight."""
+        seen = aspects(self.nominal)[: len(self.model.spacecraft.keep)]
+        return np.array([(one.least, one.largest) for one in seen])
+
     def severity(self, values: Array, ends: Ends) -> Array:
         """How bad cases are, (n,), by `compliance.severity`, of the outputs (5, n) and ``ends`` of cases.
 
@@ -121,15 +129,8 @@ class Study:
         the propellant, that is used up.
         """
         body, aim = self.model.spacecraft, OUTPUTS.index(compliance.aim(self.model.spacecraft).value)
-        found = np.asarray(compliance.severity(body, Left(values[0], values[aim], ends.spin)))
-        shares = [*([] if ends.aspects is None else self.used(ends.aspects)), ends.drained]
-        worst = np.maximum.reduce(np.broadcast_arrays(*shares))
-        return np.where(worst > 1.0, np.maximum(worst, found), found)
-
-    def used(self, aspects: Array) -> Array:
-        """By cone and case (m, n): what is used up of a cone, see `Keep.used`, by angles (m, 2, n) on the way."""
-        pairs = zip(self.model.spacecraft.keep, aspects, strict=True)
-        return np.array([keep.used(*angles) for keep, angles in pairs]).reshape(len(aspects), aspects.shape[2])
+        shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
+        return np.asarray(compliance.severity(body, Left(values[0], values[aim], ends.spin), shares))
 
     def aspects_of(self, draws: Draws) -> Array | None:
         """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
@@ -243,7 +244,7 @@ class Results:
 
         ``emptied`` (n,): whose tank runs empty; None for none.
         """
-        broken = self.study.used(aspects) > 1.0
+        broken = cones_used(self.study.model.spacecraft.keep, aspects) > 1.0
         missed = (severity > 1.0) & bool(compliance.required(self.study.model.spacecraft))
         emptied = np.zeros(len(severity), dtype=bool) if emptied is None else emptied
         self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed | emptied)))

@@ -112,4 +112,4 @@ def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable
 def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:
     """The direction to the Sun in the true body axes of t = 0, (3, n)."""
     assert model.spacecraft.sun is not None
-    return in_body(model, cases, count, model.spacecraft.sun)
+    return in_body(model.spacecraft, cases.tilt, count, model.spacecraft.sun)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp import __version__
-from nutdamp.aspect import aspects
 from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
@@ -46,7 +46,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
             column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
         },
         "requirement": requirement_of(results),
-        **_cones(results),
+        **cones_json(results),
         **({"tank_empty_fraction": results.emptied / results.done} if study.model.spacecraft.tank else {}),
         "shares": _shares(results),
         **correlation_json(study.model.spacecraft),
@@ -94,11 +94,11 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
     return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
 
 
-def _cones(results: Results) -> dict[str, Any]:
+def cones_json(results: Results | LoopResults) -> dict[str, Any]:
     """How many cases break each cone, and the least and largest angle from it to the axis; nothing without cones."""
     body, entries = results.study.model.spacecraft, []
-    nominal = aspects(results.study.nominal) if body.keep else ()
-    for index, (keep, one) in enumerate(zip(body.keep, nominal, strict=False)):
+    nominal = np.degrees(results.study.nominal_aspects).tolist() if body.keep else ()
+    for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
         entries.append(
             {
@@ -108,8 +108,8 @@ def _cones(results: Results) -> dict[str, Any]:
                 "broken_fraction": float(results.broken[index] / results.done),
                 "least_deg": least_of_all,
                 "largest_deg": largest_of_all,
-                "nominal_least_deg": math.degrees(one.least),
-                "nominal_largest_deg": math.degrees(one.largest),
+                "nominal_least_deg": least,
+                "nominal_largest_deg": largest,
             }
         )
     return {"aspects": entries} if entries else {}
@@ -154,7 +154,12 @@ def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any
 def _angles_of(study: Study, draws: dict[str, float]) -> dict[str, Any]:
     """Least and largest angle from the axis to the direction of each cone in one case; nothing without cones."""
     found = study.aspects_of(draws)
-    if found is None:
+    return {} if found is None else angles_json(study.model.spacecraft, found)
+
+
+def angles_json(spacecraft: Spacecraft, found: Array) -> dict[str, Any]:
+    """The same by those angles (m, 2) rad."""
+    if not spacecraft.keep:
         return {}
-    named = zip(study.model.spacecraft.keep, np.degrees(found).tolist(), strict=True)
+    named = zip(spacecraft.keep, np.degrees(found).tolist(), strict=True)
     return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}

@@ -10,11 +10,12 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import CONFIDENCE
-from nutdamp.files.dispersion_json import PERCENTS, correlation_json, requirement_of
+from nutdamp.files.dispersion_json import PERCENTS, angles_json, cones_json, correlation_json, requirement_of
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.files.samples_csv import column
 from nutdamp.loop.diagnosis import Stop
+from nutdamp.loop.fleet import Flown
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
 
 COLUMNS = (
@@ -53,6 +54,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         },
         "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Stop.END},
         "requirement": requirement_of(results),
+        **cones_json(results),
         "shares": {
             name: results.shares(output)
             for name, output in zip(COLUMNS, OUTPUTS, strict=True)
@@ -62,15 +64,21 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
         "worst": [
-            {**_inputs(study, case), **outputs_json(results.values[:, case])}
+            {
+                **_inputs(study, case),
+                **outputs_json(results.values[:, case]),
+                **angles_json(study.spacecraft, results.angles[:, :, case]),
+            }
             for case in results.worst.cases[:worst].tolist()
         ],
     }
 
 
-def loop_case_json(study: LoopStudy, case: int, values: Array, stop: Stop) -> dict[str, Any]:
-    """One case (from 0): the true value of each input, in SI, and the outputs."""
-    outputs = {"stopped": stop.name.lower(), **outputs_json(values)}
+def loop_case_json(study: LoopStudy, case: int, flown: Flown) -> dict[str, Any]:
+    """One case (from 0), ``flown`` alone: the true value of each input, in SI, and the outputs."""
+    values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
+    seen = angles_json(study.spacecraft, flown.aspects[:, :, 0])
+    outputs = {"stopped": stop.name.lower(), **outputs_json(values), **seen}
     return {"nutdamp": __version__, "seed": study.seed, "until_s": study.until, **_inputs(study, case), **outputs}
 
 

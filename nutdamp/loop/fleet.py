@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import aspect
+from nutdamp.dispersion.watched import watch_over
 from nutdamp.errors import Infeasible
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
@@ -53,6 +55,7 @@ class Flown:
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) from the body axes of t = 0. ``quiet`` (n,) rad is the nutation as a
     loop first fell quiet, ``largest`` (n,) the largest of its coasts since; that of the end where it never did.
+    ``aspects`` (m, 2, n) rad: least and largest angle from the spin axis to the direction of each cone of the file.
     """
 
     cases: Sequence[Case]
@@ -61,6 +64,7 @@ class Flown:
     quaternion: Vector
     quiet: Vector
     largest: Vector
+    aspects: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +115,7 @@ def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[in
     count = len(cases)
     rates, quaternion = np.empty((3, count)), np.empty((4, count))
     quiet, largest, pilots = np.full(count, math.nan), np.empty(count), []
+    aspects = np.empty((len(law.spacecraft.keep), 2, count))
     for row, case in enumerate(cases):
         alone = Alone.of(case.truth, case.truth.loop or law.loop, until, case.key, law, case.scatter)
         run = alone.fly()
@@ -123,8 +128,11 @@ def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[in
             sense = math.copysign(1.0, case.truth.spin)
             quiet[row] = arc_cones(case.truth.inertia.moments, at, sense).nutation
         largest[row] = largest_since(run)[0]
+        if law.spacecraft.keep:
+            seen = (one for one in aspect.aspects(run.flight, run.until) if one.keep in law.spacecraft.keep)
+            aspects[:, :, row] = [(one.least, one.largest) for one in seen]
         watch(row + 1)
-    return Flown(cases, pilots, rates, quaternion, quiet, largest)
+    return Flown(cases, pilots, rates, quaternion, quiet, largest, aspects)
 
 
 class _Fleet:
@@ -149,6 +157,7 @@ class _Fleet:
         self.rates = np.array([one.truth.omega0 for one in cases]).T.copy()
         self.quaternion = np.zeros((4, len(cases)))
         self.quaternion[0] = 1.0
+        self.watch = watch_over(law.spacecraft, tuple(np.array([one.tilt for one in cases]).T), len(cases))
         self.now = np.zeros(len(cases))
         self.settled = np.full(len(cases), math.inf)
         self.quiet, self.largest = np.full(len(cases), math.nan), np.full(len(cases), -math.inf)
@@ -173,7 +182,8 @@ class _Fleet:
         self._go(rows, np.maximum(self.until, self.now))
         unsettled = np.isinf(self.settled)
         self.largest[unsettled] = self._nutation(rows)[unsettled]
-        return Flown(self.cases, self.pilots, self.rates, self.quaternion, self.quiet, self.largest)
+        ends = self.rates, self.quaternion, self.quiet, self.largest
+        return Flown(self.cases, self.pilots, *ends, self.watch.angles)
 
     def _begun(self, rows: Rows) -> _Group:
         """Coasts of cases that begin now."""
@@ -275,6 +285,8 @@ class _Fleet:
     def _advance(self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
         here = rigid_cases.Stretch(self.bodies.some(rows), *motion, torque, slope)
+        if self.law.spacecraft.keep:
+            self.watch.some(rows).motion(here, lasts)
         rigid_cases.advance(here, lasts)
         self.rates[:, rows], self.quaternion[:, rows] = here.rates, here.quaternion
 

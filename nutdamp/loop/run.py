@@ -150,7 +150,8 @@ class Alone:
     ) -> Alone:
         """That of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
         moves = dynamics or make_dynamics(spacecraft)
-        pilot = Pilot(spacecraft, loop, until, law, free=moves.free, scatter=scatter)
+        free = make_dynamics(spacecraft).free  # the body's, so that any integrator flies the same decisions
+        pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
         return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
 
     def fly(self) -> Run:

@@ -23,6 +23,7 @@ from nutdamp.dispersion.kernel import carried
 from nutdamp.dispersion.outputs import angle
 from nutdamp.dispersion.statistics import Exact, Worst
 from nutdamp.dispersion.study import CONFIDENCE, KEPT_WORST, PROBABILITY
+from nutdamp.dispersion.watched import cones_used
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.cases import LoopModel
 from nutdamp.loop.diagnosis import Stop
@@ -121,7 +122,16 @@ class LoopStudy:
     @cached_property
     def nominal(self) -> Array:
         """The outputs (8,) of the file itself, with the noise of the seed."""
-        return self.measured(self.fly(self.nominal_case))[0][:, 0]
+        return self.measured(self._nominal_flown)[0][:, 0]
+
+    @property
+    def nominal_aspects(self) -> Array:
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone, of that flight."""
+        return self._nominal_flown.aspects[:, :, 0]
+
+    @cached_property
+    def _nominal_flown(self) -> Flown:
+        return self.fly(self.nominal_case)
 
     @property
     def nominal_case(self) -> list[Case]:
@@ -130,7 +140,7 @@ class LoopStudy:
 
     def expect_affordable(self, samples: int) -> int:
         """Samples that so many cases look at, by the nominal one; raises BadRequest where they are too many."""
-        looked = self.fly(self.nominal_case).pilots[0].looked_at
+        looked = self._nominal_flown.pilots[0].looked_at
         price = looked * samples * (ALONE if self.alone else 1)
         if price > MOST_SAMPLES:
             most = max(MOST_SAMPLES // (looked * (ALONE if self.alone else 1)), 1)
@@ -167,7 +177,8 @@ class LoopStudy:
         out[6] = [math.fsum(one) for one in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
-        severity = np.asarray(compliance.severity(body, Left(out[2], aim, flown.rates[2])), dtype=float)
+        shares = list(cones_used(body.keep, flown.aspects))
+        severity = np.asarray(compliance.severity(body, Left(out[2], aim, flown.rates[2]), shares))
         lost = np.array([pilot.lost for pilot in pilots])
         return out, np.where(lost, math.inf, severity)
 
@@ -201,7 +212,8 @@ class LoopResults:
     """What has been found of a study so far: the cases from 0 to ``done``.
 
     ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were stopped;
-    ``stops`` is why loops were flown no further.
+    ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and the largest
+    from the spin axis to the direction of each cone.
     """
 
     study: LoopStudy
@@ -212,10 +224,24 @@ class LoopResults:
     stops: Counter[Stop] = field(default_factory=Counter)
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     values: Array = field(init=False)
+    angles: Array = field(init=False)
     lost: NDArray[np.bool_] = field(init=False, default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         self.values = np.empty((len(OUTPUTS), self.requested))
+        self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
+
+    @property
+    def broken(self) -> NDArray[np.int64]:
+        """By cone (m,): how many cases break it."""
+        used = cones_used(self.study.spacecraft.keep, self.angles[:, :, : self.done])
+        return np.asarray(np.count_nonzero(used > 1.0, axis=1))
+
+    @property
+    def aspects(self) -> Array:
+        """By cone the least and the largest angle (m, 2) rad in all cases."""
+        seen = self.angles[:, :, : self.done]
+        return np.stack([seen[:, 0].min(axis=1), seen[:, 1].max(axis=1)], axis=1)
 
     def of(self, output: str) -> Array:
         """The known values of an output, (m,)."""
@@ -253,8 +279,8 @@ class LoopResults:
 
     @property
     def met_fraction(self) -> float | None:
-        """Share of cases that settle and comply; None where nothing is required."""
-        return self.met / self.done if self.done and compliance.required(self.study.spacecraft) else None
+        """Share of cases that settle and comply; None where nothing is required, and there are no cones."""
+        return self.met / self.done if self.done and compliance.judged(self.study.spacecraft) else None
 
     @property
     def probability(self) -> float:
@@ -268,10 +294,10 @@ class LoopResults:
         fraction = self.met_fraction
         return None if fraction is None else fraction >= self.probability
 
-    def take(self, values: Array, severity: Array, stops: list[Stop]) -> None:
-        """Counts further cases: their outputs (8, n), `LoopStudy.measured`, and why they were flown no further."""
+    def take(self, values: Array, severity: Array, angles: Array, stops: list[Stop]) -> None:
+        """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
         first, last = self.done, self.done + values.shape[1]
-        self.values[:, first:last] = values
+        self.values[:, first:last], self.angles[:, :, first:last] = values, angles
         self.met += int(np.count_nonzero(severity <= 1.0))
         self.stops.update(stops)
         self.lost = np.concatenate([self.lost, np.isinf(severity)])
@@ -326,7 +352,7 @@ def run(
             break
         values, severity = study.measured(flown)
         stops = [pilot.ending[0] for pilot in flown.pilots]
-        results.take(values, severity, stops)
+        results.take(values, severity, flown.aspects, stops)
         if collect is not None:
             collect(first, values, stops)
         watch(results.done)

@@ -19,6 +19,10 @@ AGREE = 1e-6
 """s; firings that begin and last alike to this are the same."""
 
 
+EVALUATIONS = 1_000_000
+"""Evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Solved:
     """A stretch that was integrated, by its interpolant."""
@@ -94,7 +98,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     loop = spacecraft.loop
     assert loop is not None
     run = fly(spacecraft, loop, until, seed=seed)
-    equations, inertia = Equations(spacecraft), spacecraft.inertia
+    equations, inertia = Equations(spacecraft, EVALUATIONS), spacecraft.inertia
     mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
     try:
         other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)

@@ -1,8 +1,9 @@
 """How near the spin axis comes to directions in space, and how far from them, in many cases at once.
 
 On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
-axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Any other motion is followed
-in steps. Arrays carry the case last, as in `rigid_cases`.
+axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
+those turns that count are followed in steps, and any other motion all the way. Arrays carry the case last, as in
+`rigid_cases`.
 """
 
 from __future__ import annotations
@@ -68,10 +69,12 @@ class AxisWatch:
     def motion(self, here: Stretch, duration: Array) -> None:
         """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
         bodies = here.bodies
-        if here.torque is None and bodies.free and bodies.forcing.growth == 0.0:
+        if here.torque is not None or not bodies.free:
+            self._steps(here, duration)
+        elif bodies.forcing.growth == 0.0:
             self._arc(bodies.moments, here.rates, here.quaternion, duration)
         else:
-            self._steps(here, duration)
+            self._slow(here, duration)
 
     def turn(self, here: Stretch) -> None:
         """Take one turn of the axis about H in a motion free of pulses."""
@@ -97,6 +100,23 @@ class AxisWatch:
             farthest = (nearest + math.pi) % CIRCLE
             least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
+
+    def _slow(self, here: Stretch, duration: Array) -> None:
+        """Arcs with dissipation, of which the first turn and the last are followed in steps.
+
+        H stays and θ grows, or falls, all the way: between those turns so do |β - θ| and β + θ, unless θ passes β or
+        π - β, where all turns are followed.
+        """
+        turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
+        last = here.moved(here.since + np.maximum(duration - turn, 0.0))
+        momentum = _rotated(here.quaternion, here.bodies.moments * here.rates)
+        before, after = (_angles(momentum, self._axis(one.quaternion)) for one in (here, last))
+        betas = np.array([_angles(momentum, one) for one in self.directions[:, :, self.rows]])
+        passed = [(before - one) * (after - one) <= 0.0 for one in (*betas, *(math.pi - betas))]
+        whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
+        for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
+            if cases.any():
+                self.some(cases)._steps(begins.some(cases), lasts[cases])
 
     def _steps(self, here: Stretch, duration: Array) -> None:
         """Begin and end of each step, and extremes between them."""

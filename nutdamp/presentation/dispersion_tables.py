@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -64,7 +64,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
-    parts += [Text(), *requirement_lines(results), *_cones(results), *_emptied(results), Text(), *_budget(results)]
+    parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results), Text(), *_budget(results)]
     if worst and any(entry.sigma for entry in results.study.model.inputs.drawn):
         parts += [Text(), *_worst(results, worst)]
     unused = results.study.model.inputs.unused
@@ -128,16 +128,14 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
     return [text]
 
 
-def _cones(results: Results) -> Iterator[RenderableType]:
+def cone_lines(results: Results | LoopResults) -> Iterator[RenderableType]:
     """How many cases break each cone, and how near the spin axis comes to its direction and how far from it."""
     study = results.study
-    nominal = aspects(study.nominal) if results.done and study.model.spacecraft.keep else ()
+    nominal = study.nominal_aspects.tolist() if results.done and study.model.spacecraft.keep else ()
     for index, (keep, one) in enumerate(zip(study.model.spacecraft.keep, nominal, strict=False)):
         broken = int(results.broken[index])
         share = verdicts.percent(broken / results.done, 1.0 - results.probability)
-        seen, alone = (
-            " to ".join(map(degrees, angles)) for angles in (results.aspects[index].tolist(), (one.least, one.largest))
-        )
+        seen, alone = (" to ".join(map(degrees, angles)) for angles in (results.aspects[index].tolist(), one))
         yield Text.assemble(
             (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
             (f"broken in {share} of cases", "red" if broken else "green"),
@@ -297,7 +295,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         "nutation\ndeg",
         "shift of H\ndeg",
         "axis error\ndeg",
-        *(f"{which} from\n{keep.name}, deg" for keep in study.model.spacecraft.keep for which in _bounded(keep)),
+        *bounded_heads(study.model.spacecraft.keep),
         "what counts most, in sigmas",
         text=("what counts most, in sigmas",),
     )
@@ -310,7 +308,9 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
         names = [in_words(entry.name) for entry in study.model.inputs.drawn]
         drawn = ", ".join(f"{names[row]} {sigmas[row]:+.1f}" for row in order if sigmas[row])
-        angles = [f"{math.degrees(angle):.4g}" for angle in _nearest_cones(study, draws)]
+        found = study.aspects_of(draws)
+        seen = () if found is None else bounded(study.model.spacecraft.keep, np.degrees(found).tolist())
+        angles = [f"{angle:.4g}" for angle in seen]
         table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), *angles, drawn)
     again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
@@ -321,11 +321,19 @@ def _bounded(keep: Keep) -> list[str]:
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
 
 
-def _nearest_cones(study: Study, draws: Mapping[str, float]) -> Iterator[float]:
-    """The angles of one case that are `_bounded`, rad, cone after cone."""
-    found, names = study.aspects_of(draws), ("least", "largest")
-    for keep, angles in zip(study.model.spacecraft.keep, () if found is None else found.tolist(), strict=False):
-        yield from (angles[names.index(which)] for which in _bounded(keep))
+def bounded_heads(keep: Sequence[Keep]) -> list[str]:
+    """Heads of the columns of the angles that are `bounded`."""
+    return [f"{which} from\n{one.name}, deg" for one in keep for which in _bounded(one)]
+
+
+def bounded(keep: Sequence[Keep], angles: Iterable[Iterable[float]]) -> list[float]:
+    """Of the least and largest ``angles`` to the direction of each cone those that it bounds, cone after cone."""
+    return [
+        angle
+        for one, seen in zip(keep, angles, strict=True)
+        for which, angle in zip(("least", "largest"), seen, strict=True)
+        if which in _bounded(one)
+    ]
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:
@@ -369,15 +377,20 @@ def case_screen(
         largest = scale * float(np.max(np.abs(values)))
         cells = (MISSING if math.isnan(value) else beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
-    angles = [one.aspects_of(case_) for one in (closed, real) for case_ in ({}, draws)]
-    for index, keep in enumerate(study.model.spacecraft.keep):
-        for row, which in enumerate(("least", "largest")):
-            cells = (f"{math.degrees(found[index, row]):.4g}" for found in angles if found is not None)
-            outcome.add_row(Text(f"{which} from {keep.name}, deg", style="dim"), *cells)
+    found = [one.aspects_of(case_) for one in (closed, real) for case_ in ({}, draws)]
+    add_angles(outcome, study.model.spacecraft.keep, [one for one in found if one is not None])
     empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(real.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
     return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"), *empty)
+
+
+def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:
+    """Two rows for each cone: the least and the largest angle from its direction in each of ``flights``, (m, 2) rad."""
+    for index, one in enumerate(keep):
+        for row, which in enumerate(("least", "largest")):
+            cells = (f"{math.degrees(found[index, row]):.4g}" for found in flights)
+            table.add_row(Text(f"{which} from {one.name}, deg", style="dim"), *cells)
 
 
 def _budgeted(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:

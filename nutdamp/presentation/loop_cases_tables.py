@@ -10,14 +10,19 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.dispersion.statistics import Array, Exact
+from nutdamp.dispersion.statistics import Exact
 from nutdamp.loop.diagnosis import Stop
+from nutdamp.loop.fleet import Flown
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.dispersion_tables import (
     MOST_ROWS,
     PERCENTS,
+    add_angles,
     beside,
+    bounded,
+    bounded_heads,
+    cone_lines,
     in_words,
     inputs_table,
     requirement_lines,
@@ -52,7 +57,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
     parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results), Text()]
-    parts += [*_settled(results), _dead_band(results), *requirement_lines(results)]
+    parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
     parts += list(_shares(results))
     anew = ", ".join(f"{in_words(one.name)} {size_text(one)}" for one in study.model.of_firings)
     if anew:
@@ -138,13 +143,14 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 
 
 def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
-    study = results.study
+    study, keep = results.study, results.study.spacecraft.keep
     heads = (
         "case\n",
         "first quiet\ns",
         "largest\ndeg",
         "propellant\ng",
         "firings\n",
+        *bounded_heads(keep),
         "largest inputs, in sigmas\n",
     )
     table = columns(*heads, text=(heads[-1],))
@@ -158,20 +164,23 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
             MISSING if math.isnan(values[name]) else f"{values[name] * NAMES[name][1]:.4g}"
             for name in ("settled", "nutation", "propellant", "firings")
         )
-        table.add_row(str(case + 1), *cells, ", ".join(f"{name} {sigma:+.1f}" for name, sigma in largest))
+        angles = [f"{angle:.4g}" for angle in bounded(keep, np.degrees(results.angles[:, :, case]).tolist())]
+        table.add_row(str(case + 1), *cells, *angles, ", ".join(f"{name} {sigma:+.1f}" for name, sigma in largest))
     yield Text("Worst cases", style="bold")
     yield table
     one = f"--seed {study.seed} --case {cases[0] + 1}"
     yield Text(f"Each can be looked at alone: {one}; `nutdamp loop` flies it with {one} again", "dim")
 
 
-def loop_case_screen(study: LoopStudy, case: int, values: Array, stop: Stop) -> Group:
-    """One case (from 0): every input, and how it ends, by its outputs (8,), beside the nominal one."""
+def loop_case_screen(study: LoopStudy, case: int, flown: Flown) -> Group:
+    """One case (from 0), ``flown`` alone: every input, and how it ends beside the nominal one."""
+    values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
     table = columns("", "nominal", "this case")
     for output, *pair in zip(OUTPUTS, study.nominal.tolist(), values.tolist(), strict=True):
         name, scale = NAMES[output]
         largest = scale * max((abs(one) for one in pair if not math.isnan(one)), default=0.0)
         table.add_row(Text(name, style="dim"), *(_number(output, scale * one, largest) for one in pair))
+    add_angles(table, study.spacecraft.keep, [study.nominal_aspects, flown.aspects[:, :, 0]])
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, study.draws_of(case)), Text()]
     parts.append(table)

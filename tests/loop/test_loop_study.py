@@ -10,6 +10,7 @@ import pytest
 from builders import channel, spinner
 from dispersed import jet, normal
 
+from nutdamp.demands import Keep
 from nutdamp.dispersion import study_of
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.diagnosis import Stop
@@ -21,7 +22,7 @@ from nutdamp.loop_settings import ACCELEROMETER, BANG, Loop, Sensor
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Trapezoid
 from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Channel, Disturbance, Requirement, Spacecraft
+from nutdamp.spacecraft import Attitude, Channel, Disturbance, Requirement, Spacecraft
 from nutdamp.tolerances import Dispersions, Tolerance
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)
@@ -330,3 +331,27 @@ def test_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
 @pytest.mark.parametrize("name", SIX)
 def test_ten_thousand_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
     check_six(name, 10_000)
+
+
+@pytest.mark.parametrize("dissipation", [None, 200.0])
+def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> None:
+    body = replace(craft(), dissipation=dissipation, attitude=Attitude(np.array([0.8, 0.0, 0.6, 0.0])))
+    at = body.direction_in_n(rad(3.0), 0.4)
+    watched = replace(body, keep=(Keep("star", at, most=rad(5.0)), Keep("Sun", -at, least=rad(174.0))))
+    free, kept = (run(LoopResults(study(one), 40)) for one in (body, watched))
+    assert kept.values == pytest.approx(free.values, nan_ok=True)
+    alone = []
+    for case in range(12):
+        seen = loop_of(watched, 60.0, seed=3, case=case)
+        angles = np.array([(one.least, one.largest) for one in seen.aspects])
+        assert kept.angles[:, :, case] == pytest.approx(angles, abs=rad(2e-3))
+        alone.append(seen.meets_requirement)
+    assert len(set(alone)) == 2
+    broken = np.any([keep.used(*pair) > 1.0 for keep, pair in zip(watched.keep, kept.angles, strict=True)], axis=0)
+    assert 0 < np.count_nonzero(broken) < 40
+    assert kept.met == np.count_nonzero(~broken) - (free.done - free.met)
+    assert alone == [not one for one in broken[:12]]
+    assert kept.broken.tolist() == [np.count_nonzero(kept.angles[0, 1] > rad(5.0)), int(kept.broken[1])]
+    assert kept.aspects[0] == pytest.approx([kept.angles[0, 0].min(), kept.angles[0, 1].max()])
+    only = run(LoopResults(study(replace(watched, requirement=None)), 40))
+    assert only.met_fraction == pytest.approx(np.mean(~broken))
