@@ -184,11 +184,16 @@ def _apart(value: float) -> str:
     return f"{value:.1e}"
 
 
+ROUNDING = 1e-12
+"""Share of the nutation that a firing leaves by rounding alone."""
+
+
 def margin_table(found: tuple[Margin, ...]) -> Table:
     """How far each channel is from feeding the nutation."""
     table = columns("channel\n", "late\ndeg", "a firing leaves\n%", "growth in a period\n%", "delay margin\n")
     for one in found:
         margin = "none" if one.delay < 0.0 else duration(one.delay)
         growth = f"{100.0 * (one.growth - 1.0):.3g}"
-        table.add_row(one.channel, f"{math.degrees(one.late):.4g}", f"{100.0 * one.gain:.4g}", growth, margin)
+        left = 0.0 if one.gain < ROUNDING else 100.0 * one.gain
+        table.add_row(one.channel, f"{math.degrees(one.late):.4g}", f"{left:.4g}", growth, margin)
     return table

@@ -36,9 +36,14 @@ def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: 
     here, directions, lasts = arcs(sense, growth)
     few, every = AxisWatch.of(directions, sense), AxisWatch.of(directions, sense)
     every._steps(here, lasts)
-    steps = []
+    steps: list[int] = []
     stepped = AxisWatch._steps
-    monkeypatch.setattr(AxisWatch, "_steps", lambda *given: steps.append(len(given[2])) or stepped(*given))
+
+    def counted(self: AxisWatch, begin: Stretch, duration: np.ndarray) -> None:
+        steps.append(len(duration))
+        stepped(self, begin, duration)
+
+    monkeypatch.setattr(AxisWatch, "_steps", counted)
     few.motion(here, lasts)
     assert few.angles == pytest.approx(every.angles, abs=3e-5)
     assert steps[0] < COUNT // 2  # followed all the way
