@@ -32,8 +32,8 @@ class Equations:
     the propellant used too, kg.
     """
 
-    def __init__(self, spacecraft: Spacecraft, most: int = EVALUATIONS) -> None:
-        self.most = most
+    def __init__(self, spacecraft: Spacecraft, most: int | None = None) -> None:
+        self.most = EVALUATIONS if most is None else most
         self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
         self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
         self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)

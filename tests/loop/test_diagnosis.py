@@ -14,7 +14,7 @@ from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.law import Law
 from nutdamp.loop.run import Run, fly
 from nutdamp.loop.sensor import Estimator, gain
-from nutdamp.loop.stability import Margin, feeding
+from nutdamp.loop.stability import Cause, Margin, feeding
 from nutdamp.loop_settings import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
 from nutdamp.presentation.loop_tables import margin_table
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -177,5 +177,5 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
 
 
 def test_rounding_is_no_share_that_a_firing_leaves() -> None:
-    one = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4)
+    one = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, Cause(sensor=False, backwards=False))
     assert list(margin_table((one,)).columns[2].cells) == ["0"]
