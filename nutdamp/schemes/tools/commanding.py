@@ -179,8 +179,12 @@ def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inerti
         corrected = _on_ticks(spacecraft, first, correct)
     found = _firing(corrected)
     if found.pulses:
-        supply = Supply(spacecraft)
-        supply.count(found)
+        supply, channels = Supply(spacecraft), {one.name: one for one in spacecraft.channels}
+        for pulse in found:  # as commanded: what an empty tank has weakened would never be more than it has
+            if pulse.channel in channels:
+                supply.take(channels[pulse.channel], pulse.on_time)
+            else:
+                supply.count((pulse,))
         supply.expect_to_last()
     fired = [pulse for pulse, command in zip(made, commands, strict=True) if command.magnitude > 0.0]
     notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), found, correct)
