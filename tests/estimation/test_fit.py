@@ -64,6 +64,12 @@ def scores(seeds: Iterable[int]) -> list[Score]:
     return [score(gyro_case(seed)) for seed in seeds]
 
 
+def test_the_true_values_of_eight_records_are_in_the_95_percent_region() -> None:
+    """All but one at most: 7.6 are expected."""
+    assert sum(one.inside for one in scores(range(8))) >= 7
+
+
+@pytest.mark.slow
 def test_the_true_values_are_in_the_95_percent_region() -> None:
     found = scores(range(40))
     # 38 of 40 are expected; fewer than 33 come once in 2,000 sets of seeds.

@@ -238,7 +238,8 @@ def turned(horizon: str) -> Node:
 def cards(tree: Node) -> dict[str, list[str]]:
     """The tiles: what stands below the name of each."""
     tiles = [tile for one in tree.all("dl") if one.attributes.get("class") == "figures" for tile in one.all("div")]
-    return {tile.all("dt")[0].text: [one.text for one in tile.all("dd")] for tile in tiles}
+    plain = {tile.all("dt")[0].text: [one.text for one in tile.all("dd")] for tile in tiles}
+    return {name: [text.replace("\N{NO-BREAK SPACE}", " ") for text in texts] for name, texts in plain.items()}
 
 
 @pytest.mark.slow
