@@ -227,8 +227,8 @@ def _translated(
     """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where the propellant does
-    not last, and for pulses so weak that they would be longer than the horizon.
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
+    they would be longer than the horizon.
     """
     supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
@@ -251,7 +251,6 @@ def _translated(
             raise Infeasible(f"{text}, longer than limits.horizon")
         given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
         pulses.append(supply.fire(given, channel))
-    supply.expect_to_last()  # a correction would make do with what the tank has
     return tuple(pulses)
 
 
