@@ -122,3 +122,14 @@ def test_numbers_of_points_close_together_are_nearest_to_their_own_or_joined_to_
 
 def test_trades_can_be_seen_on_white_and_in_the_dark() -> None:
     check_colours(figures.trade_figure(BODY, traded(), compared().recommended))
+
+
+def test_a_schedule_that_ends_at_once_has_its_place_on_the_axis_of_time() -> None:
+    body = replace(spinner(phase=0.0), requirement=Requirement(momentum_shift=math.radians(0.05)))
+    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))
+    ends = [point.plan.pulses.end for _, _, point in fronts.numbered(found)]
+    assert min(ends) == 0.0
+    figure = figures.trade_figure(body, found)
+    check_layout(figure)
+    low, high = figure.axes[0].get_xlim()
+    assert all(low < end < high for end in ends)

@@ -273,8 +273,10 @@ def _budget(figure: Figure | SubFigure, results: Results) -> None:
         axes.set_title(f"{name}: one sigma\nof each input alone")
         effects = np.degrees([row.effects[index] for row in rows])
         most = float(effects.max(initial=0.0))
+        limit, right = _limit(results, part), 1.3 * most
         if most < NOTHING:
-            style.words(axes, f"each input: below {NEXT_TO_NOTHING}" if rows else "no input varies")
+            required = "" if limit is None else f"\nrequired {limit:.4g}°"
+            style.words(axes, (f"each input: below {NEXT_TO_NOTHING}" if rows else "no input varies") + required)
             continue
         bars = axes.barh(places, effects, height=0.62, facecolor=colour, edgecolor=INK, linewidth=0.5)
         for bar, row, place, effect in zip(bars, rows, places, effects, strict=True):
@@ -282,7 +284,6 @@ def _budget(figure: Figure | SubFigure, results: Results) -> None:
                 bar.set(hatch="////", label="bias, not one sigma")
             text = f"{effect:.3g}" if effect >= NOTHING else "< 1e-6"
             axes.annotate(text, (effect, place), (3, 0), textcoords="offset points", va="center", fontsize=style.SMALL)
-        limit, right = _limit(results, part), 1.3 * most
         if limit is not None and limit <= right:
             right = max(right, 1.05 * limit)
             axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")

@@ -29,6 +29,9 @@ SAMPLES = 3000
 BLOCK = 4096
 """Samples that are worked out together."""
 
+ROW = 0.36
+"""Inches from one row of firings to the next: a bar, its number, and room."""
+
 DECADES = 5.0
 """Of the nutation shown on its log axis, at most."""
 
@@ -38,8 +41,8 @@ def loop_figure(plan: LoopPlan) -> Figure:
     """Signal of the sensor, nutation with thresholds, and firings, over the whole run."""
     run = plan.flown_run
     names = len({one.pulse.channel for one in run.fired})
-    figure = style.sheet(7.4, 5.6 + 0.2 * names)
-    grid = figure.add_gridspec(3, 1, height_ratios=[2.2, 2.2, 0.8 + 0.25 * names])
+    figure = style.sheet(7.4, 5.3 + ROW * names)
+    grid = figure.add_gridspec(3, 1, height_ratios=[1.8, 1.8, 0.3 + ROW * names])
     signal = figure.add_subplot(grid[0])
     nutation = figure.add_subplot(grid[1], sharex=signal)
     fired = figure.add_subplot(grid[2], sharex=signal)

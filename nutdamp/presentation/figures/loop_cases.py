@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nutdamp import compliance
+from nutdamp.compliance import Part
 from nutdamp.loop.study import LoopResults
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.legends import heading, legend
@@ -26,25 +28,40 @@ NEAR = 2.0
 
 @style.styled
 def loop_cases_figure(results: LoopResults) -> Figure:
-    """Histograms of four outputs, with dead band and requirement."""
+    """Histograms of six outputs, with dead band and requirement."""
     study = results.study
-    figure = style.sheet(7.4, 6.2)
-    settled, quiet, largest, propellant = figure.subplots(2, 2).ravel()
+    figure = style.sheet(7.4, 8.4)
+    settled, quiet, largest, shift, propellant, firings = figure.subplots(3, 2).ravel()
     degrees = 180.0 / math.pi
     _histogram(settled, results, "settled", 1.0, "first quiet, s")
     _histogram(quiet, results, "quiet", degrees, "left then, deg")
     quiet.axvline(degrees * study.band.most, color=GREY, linewidth=1.2, linestyle="--", label="dead band")
     _histogram(largest, results, "nutation", degrees, "largest, deg")
-    required = study.spacecraft.requirement
-    most = results.distribution("nutation")
-    if required is not None and required.nutation is not None and most and required.nutation < NEAR * most.maximum:
-        largest.axvline(degrees * required.nutation, color=PULSE, linewidth=1.4, label="required")
+    _required(largest, results, "nutation", Part.NUTATION)
+    aim = compliance.aim(study.spacecraft)
+    _histogram(shift, results, aim.value, degrees, f"{aim.label}, deg")
+    _required(shift, results, aim.value, aim)
     _histogram(propellant, results, "propellant", 1e3, "propellant, g")
-    legend(figure, [quiet, largest])
+    _histogram(firings, results, "firings", 1.0, "firings")
+    firings.locator_params(axis="x", integer=True)
+    legend(figure, [quiet, largest, shift])
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
     heading(figure, study.spacecraft, f"closed loop, {results.done:,} dispersed cases{verdict}")
     return figure
+
+
+def _required(axes: Axes, results: LoopResults, output: str, part: Part) -> None:
+    """The bound of a part of the requirement, degrees; in words where it is far from every case."""
+    limit = next((one.most for one in compliance.required(results.study.spacecraft) if one.part is part), None)
+    most = results.distribution(output)
+    if limit is None or not most:
+        return
+    if limit < NEAR * most.maximum:
+        axes.axvline(math.degrees(limit), color=PULSE, linewidth=1.4, label="required")
+    else:
+        far = f"required {math.degrees(limit):.4g}°, outside the view"
+        axes.set_title(far, fontsize=style.SMALL, fontweight="normal")
 
 
 def _histogram(axes: Axes, results: LoopResults, output: str, scale: float, name: str) -> None:

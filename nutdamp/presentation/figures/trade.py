@@ -58,7 +58,9 @@ def trade_figure(
         return figure
     axes = figure.subplots()
     axes.set_title(reasons, loc="left", fontsize=style.SMALL, fontweight="normal")
-    axes.set_xscale("log")
+    # A pulse of no width at t = 0 ends there, which a log axis has no place for.
+    log = all(point.plan.pulses.end > 0.0 for point in points)
+    axes.set_xscale("log" if log else "linear")
     scale = 1e3 if points[0].unit == "kg" else 1.0
     _draw_fronts(axes, spacecraft, found, scale)
     proved = [point.bounds.rigorous for point in points]
@@ -73,7 +75,9 @@ def trade_figure(
     axes.margins(y=0.12)
     axes.set_xlabel("end of the last pulse, s")
     axes.set_ylabel("propellant, g" if scale > 1.0 else "impulse, N m s")
-    _graduate(axes)
+    if log:
+        _graduate(axes)
+    axes.grid(True, which="both")
     legend(figure, [axes], 3)
     style.settle(figure)
     return figure
@@ -88,7 +92,6 @@ def _graduate(axes: Axes) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
-    axes.grid(True, which="both")
 
 
 def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], scale: float) -> None:
