@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nutdamp import comparison, dispersion
-from nutdamp.dispersion.study import Results, run
+from nutdamp.dispersion.study import PROBABILITY, Results, run
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.fit import Fit, estimated
 from nutdamp.estimation.model import Model
@@ -32,7 +32,7 @@ CASES = 4000
 """Dispersed cases flown for each."""
 
 LEVEL = 0.997
-"""Share of the cases that stay below the nutation that is told."""
+"""Share of the cases that stay below the nutation that is shown."""
 
 PAYS = 0.9
 """Share of that nutation, and less, down to which it must fall for another coast or a probe pulse to pay."""
@@ -65,11 +65,18 @@ class Outlook:
     scheme: str
     coasts: tuple[Prospect, ...]
     probes: tuple[Prospect, ...]
+    probability: float = PROBABILITY
+    """Share of cases that must meet the requirement."""
 
     @property
     def now(self) -> Prospect:
         """With a coast as long as the record."""
         return self.coasts[LENGTHS.index(1.0)]
+
+    @property
+    def enough(self) -> bool:
+        """Whether as many cases as must meet the requirement already: then nothing pays."""
+        return self.now.met is not None and self.now.met >= self.probability
 
     @property
     def longer(self) -> Prospect | None:
@@ -83,7 +90,7 @@ class Outlook:
         return best if best is not None and self._pays(best) else None
 
     def _pays(self, one: Prospect) -> bool:
-        return one.nutation < PAYS * self.now.nutation
+        return not self.enough and one.nutation < PAYS * self.now.nutation
 
 
 def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _: None) -> Outlook:
@@ -105,7 +112,9 @@ def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _:
     for name, on_time in _probes(plan, body):
         probes.append(_prospect(plan, found, time, length, name, on_time))
         progress(done := done + 1)
-    return Outlook(plan.scheme, tuple(made), tuple(probes))
+    required = spacecraft.requirement
+    probability = PROBABILITY if required is None or required.probability is None else required.probability
+    return Outlook(plan.scheme, tuple(made), tuple(probes), probability)
 
 
 def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:

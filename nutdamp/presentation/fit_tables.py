@@ -15,6 +15,7 @@ from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import SHARED, TOLD, Estimate, correlated, estimates
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees, sentence
+from nutdamp.presentation.verdicts import exact_percent, percent
 
 SHOWN = {
     "axis": ("deg", 180.0 / math.pi),
@@ -64,6 +65,10 @@ def advice(ahead: Outlook) -> Iterator[str]:
     """Whether more telemetry would pay: clauses."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
     today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in 99.7 % of cases"
+    if ahead.enough:
+        met, level = percent(now.met or 0.0, ahead.probability), exact_percent(ahead.probability)
+        yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
+        return
     if longer is None:
         last = ahead.coasts[-1]
         yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"

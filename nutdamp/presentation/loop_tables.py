@@ -71,10 +71,11 @@ def stopped(run: Run) -> str:
     count, after = len(run.fired), ""
     if run.fired:
         after = f"after {count} firing{'s' * (count != 1)}, at {moment(run.fired[-1].pulse.end)}: "
-    name = run.channel
+    name, fired = run.channel, " and ".join(dict.fromkeys(one.pulse.channel for one in run.fired))
     said = {
         Stop.EMPTY: "the tank is empty, and nothing fires any more",
-        Stop.SENSOR: "the sensor is reversed: firings of two channels changed what it shows against what they should",
+        Stop.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
+        "sensor shows against what it should",
         Stop.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
         Stop.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
         Stop.IDLE: f"channel {name} does nothing, or much less than its torque should",

@@ -131,7 +131,8 @@ def test_settings_become_part_of_the_file(run: Run, tmp_path: Path) -> None:
 
 def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 6)
-    done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", columns=100)
+    tight = "requirement.nutation=0.1 deg"
+    done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", "--set", tight, columns=100)
     assert done.returncode == 0, done.stderr
     ahead = json.loads((tmp_path / "f.json").read_text())["next"]
     coasts = [one for one in ahead["prospects"] if one["probe"] is None]
@@ -148,6 +149,16 @@ def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Pa
     assert min(one["nutation_99.7_deg"] for one in probes) < 0.9 * now
     # 2 % of thrust becomes what is left of it beside A, whose scale no record tells.
     assert all(0.0034 < one["sigma_thrust"] < 0.006 for one in probes)
+
+
+def test_nothing_pays_where_as_many_cases_comply_as_must(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 6)
+    done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json")
+    said = " ".join(done.stdout.split())
+    assert "(99.7 % required): neither a longer coast nor a probe pulse is needed." in said
+    assert "pays" not in said
+    ahead = json.loads((tmp_path / "f.json").read_text())["next"]
+    assert (ahead["longer_coast_s"], ahead["probe"]) == (None, None)
 
 
 def test_the_prospect_of_the_record_as_it_is_agrees_with_its_fit(tmp_path: Path) -> None:
