@@ -57,7 +57,7 @@ SAVED_EVERY = 30.0
 @click.option(
     "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
 )
-@click.option("--csv", type=FILE, help="Write inputs and outcome of every case.")
+@click.option("--csv", type=FILE, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
 @click.option("--resume", type=FILE, help="Save finished cases in this file, and resume from it if it exists.")

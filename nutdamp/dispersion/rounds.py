@@ -36,7 +36,7 @@ class Round:
     def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
         self.severity = np.empty(last - first)
-        self.aspects = np.empty((len(results.broken), 2, last - first))
+        self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
         self.emptied = np.zeros(last - first, dtype=bool)
         self.chunk = max(chunk // STRIDE, 1) * STRIDE
         self.portion = PORTION if results.study.flown else BLOCK
@@ -113,7 +113,7 @@ class Round:
             outputs = np.empty((len(OUTPUTS), high - low))
             measure(study.model, ends, outputs)
             place = slice(columns.start - self.first, columns.stop - self.first)
-            self.out[:, place] = outputs[:, inner]
+            self.out[: len(OUTPUTS), place] = outputs[:, inner]
             self.severity[place] = study.severity(outputs, ends)[inner]
             self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
             if ends.aspects is not None:

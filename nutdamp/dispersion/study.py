@@ -51,7 +51,7 @@ CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
 
 Collect = Callable[[int, Array], None]
-"""Takes the number (from 0) of the first of some cases, and their outputs (5, n), in order."""
+"""Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
 
 
 def threads_here() -> int:
@@ -161,9 +161,10 @@ class Study:
 class Results:
     """What has been found of a study so far: the cases from 0 to ``done``.
 
-    ``values`` (5, capacity) are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the
-    outcome of the first cases. By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the
-    least and the largest angle in all cases. ``emptied`` counts those whose tank runs empty.
+    ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
+    are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
+    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
+    in all cases. ``emptied`` counts those whose tank runs empty.
     """
 
     study: Study
@@ -184,8 +185,13 @@ class Results:
         self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
         if self.values is None and self.sketches is None:
             exact = self.requested <= EXACT_CASES
-            self.values = np.empty((len(OUTPUTS), self.requested)) if exact else None
+            self.values = np.empty((self.rows, self.requested)) if exact else None
             self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+
+    @property
+    def rows(self) -> int:
+        """Rows of ``values``."""
+        return len(OUTPUTS) + 2 * len(self.study.model.spacecraft.keep)
 
     @property
     def exact(self) -> bool:
@@ -267,7 +273,7 @@ class Results:
         if self.values is not None and more.values is not None:
             more.values[:, : self.done] = self.values[:, : self.done]
         elif self.values is not None and more.sketches is not None:
-            for sketch, row in zip(more.sketches, self.values, strict=True):
+            for sketch, row in zip(more.sketches, self.values, strict=False):
                 sketch.add(row[: self.done])
         return more
 
@@ -293,7 +299,7 @@ def run(
     while results.done < results.requested and not stopped():
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)
-        out = np.empty((len(OUTPUTS), last - first)) if results.values is None else results.values[:, first:last]
+        out = np.empty((results.rows, last - first)) if results.values is None else results.values[:, first:last]
         flights = Round(results, first, last, out, chunk)
         done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:

@@ -13,7 +13,7 @@ from nutdamp.dispersion.study import CONFIDENCE
 from nutdamp.files.dispersion_json import PERCENTS, angles_json, cones_json, correlation_json, requirement_of
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import spacecraft_json
-from nutdamp.files.samples_csv import column
+from nutdamp.files.samples_csv import column, cone_columns
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.fleet import Flown
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
@@ -112,16 +112,20 @@ def _share(results: LoopResults, count: int, of: int) -> dict[str, float | None]
 
 
 class LoopCasesWriter:
-    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees."""
+    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
+
+    With cones the least and the largest angle from the spin axis to the direction of each one follow.
+    """
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
         self._stream, self._study = stream, study
-        header = ["case", *(column(entry) for entry in study.model.inputs.drawn), *COLUMNS, "stopped"]
+        inputs = (column(entry) for entry in study.model.inputs.drawn)
+        header = ["case", *inputs, *COLUMNS, "stopped", *cone_columns(study.spacecraft)]
         stream.write(csv_text(header, []).encode())
         stream.flush()
 
-    def write(self, first: int, values: Array, stops: list[Stop]) -> None:
-        """The cases from ``first`` (from 0) on, with their outputs (8, n)."""
+    def write(self, first: int, values: Array, stops: list[Stop], angles: Array) -> None:
+        """The cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
         entries = self._study.model.inputs.drawn
         drawn = self._study.draws_from(first, len(stops))
         rows = []
@@ -133,5 +137,6 @@ class LoopCasesWriter:
             ]
             outputs = outputs_json(values[:, row]).values()
             shown = ["" if math.isnan(value) else number(value) for value in outputs]
-            rows.append([str(first + row + 1), *inputs, *shown[:-1], str(int(values[-1, row])), stop.name.lower()])
+            ending = [str(int(values[-1, row])), stop.name.lower(), *map(number, np.degrees(angles[..., row]).flat)]
+            rows.append([str(first + row + 1), *inputs, *shown[:-1], *ending])
         self._stream.write(csv_text(rows[0], rows[1:]).encode())

@@ -16,6 +16,7 @@ from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import Study
 from nutdamp.errors import CannotWrite
 from nutdamp.files.output import STDOUT, csv_text
+from nutdamp.spacecraft import Spacecraft
 
 SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "": "factor"}
 """Endings of headings for units; those not in it are written as they are."""
@@ -26,23 +27,33 @@ SHORTEST = 12
 """Bytes that a number takes at least, on average, with its comma."""
 
 
+def cone_columns(spacecraft: Spacecraft) -> list[str]:
+    """Headings of the least and the largest angle to the direction of each cone: its name with what they are."""
+    names = [keep.name.replace(" ", "_") for keep in spacecraft.keep]
+    return [f"{name}_{angle}" for name in names for angle in ("least_deg", "largest_deg")]
+
+
 def column(entry: Input) -> str:
     """Heading of an input: its name with the unit as suffix."""
     return f"{entry.name.replace(' ', '_')}_{SUFFIXES.get(entry.unit, entry.unit)}"
 
 
 class SamplesWriter:
-    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees."""
+    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
+
+    With cones the least and the largest angle from the spin axis to the direction of each one follow.
+    """
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
         self._stream, self._source = stream, study.source()
         self._inputs = study.model.inputs.drawn
-        header = ["case", *(column(entry) for entry in self._inputs), *OUTPUT_COLUMNS]
+        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(study.model.spacecraft)]
+        header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())
         stream.flush()  # a full disk is better reported before the first case is flown
 
     def write(self, first: int, values: Array) -> None:
-        """The cases from ``first`` (from 0) on, with their outputs (5, n)."""
+        """The cases from ``first`` (from 0) on, with their `Results.values` (5 + 2m, n)."""
         last = first + values.shape[1]
         for block in range(first // BLOCK, math.ceil(last / BLOCK)):
             low, high = max(first, block * BLOCK), min(last, (block + 1) * BLOCK)
@@ -52,7 +63,7 @@ class SamplesWriter:
                 draw = np.broadcast_to(draws[entry.name], BLOCK)[low - block * BLOCK : high - block * BLOCK]
                 columns.append(_texts(_shown(entry, draw)))
             outputs = values[:, low - first : high - first]
-            for name, row in zip(OUTPUT_COLUMNS, outputs, strict=True):
+            for name, row in zip(self._outputs, outputs, strict=True):
                 columns.append(_texts(np.degrees(row) if name.endswith("_deg") else row))
             lines = map(",".join, zip(*columns, strict=True))
             self._stream.write(("\r\n".join(lines) + "\r\n").encode())
@@ -74,7 +85,7 @@ def check_room(path: str, study: Study, samples: int) -> None:
     """Raises CannotWrite at once where a disk cannot hold so many rows, rather than when it is full."""
     if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
         return
-    needed = samples * SHORTEST * (1 + len(study.model.inputs.drawn) + len(OUTPUTS) - 1)
+    needed = samples * SHORTEST * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
     try:
         free = shutil.disk_usage(Path(path).resolve().parent).free
     except OSError:

@@ -101,7 +101,7 @@ def _check(arrays: dict[str, Any], cones: int) -> None:
         "aspects": (np.float64, (cones, 2)),
     }
     if "values" in arrays:
-        forms["values"] = (np.float64, (outputs, done))
+        forms["values"] = (np.float64, (outputs + 2 * cones, done))
     else:
         forms |= {"sketches": (np.int64, (outputs, len(Sketch().counts))), "extremes": (np.float64, (outputs, 2))}
     for name, (kind, shape) in forms.items():

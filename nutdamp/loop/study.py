@@ -63,8 +63,9 @@ FEW = 100
 """Cases that fall quiet, at least, of which it is said what they depend on."""
 
 
-Collect = Callable[[int, Array, list[Stop]], None]
-"""Takes the number (from 0) of the first of some cases, their outputs (8, n), and why they were flown no further."""
+Collect = Callable[[int, Array, list[Stop], Array], None]
+"""Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
+least and largest angle (m, 2, n) rad to the direction of each cone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,7 +355,7 @@ def run(
         stops = [pilot.ending[0] for pilot in flown.pilots]
         results.take(values, severity, flown.aspects, stops)
         if collect is not None:
-            collect(first, values, stops)
+            collect(first, values, stops, flown.aspects)
         watch(results.done)
     return results
 

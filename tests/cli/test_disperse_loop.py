@@ -54,6 +54,25 @@ def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) ->
     assert flown["propellant_kg"] == pytest.approx(worst["propellant_kg"], rel=1e-9)
 
 
+def test_the_csv_has_the_angles_to_cones_at_the_end_of_its_rows(run: Run, stage: Path, tmp_path: Path) -> None:
+    command = ("disperse", "stage.yaml", "--loop", "--until", "6s", "--samples", "20", "--csv", "c.csv")
+    run(*command)
+    plain = (tmp_path / "c.csv").read_bytes().splitlines()
+    attitude = "attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}\n"
+    cones = "keep: [{name: North Star, direction: [30 deg, 80 deg], min: 1 deg}]\n"
+    stage.write_text(f"{stage.read_text()}\n{attitude * ('attitude:' not in stage.read_text())}{cones}")
+    found = json.loads(run(*command, "--worst", "20", "--json", "-").stdout)
+    watched = (tmp_path / "c.csv").read_bytes().splitlines()
+    assert [line.rsplit(b",", 2)[0] for line in watched] == plain
+    rows = list(csv.DictReader(line.decode() for line in watched))
+    assert list(rows[0])[-2:] == ["North_Star_least_deg", "North_Star_largest_deg"]
+    assert len(found["worst"]) == 20
+    for worst in found["worst"]:
+        row, (angles,) = rows[worst["case"] - 1], worst["aspects"]
+        assert float(row["North_Star_least_deg"]) == angles["least_deg"] < angles["largest_deg"]
+        assert float(row["North_Star_largest_deg"]) == angles["largest_deg"]
+
+
 def test_the_library_gives_the_numbers_of_the_command(run: Run, stage: Path) -> None:
     shown = run("disperse", "stage.yaml", "--loop", "--until", "7s", "--samples", "40", "--seed", "3", "--json", "-")
     made = nutdamp.disperse_loop(nutdamp.load(stage), 40, until=7.0, seed=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from dataclasses import replace
@@ -204,6 +205,42 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> 
     assert row[4] == f"{worst['aspects'][0]['least_deg']:.4g}"
     alone = run("disperse", str(keeper), "--scheme", "rhumb-line", "--case", "1").stdout
     assert "least from Sun, deg" in alone
+
+
+def test_the_csv_has_the_angles_of_each_case_also_of_those_resumed(run: Run, keeper: Path, tmp_path: Path) -> None:
+    arguments = (
+        "disperse",
+        str(keeper),
+        "--scheme",
+        "half-cone",
+        "--csv",
+        str(tmp_path / "s.csv"),
+        "--resume",
+        str(tmp_path / "kept"),
+    )
+    run(*arguments, "--samples", "100")
+    found = json.loads(run(*arguments, "--samples", "300", "--json", "-").stdout)
+    rows = list(csv.DictReader((tmp_path / "s.csv").read_text().splitlines()))
+    assert list(rows[0])[-3:] == ["propellant_kg", "Sun_least_deg", "Sun_largest_deg"]
+    assert len(rows) == 300
+    least, largest = (np.array([float(row[name]) for row in rows]) for name in ("Sun_least_deg", "Sun_largest_deg"))
+    (cone,) = found["aspects"]
+    assert (least.min(), largest.max()) == (cone["least_deg"], cone["largest_deg"])
+    assert np.mean(least < 5.0) == cone["broken_fraction"]
+    for worst in found["worst"]:
+        (angles,) = worst["aspects"]
+        assert least[worst["case"] - 1] == pytest.approx(angles["least_deg"], abs=1e-9)
+        assert largest[worst["case"] - 1] == pytest.approx(angles["largest_deg"], abs=1e-9)
+    resumed = (tmp_path / "s.csv").read_bytes()
+    run(*arguments[:-2], "--samples", "300")
+    assert (tmp_path / "s.csv").read_bytes() == resumed
+    both = []
+    for cone in ("keep: [{name: Sun, direction: sun, min: 1 deg}]\n", ""):  # so far away that nothing is routed
+        lines = FILE.splitlines(keepends=True)
+        keeper.write_text("".join(cone if line.startswith("keep") else line for line in lines))
+        run(*arguments[:-2], "--samples", "300")
+        both.append((tmp_path / "s.csv").read_bytes().splitlines())
+    assert both[1] == [line.rsplit(b",", 2)[0] for line in both[0]]
 
 
 @pytest.mark.slow
