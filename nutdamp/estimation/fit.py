@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation import noises
+from nutdamp.estimation import aliases, noises
 from nutdamp.estimation.guess import starts
 from nutdamp.estimation.model import Matrix, Model, Vector
 from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE, Record
@@ -147,6 +147,7 @@ def fit(spacecraft: Spacecraft, record: Record) -> Fit:
     _expect_enough(model)
     found = _settled(model, _best(model))
     _expect_seen(found)
+    found = aliases.likeliest([found, *(_settled(model, one) for one in aliases.neighbours(model, found.values))])
     if len(model.pulses):
         return found
     if model.unequal:

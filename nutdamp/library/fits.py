@@ -11,6 +11,7 @@ from nutdamp import arguments
 from nutdamp.errors import BadRequest
 from nutdamp.estimation import fit as fits
 from nutdamp.estimation import outlook, results
+from nutdamp.estimation.doubts import doubts
 from nutdamp.library.craft import Source, expected, read
 from nutdamp.planning import Plan
 from nutdamp.spacecraft import Spacecraft
@@ -64,8 +65,8 @@ def fit(
     """Estimate a spacecraft from a CSV file of telemetry, as ``nutdamp fit`` does.
 
     ``schedule``: what was fired during the record (`nutdamp.load_schedule`); ``sun_pulses``: a CSV file of their times.
-    Warns of columns that are ignored. Raises CannotRead, FaultyFile, BadRequest, and Infeasible where the record tells
-    nothing.
+    Warns of columns that are ignored, and of what makes the estimates doubtful. Raises CannotRead, FaultyFile,
+    BadRequest, and Infeasible where the record tells nothing.
     """
     from nutdamp.files.telemetry_csv import read_telemetry
 
@@ -73,6 +74,7 @@ def fit(
     fired = None if schedule is None else arguments.instance("schedule", schedule, Plan, "a Plan").pulses
     times = None if sun_pulses is None else arguments.path("sun_pulses", sun_pulses)
     record, remarks = read_telemetry(name, body, times, fired)
-    for remark in remarks:
+    found = fits.fit(body, record)
+    for remark in (*remarks, *doubts(found)):
         warnings.warn(remark, stacklevel=2)
-    return Fitted(fits.fit(body, record))
+    return Fitted(found)

@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.outlook import Outlook
 from nutdamp.estimation.parameters import untold
@@ -133,6 +134,7 @@ def _digits(one: Estimate) -> int:
 
 def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
     """What the data do not tell, what is known together only, and what the file does not expect: clauses."""
+    yield from doubts(found)
     yield from untold(found.model.record)
     kept = [one.label for one in rows if one.source == "file"]
     if kept:

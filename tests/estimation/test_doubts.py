@@ -1,0 +1,50 @@
+"""Records that a fit could explain wrongly, with small sigmas: it refuses them, or says what it rests on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from synthetic import Array, motion
+
+import nutdamp
+from nutdamp.errors import Infeasible
+from nutdamp.estimation.doubts import doubts
+from nutdamp.estimation.fit import fit
+from nutdamp.estimation.record import GYROS, Record
+
+NOISE = math.radians(0.01)
+SPIN = math.pi
+
+
+def record(times: Array, C: float, *, gyros: tuple[str, ...] = GYROS, spin: float = SPIN) -> Record:
+    """Gyros of the example with another C."""
+    rates = motion((120.0, 120.0, C), np.array([0.14, 0.12, spin]), times)
+    rates = rates + NOISE * np.random.default_rng(16).normal(size=rates.shape)
+    return Record(times, {name: rates[:, GYROS.index(name)] for name in gyros})
+
+
+WIDE = {"A": {"normal": "30 %"}, "C": {"normal": "30 %"}}
+
+
+@pytest.mark.parametrize("gyros", [GYROS, ("omega_2", "omega_3")])
+def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(gyros: tuple[str, ...]) -> None:
+    """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate does by 2π/10 s."""
+    body = nutdamp.example().with_(dispersions=WIDE)
+    with pytest.raises(Infeasible, match=r"several nutation rates fit alike: .* 0\.5750, .*0\.7750, .*0\.9750"):
+        fit(body, record(np.arange(61) * 10.0, 93.0, gyros=gyros))
+
+
+def test_sampling_at_uneven_times_tells_them_apart() -> None:
+    times = np.arange(61) * 10.0 + np.random.default_rng(1).uniform(-1.0, 1.0, 61)
+    found = fit(nutdamp.example().with_(dispersions=WIDE), record(times - times[0], 93.0))
+    assert found.named["C/A"] == pytest.approx(0.775, abs=4.0 * found.sigmas[found.index("C/A") or 0])
+
+
+def test_a_tolerance_that_leaves_one_rate_is_said_to_decide() -> None:
+    found = fit(nutdamp.example(), record(np.arange(61) * 10.0, 80.4))
+    assert found.named["C/A"] == pytest.approx(0.67, abs=2e-4)
+    assert any("sampled below the nutation rate" in one for one in doubts(found))
+    found = fit(nutdamp.example(), record(np.arange(121) * 1.0, 80.4))
+    assert not list(doubts(found))
