@@ -25,6 +25,7 @@ from nutdamp.estimation import aliases, noises
 from nutdamp.estimation.guess import starts
 from nutdamp.estimation.model import Matrix, Model, Vector
 from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE, Record
+from nutdamp.estimation.unexplained import expect_explained
 from nutdamp.physics import cones
 from nutdamp.spacecraft import Spacecraft
 
@@ -142,6 +143,12 @@ def fit(spacecraft: Spacecraft, record: Record) -> Fit:
     Raises Infeasible where that is nothing, saying what would help; BadRequest where the file does not describe what
     a signal of the record needs.
     """
+    found = _fitted(spacecraft, record)
+    expect_explained(found)
+    return found
+
+
+def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     # Three moments and dissipation together take an integration: only where both are seen.
     model = Model(spacecraft, record, growing=spacecraft.inertia.symmetric)
     _expect_enough(model)

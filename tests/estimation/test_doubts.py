@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import reference
 from synthetic import Array, motion
 
 import nutdamp
@@ -33,18 +34,36 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(gyros: tup
     """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate does by 2π/10 s."""
     body = nutdamp.example().with_(dispersions=WIDE)
     with pytest.raises(Infeasible, match=r"several nutation rates fit alike: .* 0\.5750, .*0\.7750, .*0\.9750"):
-        fit(body, record(np.arange(61) * 10.0, 93.0, gyros=gyros))
+        fit(body, record(np.linspace(0.0, 600.0, 61), 93.0, gyros=gyros))
 
 
 def test_sampling_at_uneven_times_tells_them_apart() -> None:
-    times = np.arange(61) * 10.0 + np.random.default_rng(1).uniform(-1.0, 1.0, 61)
+    times = np.linspace(0.0, 600.0, 61) + np.random.default_rng(1).uniform(-1.0, 1.0, 61)
     found = fit(nutdamp.example().with_(dispersions=WIDE), record(times - times[0], 93.0))
     assert found.named["C/A"] == pytest.approx(0.775, abs=4.0 * found.sigmas[found.index("C/A") or 0])
 
 
 def test_a_tolerance_that_leaves_one_rate_is_said_to_decide() -> None:
-    found = fit(nutdamp.example(), record(np.arange(61) * 10.0, 80.4))
+    found = fit(nutdamp.example(), record(np.linspace(0.0, 600.0, 61), 80.4))
     assert found.named["C/A"] == pytest.approx(0.67, abs=2e-4)
     assert any("sampled below the nutation rate" in one for one in doubts(found))
-    found = fit(nutdamp.example(), record(np.arange(121) * 1.0, 80.4))
+    found = fit(nutdamp.example(), record(np.linspace(0.0, 120.0, 121), 80.4))
     assert not list(doubts(found))
+
+
+def pushed(thrust: float) -> Record:
+    """A minute of 10 Hz gyros of a body that +M2 pushes for 0.5 s at 20 s, with ``thrust`` N m."""
+    moments, times = (120.0, 120.0, 80.4), np.linspace(0.0, 60.0, 601)
+    now, rates = reference.Motion(np.array([0.14, 0.12, SPIN]), np.eye(3)), [np.array([0.14, 0.12, SPIN])]
+    for begin, end, torque in ((0, 200, 0.0), (200, 205, thrust), (205, 600, 0.0)):
+        motions = reference.coast(moments, now, np.array([0.0, torque, 0.0]), times[1 : end - begin + 1])
+        rates += [one.rates for one in motions]
+        now = motions[-1]
+    noisy = np.array(rates) + NOISE * np.random.default_rng(16).normal(size=(601, 3))
+    return Record(times, dict(zip(GYROS, noisy.T, strict=True)))
+
+
+@pytest.mark.parametrize("thrust", [8.0, 1.0])
+def test_a_pulse_that_no_schedule_names_is_found_and_nothing_is_estimated(thrust: float) -> None:
+    with pytest.raises(Infeasible, match=r"with a step at about (19\.|20\.|21\.).* --schedule"):
+        fit(nutdamp.example(), pushed(thrust))

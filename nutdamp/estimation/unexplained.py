@@ -1,0 +1,100 @@
+"""Whether a fit explains its record: what it leaves must be the noise that neighbouring samples show.
+
+Second differences of the residuals, r[k-1] - 2 r[k] + r[k+1], have the standard deviation √6 s of noise s, and next to
+nothing of what changes slowly. Residuals far larger than that s are no noise but motion that the model does not have,
+such as a pulse: their sigmas would mean nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.estimation import aliases, noises
+from nutdamp.estimation.model import Vector
+from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE
+
+if TYPE_CHECKING:
+    from nutdamp.estimation.fit import Fit
+
+FAR = 2.0
+"""Times the noise of neighbouring samples from which on residuals are no noise."""
+
+PART = 1e-3
+"""Part of what varies in a signal that such residuals have at least: records without noise show smaller ones."""
+
+FEWEST = 20
+"""Samples of a signal that are judged at least."""
+
+SPLITS, SAMPLES = 120, 2000
+"""Times at which a step is looked for, and samples of a signal used for that, at most."""
+
+STEP = 0.7
+"""Part of the residuals that is left beside a step, at most, for it to count as found."""
+
+
+def expect_explained(found: Fit) -> None:
+    """Raises Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one."""
+    model = found.model
+    left = [index for index in range(len(model.signals)) if _more_than_noise(found, index)]
+    if not left:
+        return
+    signals = ", ".join(model.signals[index] for index in left)
+    more = max(found.noise[index] / _noise(found, index) for index in left)
+    says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
+    time = _step(found, left)
+    where = "" if time is None else f", with a step at about {time:.4g} s"
+    what = "pulses fired in the record are given with --schedule"
+    if len(model.pulses):
+        what = "check the channels and times of the schedule"
+    raise Infeasible(f"{says}{where}; {what}, and a record of the coast before or after needs none")
+
+
+def _rows(found: Fit, signal: int) -> Vector:
+    return np.asarray(found.residuals[found.model.signal == signal])
+
+
+def _noise(found: Fit, signal: int) -> float:
+    """Noise of a signal by its second differences; at least that of its steps."""
+    second = np.diff(_rows(found, signal), 2)
+    noise = noises.NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
+    return max(noise, float(noises.least(found.model)[signal]))
+
+
+def _more_than_noise(found: Fit, signal: int) -> bool:
+    model = found.model
+    values = model.measured[model.signal == signal]
+    if model.signals[signal] == SUN_PULSE or len(values) < FEWEST or found.noise[signal] < FAR * _noise(found, signal):
+        return False
+    varied = noises.NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+    return bool(found.noise[signal] > PART * varied) and not found.white(signal)
+
+
+def _step(found: Fit, signals: list[int]) -> float | None:
+    """When the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals."""
+    model = found.model
+    chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION)]
+    rate = aliases.nutation_rate(model, found.values)
+    splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
+    total, left = 0.0, np.zeros(len(splits))
+    for index in chosen:
+        rows = np.flatnonzero(model.signal == index)
+        rows = rows[:: -(-len(rows) // SAMPLES)]
+        times, values = model.times[rows], found.residuals[rows] / found.noise[index]
+        turn = rate * (times - model.record.start)
+        wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
+        # Waves that grow linearly stand for what a rate that is off does, with or without a step.
+        smooth = np.column_stack([wave, wave * (times - times.mean())[:, None] / model.record.length])
+        total += _remains(smooth, values)
+        left += [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
+    best = int(np.argmin(left))
+    return float(splits[best]) if chosen and left[best] < STEP**2 * total else None
+
+
+def _remains(columns: Vector, values: Vector) -> float:
+    """Sum of squares that least squares leaves."""
+    solved = np.linalg.lstsq(columns, values, rcond=1e-10)[0]
+    return float(np.sum((values - columns @ solved) ** 2))
