@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from nutdamp import compliance
 from nutdamp.aspect import Aspect
 from nutdamp.compliance import NEGLIGIBLE
 from nutdamp.hindrance import Hindrance, Obstacle
@@ -31,7 +32,14 @@ def remarks(plan: Plan, *, cones: bool = True) -> tuple[str, ...]:
         notes = (*notes, f"{CUT}: this is the best schedule found so far")
     if plan.flown is None or not len(plan.pulses):
         return notes
-    return (*notes, *_bounds(plan), *_remainder(plan), *_asymmetry(plan), *(_cones(plan) if cones else ()))
+    return (
+        *notes,
+        *_bounds(plan),
+        *_remainder(plan),
+        *_asymmetry(plan),
+        *_given_length(plan),
+        *(_cones(plan) if cones else ()),
+    )
 
 
 def _cones(plan: Plan) -> tuple[str, ...]:
@@ -177,6 +185,21 @@ def _asymmetry(plan: Plan) -> Iterator[str]:
         f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
         f"and would leave {_degrees(without)} if both were their mean"
     )
+
+
+def _given_length(plan: Plan) -> Iterator[str]:
+    """That equal pulses of a given length do not end exactly, where they were planned on a simpler motion."""
+    options, body, left = plan.options, plan.spacecraft, plan.left
+    simple = body.inertia.symmetric and not body.disturbances and body.growth == 0.0
+    if left is None or simple or not options.equal or options.resizable or options.uncorrected:
+        return
+    off = float(compliance.missed(body, left.nutation, left.aim))
+    if off >= TELLING:
+        yield (
+            f"the end is off by {_degrees(off)}, nutation or direction of H, whichever is more: the pulses are planned "
+            "on the free motion of a symmetric body, and of a fixed length their starts alone cannot make up for all "
+            "of the difference; without --on-time their length is corrected too"
+        )
 
 
 def _down(value: float) -> float:

@@ -107,6 +107,9 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 MOVED = 8
 """Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
 
+BEFORE, AFTER = 12, 24
+"""Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
+
 LONGER = 4.0
 """Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
 
@@ -208,10 +211,14 @@ class _Correction:
         if self.options.uncorrected or not made.pulses:
             return made
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-        last = MOVED if self.options.equal and free == 4 else free
+        whole, given = free == 4, self.options.equal and not self.options.resizable
+        last = free if not (whole and self.options.equal) else AFTER if given else MOVED
         chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
+        if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
+            damping = [index for index, pulse in enumerate(made) if not least_squares.alike(made, pulse)]
+            chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
-        if spin and free == 4:  # and the pulse that gives most to the spin
+        if spin and whole:  # and the pulse that gives most to the spin
             chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
         return least_squares.correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)

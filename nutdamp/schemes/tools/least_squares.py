@@ -115,19 +115,20 @@ def correct(
 ) -> Schedule:
     """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
 
-    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses the sizes
-    stay as they are, or where they are ``resizable`` and commands have no ticks, all that are as large as the last one
-    change alike. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
+    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses, those
+    as large as the last one, the sizes stay as they are, or all change alike where they are ``resizable`` and commands
+    have no ticks. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
     taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
     """
     if not made.pulses:
         return made
     chosen = sorted({index % len(made) for index in chosen})
     kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
-    pulses = [_Movable(spacecraft, made.pulses[index], sized=not equal) for index in chosen]
+    moving = [made.pulses[index] for index in chosen]
+    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(made, pulse))) for pulse in moving]
     ends = np.cumsum([len(one.start) for one in pulses])
-    alike = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
-    common = [_Common(spacecraft, made)] if alike else []
+    together = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
+    common = [_Common(spacecraft, made)] if together else []
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)
@@ -159,6 +160,13 @@ def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector
         np.concatenate([getattr(one, name) for one in parts]) for name in ("start", "scale", "lower", "upper")
     )
     return start, scale, lower, upper
+
+
+def alike(made: Schedule, pulse: Pulse) -> bool:
+    """Whether a pulse is as large as the last one of a schedule."""
+    last = made.pulses[-1]
+    one, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
+    return abs(one - other) <= ALIKE * other
 
 
 class _Movable:
@@ -201,18 +209,13 @@ class _Common:
     start = scale = np.ones(1)
 
     def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
-        self.spacecraft, self.last = spacecraft, made.pulses[-1]
-        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if self._alike(pulse)]) / _size(self.last)
+        self.spacecraft, self.made, last = spacecraft, made, made.pulses[-1]
+        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if alike(made, pulse)]) / _size(last)
         self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
-
-    def _alike(self, pulse: Pulse) -> bool:
-        by_size = self.last.on_time == 0.0
-        one, other = (each.magnitude if by_size else each.on_time for each in (pulse, self.last))
-        return abs(one - other) <= ALIKE * other
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """The ``pulses`` about their centres, those alike ``factor`` times as large."""
-        return [_resized(self.spacecraft, one, factor) if self._alike(one) else one for one in pulses]
+        return [_resized(self.spacecraft, one, factor) if alike(self.made, one) else one for one in pulses]
 
 
 def _resized(spacecraft: Spacecraft, pulse: Pulse, factor: float) -> Pulse:
