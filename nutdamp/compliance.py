@@ -128,10 +128,12 @@ def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
 def unaided(spacecraft: Spacecraft) -> bool:
     """Whether the body keeps all `bounds` up to the horizon when no pulse is fired.
 
-    Dissipation leaves H where it is and lets tan θ grow or decay. False where it is not known: with disturbances, and
-    with I1 ≠ I2, where nutation and spin run to and fro.
+    Dissipation leaves H where it is and lets tan θ grow or decay. With I1 ≠ I2 nutation runs to and fro, and its
+    largest counts. False where it is not known: with disturbances, and with I1 ≠ I2 where there is dissipation or a
+    final spin.
     """
-    if spacecraft.disturbances or not spacecraft.inertia.symmetric:
+    varying = spacecraft.growth != 0.0 or spacecraft.goal.spin is not None
+    if spacecraft.disturbances or (varying and not spacecraft.inertia.symmetric):
         return False
     change = min(spacecraft.growth * spacecraft.horizon, 700.0)
     nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(change))

@@ -181,9 +181,8 @@ def _asymmetry(plan: Plan) -> Iterator[str]:
     first, second, _ = inertia.moments
     left = plan.flight.residual.nutation
     yield (
-        f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % accounts for "
-        f"{_degrees(abs(left - without))}: these pulses leave {_degrees(left)} of nutation, "
-        f"and would leave {_degrees(without)} if both were their mean"
+        f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % changes what these pulses leave by "
+        f"{_degrees(abs(left - without))}: {_degrees(left)} of nutation, {_degrees(without)} if both were their mean"
     )
 
 

@@ -42,7 +42,10 @@ def needless(compared: Comparison) -> str | None:
     body = compared.spacecraft
     if not compliance.unaided(body):
         return None
-    there = [f"the nutation of {degrees(body.nutation)} at t = 0"]
+    nutation = degrees(body.nutation)
+    there = [
+        f"the nutation of {nutation} at t = 0" if body.inertia.symmetric else f"the nutation of at most {nutation}"
+    ]
     if body.goal.axis is not None:
         there.append(f"the {degrees(body.to_turn)} between H and the target")
     count = "" if len(there) > 1 else "s"

@@ -88,9 +88,12 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
 
 
 def budget_note(found: Verification) -> str:
-    """Why leaving something out leaves more, in a sentence; empty where nothing is left out."""
+    """What the rows that leave something out are, in a sentence; empty where nothing is left out."""
     names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
     if not names:
         return ""
     subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    return f"Plans include {subject}; a row 'without' shows what the same pulses leave on a body without it."
+    return (
+        f"Plans are checked by flights with {subject}, on which most schemes correct them; a row 'without' shows what "
+        f"the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, more or less."
+    )

@@ -69,8 +69,8 @@ def test_a_plan_says_how_much_is_due_to_unequal_moments() -> None:
     share, flown, even = (f"{math.degrees(angle):.3g}°" for angle in (abs(left(made) - without), left(made), without))
     assert len({share, flown, even}) == 3
     assert said == (
-        f"I1 ≠ I2 by 5 % accounts for {share}: these pulses leave {flown} of nutation, "
-        f"and would leave {even} if both were their mean"
+        f"I1 ≠ I2 by 5 % changes what these pulses leave by {share}: "
+        f"{flown} of nutation, {even} if both were their mean"
     )
 
 
