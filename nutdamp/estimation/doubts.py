@@ -7,6 +7,12 @@ from collections.abc import Iterator
 from nutdamp.estimation import aliases
 from nutdamp.estimation.fit import Fit
 
+LATE = 0.1
+"""Delay of a channel from which on the times of the schedule are doubted, s: valves are faster."""
+
+SURE = 3.0
+"""Standard deviations from which on a doubt is said."""
+
 
 def doubts(found: Fit) -> Iterator[str]:
     """Remarks on a fit: what it rests on besides the data, and where record, schedule and file disagree."""
@@ -15,3 +21,26 @@ def doubts(found: Fit) -> Iterator[str]:
             f"sampled below the nutation rate, every {aliases.interval(found.model):.4g} s: which C/A it is rests on "
             "the tolerance of the file (are the times in seconds?)"
         )
+    yield from _of_schedule(found)
+
+
+def _of_schedule(found: Fit) -> Iterator[str]:
+    """Where the schedule is not what was fired in the record."""
+    record = found.model.record
+    outside = len(record.schedule) - len(record.fired)
+    if outside:
+        span = f"the record, {record.start:g} s to {record.end:g} s"
+        count = f"{outside} of {len(record.schedule)} pulses of the schedule" if record.fired else "the whole schedule"
+        yield f"{count} is outside {span}: of its channels the record tells nothing"
+    for index, one in enumerate(found.model.parameters):
+        kind, _, channel = one.name.partition(" ")
+        value, sigma = float(found.values[index]), float(found.sigmas[index])
+        if kind == "delay" and abs(value) > max(LATE, SURE * sigma):
+            way = "late" if value < 0.0 else "early"
+            yield (
+                f"the times of {channel} in the schedule are {abs(value):.3f} s {way} against the record: do both "
+                "count from the same t = 0?"
+            )
+        if kind == "thrust" and value < -SURE * sigma:
+            way = "it pushes the other way: another channel, or reversed?"
+            yield f"the thrust factor of {channel} is {value:.3g}: {way}"

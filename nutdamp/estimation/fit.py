@@ -155,7 +155,7 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     found = _settled(model, _best(model))
     _expect_seen(found)
     found = aliases.likeliest([found, *(_settled(model, one) for one in aliases.neighbours(model, found.values))])
-    if len(model.pulses):
+    if record.fired:
         return found
     if model.unequal:
         return _wider(found, Model(spacecraft, record), ("growth",))

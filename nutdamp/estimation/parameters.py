@@ -179,7 +179,7 @@ def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Thrust factor and delay of each channel that fired."""
-    for name in dict.fromkeys(pulse.channel for pulse in record.schedule):
+    for name in dict.fromkeys(pulse.channel for pulse in record.fired):
         mean, sigma = thrust_prior(spacecraft, name)
         yield Parameter(f"thrust {name}", "", mean, max(sigma, THRUST), TINY)
         yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
@@ -207,7 +207,7 @@ def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:
 
 def untold(record: Record) -> Iterator[str]:
     """What signals of the kinds in a record cannot tell, whatever the file: in words."""
-    if not record.schedule.pulses:
+    if not record.fired:
         yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
     if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
         yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"

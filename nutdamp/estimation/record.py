@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 
 Vector = NDArray[np.float64]
 
@@ -62,6 +62,11 @@ class Record:
         """Usual time between two samples, s; of Sun pulses where there is nothing else."""
         times = self.times if len(self.times) > 1 else self.sun_pulses
         return float(np.median(np.diff(times)))
+
+    @property
+    def fired(self) -> tuple[Pulse, ...]:
+        """The pulses of the schedule whose thrust falls in the record, wholly or in part."""
+        return tuple(one for one in self.schedule if one.over > self.start and one.thrust[0] < self.end)
 
     def has(self, *names: str) -> bool:
         """Whether all of these signals are there."""

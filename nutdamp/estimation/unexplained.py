@@ -48,7 +48,7 @@ def expect_explained(found: Fit) -> None:
     time = _step(found, left)
     where = "" if time is None else f", with a step at about {time:.4g} s"
     what = "pulses fired in the record are given with --schedule"
-    if len(model.pulses):
+    if model.record.fired:
         what = "check the channels and times of the schedule"
     raise Infeasible(f"{says}{where}; {what}, and a record of the coast before or after needs none")
 

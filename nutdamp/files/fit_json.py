@@ -21,7 +21,7 @@ def fit_json(found: Fit, carried: Carried, ahead: Outlook | None = None) -> dict
         "record": {
             "start_s": model.record.start,
             "end_s": model.record.end,
-            "pulses": len(model.pulses),
+            "pulses": len(model.record.fired),
             "signals": [
                 {
                     "signal": name,

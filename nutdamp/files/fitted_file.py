@@ -61,12 +61,16 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
         assert at is not None
         if abs(found.values[at]) > SEEN * found.sigmas[at]:
             channel = name.removeprefix("delay ")
-            yield f"the delay of {channel}, {1e3 * found.values[at]:.3g} ms, is not written: see the key valve"
+            yield f"the delay of {channel}, {1e3 * found.values[at]:.4g} ms, is not written: see the key valve"
     for name in (one.name for one in found.model.parameters if one.name.startswith("thrust ")):
         if found.named[name] <= LEAST_THRUST:
             channel = name.removeprefix("thrust ")
-            share = f"{channel} gave {100.0 * found.named[name]:.2g} % of its thrust"
-            yield f"{share}: did it fire? Its force stays as it was"
+            factor = found.named[name]
+            share = f"{channel} gave {100.0 * factor:.3g} % of its thrust"
+            doubt = (
+                "did it fire?" if factor > -LEAST_THRUST else "it pushes the other way: another channel, or reversed?"
+            )
+            yield f"{share}: {doubt} Its force stays as it was"
     limits = body.limits
     if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
         yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"

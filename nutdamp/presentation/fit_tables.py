@@ -93,8 +93,9 @@ def _record(found: Fit) -> Table:
     period = 2.0 * math.pi / abs(_rate(found)) if _rate(found) else math.inf
     turns = f", {record.length / period:.3g} nutation periods" if math.isfinite(period) else ""
     table.add_row("record", f"{record.start:g} s to {record.end:g} s{turns}")
-    if len(model.pulses):
-        table.add_row("schedule", f"{len(model.pulses)} pulses fired meanwhile")
+    if len(record.schedule):
+        count = len(record.fired)
+        table.add_row("schedule", f"{count} pulse{'s' * (count != 1)} fired meanwhile")
     for index, name in enumerate(model.signals):
         rows = model.signal == index
         unit, factor = in_shown(name)
@@ -118,11 +119,16 @@ def _table(rows: tuple[Estimate, ...]) -> Table:
     for one in rows:
         digits = _digits(one)
         file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
-        change = MISSING if one.change is None else f"{one.change:+.2g}" if abs(one.change) > NOTHING else "0"
+        change = MISSING if one.change is None else _changed(one.change) if abs(one.change) > NOTHING else "0"
         shown = one.value if abs(one.value) > NOTHING * one.sigma else 0.0
         value, sigma = f"{shown * one.factor:.{digits}g}", f"{one.sigma * one.factor:.2g}"
         table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
     return table
+
+
+def _changed(change: float) -> str:
+    """A change in sigmas, to two digits or to whole ones."""
+    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+,.0f}".replace(",", " ")
 
 
 def _digits(one: Estimate) -> int:
@@ -143,7 +149,7 @@ def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
     tied += [f"{one} and {other} {value:+.3f}" for one, other, value in correlated(found)[:MOST_PAIRS]]
     if tied:
         yield f"correlated: {', '.join(tied)}"
-    far = [f"{one.label} ({one.change:+.2g})" for one in rows if one.change is not None and abs(one.change) > FAR]
+    far = [f"{one.label} ({_changed(one.change)})" for one in rows if one.change is not None and abs(one.change) > FAR]
     if far:
         yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
     if found.model.unequal and found.model.spacecraft.inertia.symmetric:

@@ -219,6 +219,36 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     assert pairs[frozenset(("thrust +M1", "A"))] > 0.99
 
 
+def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
+    """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the record."""
+    (tmp_path / "fired.csv").write_text("start_s,on_time_s,channel\n20,0.5,+M2\n", encoding="utf-8")
+    made = run(
+        "simulate", "-q", "--schedule", "fired.csv", "--flown", "--until", "30s", "--samples", "151", "--csv", "t.csv"
+    )
+    assert made.returncode in (0, 4), made.stderr
+    table = [line.split(",")[:4] for line in (tmp_path / "t.csv").read_text().splitlines()]
+    draw = np.random.default_rng(3)
+    noisy = [[row[0], *(f"{float(one) + 1e-4 * draw.normal():.7f}" for one in row[1:])] for row in table[1:]]
+    (tmp_path / "gyro.csv").write_text("\n".join(",".join(row) for row in [table[0], *noisy]) + "\n", encoding="utf-8")
+    said = {}
+    for name, row in (("late", "21,0.5,+M2"), ("other", "20,0.5,-M2"), ("after", "20,0.5,+M2\n100,0.5,+M1")):
+        (tmp_path / "s.csv").write_text(f"start_s,on_time_s,channel\n{row}\n", encoding="utf-8")
+        done = run("fit", "gyro.csv", "--schedule", "s.csv", "-o", f"{name}.yaml", columns=140)
+        assert done.returncode == 0, done.stderr
+        assert "e+0" not in done.stdout + done.stderr
+        said[name] = " ".join((done.stdout + done.stderr).split())
+    assert "The times of +M2 in the schedule are 1.000 s late against the record" in said["late"]
+    assert "the delay of +M2, -1000 ms, is not written" in said["late"]
+    assert "it pushes the other way: another channel, or reversed?" in said["other"]
+    assert "-M2 gave -100 % of its thrust: it pushes the other way" in said["other"]
+    assert "schedule 1 pulse fired meanwhile" in said["after"]
+    assert "1 of 2 pulses of the schedule is outside the record, 0 s to 30 s" in said["after"]
+    assert "thrust factor of +M1" not in said["after"]
+    thrust = nutdamp.load(tmp_path / "after.yaml").dispersions
+    assert thrust is not None
+    assert thrust.thrust["+M1"].size == 0.02
+
+
 def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 10)
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n20,0.3,+M1\n", encoding="utf-8")
