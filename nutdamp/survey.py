@@ -22,13 +22,16 @@ from nutdamp.schemes.tools import sun_pulses
 from nutdamp.schemes.tools.block_model import acts
 from nutdamp.spacecraft import Channel, Disturbance, Spacecraft
 
+SHORTEST, GRID = 1e-6, 600
+"""Part of the longest on-time from which on, and number of on-times among which, the largest step is looked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelSteps:
-    """A channel and the nutation angles (rad) that its shortest and longest pulse take out or put in.
+    """A channel and the nutation angles (rad) that its pulses take out or put in.
 
     ``smallest`` is that of the shortest on-time that can be commanded, `limits.shortest_on_time`, and is 0 without any;
-    ``largest`` that of `limits.longest_useful`, a right angle where nothing bounds it.
+    ``largest`` the most of on-times up to `limits.longest_useful`, a right angle where nothing bounds it.
     """
 
     channel: Channel
@@ -101,7 +104,8 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
     for channel in spacecraft.channels:
         shortest = effective_on_time(channel, shortest_on_time(spacecraft, channel))
         longest = longest_useful(effective_on_times(channel)[1], period)
-        steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), _step(spacecraft, channel, longest)))
+        most = max(_step(spacecraft, channel, on_time) for on_time in _on_times(channel, shortest, longest))
+        steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), most))
     return tuple(steps)
 
 
@@ -131,6 +135,13 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
                 impulse = channel.strength * thrust.on_time
                 found.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
     return tuple(found)
+
+
+def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
+    """Those among which the largest step is, s: the longest, but where the spin changes during the pulse."""
+    if channel.axial == 0.0 or math.isinf(longest) or not 0.0 < longest > shortest:
+        return [longest]
+    return [*np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist(), longest]
 
 
 def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import reference
+from cases_dir import CASES
 from process import Run
 
 from nutdamp import flight, survey
@@ -17,6 +18,8 @@ from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import attitude, forced
 from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes import one_pulse
+from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools import sun_pulses
 from nutdamp.spacecraft import Disturbance
 
@@ -175,3 +178,19 @@ def test_check_shows_sun_cones_and_commands(run: Run) -> None:
     blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
     shown = " ".join(run("check", "-", stdin=blind, columns=200).stdout.split())
     assert "the Sun sensor does not see the Sun at" in shown
+
+
+def test_the_largest_step_of_a_channel_that_spins_up_is_that_of_a_shorter_pulse() -> None:
+    """Over half a nutation period the spin rises by so much that such a pulse does nothing across the axis."""
+    body = read_spacecraft((CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml")
+    for steps in survey.channel_steps(body):
+        assert steps.largest > math.radians(80.0)
+
+
+def test_one_pulse_is_not_cut_to_what_the_longest_pulse_of_a_channel_that_spins_up_does() -> None:
+    """Impulse approximation: 5.42 s of T1 oppose all of ω, and no reason names a horizon that is far off."""
+    body = read_spacecraft((CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml")
+    made = one_pulse.schedule(body, SchemeOptions())
+    assert made.pulses[0].channel == "T1"
+    assert made.pulses[0].on_time == pytest.approx(5.4214, rel=1e-4)
+    assert made.end < 1e-2 * body.horizon

@@ -96,10 +96,12 @@ def _train(
         count = math.ceil(min(start.left / share, most + 1.0))
         if count > most:  # rather longer pulses than too many
             count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
-    builder = _fire_train(spacecraft, count, capacity(longest), fire)
+    # A channel that also spins up takes out less the longer it is on: one pulse may do what the longest cannot.
+    strongest = math.inf if single else capacity(longest)
+    builder = _fire_train(spacecraft, count, strongest, fire)
     if spacecraft.growth > 0.0 and builder.pulses and builder.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
-        longer = _fire_train(spacecraft, count + 1, capacity(longest), fire)
+        longer = _fire_train(spacecraft, count + 1, strongest, fire)
         builder = min(builder, longer, key=lambda one: one.left)
     return builder
 

@@ -79,6 +79,8 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} of nutation, and "
             f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
         )
+    if min(ends) <= spacecraft.horizon:
+        return Infeasible("channels oppose the nutation within the horizon, but the pulses planned increase it")
     return TooShort(
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
         f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
