@@ -193,6 +193,7 @@ def test_where_enough_cases_comply_nothing_has_to_shrink() -> None:
     assert verdicts.tightened(found) == ""
 
 
+@pytest.mark.slow
 def test_two_channels_that_fire_one_after_the_other_share_the_time_between_them() -> None:
     """Long burns of channels at right angles overlap in the program, where they may be on together."""
     body = spinner(
@@ -257,6 +258,7 @@ def gained(seed: int) -> float:
     return min(chosen, found.probability) - min(best, found.probability)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [0, 11])
 def test_never_worse_than_the_best_of_schemes_and_variants(seed: int) -> None:
     assert gained(seed) >= -0.005

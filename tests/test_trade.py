@@ -121,6 +121,7 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
         assert first[-1].cost <= least / (1.0 - SAME_COST)
 
 
+@pytest.mark.slow
 def test_a_schedule_that_keeps_h_counts_whichever_search_found_it() -> None:
     """The example: at 9.826 s the search that lets H go anywhere finds a schedule that keeps it where it was."""
     strict, free = fronts.fronts(nutdamp.example(), OptimalOptions(), count=10, shifts=(0.0, fronts.EVERYWHERE))
@@ -131,6 +132,7 @@ def test_a_schedule_that_keeps_h_counts_whichever_search_found_it() -> None:
     assert {one.plan.end for one in strict.points} <= {one.plan.end for one in keeping}
 
 
+@pytest.mark.slow
 def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """120 short pulses, of which the search for the fastest tries thousands, and ends without any."""
     body = nutdamp.load(case("nothing-damps.yaml"))

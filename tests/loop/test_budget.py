@@ -135,6 +135,7 @@ def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
     assert cycle.high == pytest.approx(0.5 * math.atan(6.0 * 0.1 / (80.0 * 3.0)), rel=0.05)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("degrees", "pauses"), [(2.0, True), (2.07, False)])
 def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(degrees: float, pauses: bool) -> None:
     """Pulses all alike, half of each above stop: what is left of the first nutation decides whether it ever pauses."""

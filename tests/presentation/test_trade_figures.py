@@ -94,6 +94,7 @@ def near_each_other(count: int, *, later: float, cheaper: float) -> list[fronts.
     return close
 
 
+@pytest.mark.slow
 def test_points_close_together_keep_numbers_that_can_be_read() -> None:
     """Eighty schedules of which each costs a little less, a little later."""
     close = near_each_other(80, later=0.006, cheaper=0.0022)

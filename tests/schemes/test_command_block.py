@@ -251,6 +251,7 @@ def check_flown_ones_are_not_beaten(seed: int, required: Requirement) -> None:
     assert plan.severity <= 1.02 * max(min(shares()), 1.0)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("seed", "required"), [(9, (0.1, 0.05)), (11, (0.1, 0.05)), (12, (0.3, 0.02))])
 def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int, required: tuple[float, float]) -> None:
     """The closed form leaves it out: its best ones left up to nine times as much as others of the same search."""

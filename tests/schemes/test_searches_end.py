@@ -176,6 +176,7 @@ def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
             assert (left is None) == (infeasibility(plan) != "")
 
 
+@pytest.mark.slow
 def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> None:
     """One pulse that spins a needle up to turn after turn."""
     body = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0)

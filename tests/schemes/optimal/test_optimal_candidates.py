@@ -36,6 +36,7 @@ def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
     assert violations(body, made.pulses) == []
 
 
+@pytest.mark.slow
 def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
     body = aimed(spinner(channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)), 60, 10)
     sunny = replace(body, goal=replace(body.goal, sun=np.array([1.0, 0.0, 0.0])))
