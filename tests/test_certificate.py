@@ -175,3 +175,13 @@ def test_without_optimal_the_command_says_what_to_name(tmp_path: Path) -> None:
     assert result.returncode == 2
     assert "a certificate is of optimal, which was not planned" in result.stderr
     assert not file.exists()
+
+
+def test_where_another_plan_is_recommended_the_command_says_whose_certificate_it_writes(tmp_path: Path) -> None:
+    whose = "the certificate is of optimal for nominal values, which is not the recommended plan"
+    command = ["plan", "--certificate", "proof.json", "--scheme", "optimal", "--scheme", "four-pulse"]
+    impulse, pulses = (within(tmp_path, *command, "--least", least) for least in ("impulse", "pulses"))
+    assert "Recommended: optimal" in impulse.stdout
+    assert whose not in impulse.stderr
+    assert "Recommended: four-pulse" in pulses.stdout
+    assert whose in pulses.stderr

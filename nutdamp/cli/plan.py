@@ -105,7 +105,7 @@ def command(
         (json, partial(_data, compared, decided, dispersed)),
         (table, partial(_schemes, compared, decided)),
         (all_plans, partial(_schemes_picture, compared, decided)),
-        *_outputs_of_proof(compared, certificate, curve),
+        *_outputs_of_proof(compared, chosen, certificate, curve, job.remark),
         *_outputs_of(chosen, csv, one_plan, figure),
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
     ]
@@ -169,7 +169,9 @@ def _pictured(figure: str) -> tuple[bool, bool, bool]:
     return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
 
 
-def _outputs_of_proof(compared: Comparison, path: str | None, plot: str | None) -> list[Output]:
+def _outputs_of_proof(
+    compared: Comparison, chosen: Plan | None, path: str | None, plot: str | None, remark: Callable[[str], None]
+) -> list[Output]:
     """The files of the certificate of the plan of optimal, which must be among the plans."""
     if path is None and plot is None:
         return []
@@ -179,6 +181,8 @@ def _outputs_of_proof(compared: Comparison, path: str | None, plot: str | None) 
     if planned is None:
         raise BadRequest(f"a certificate is of {SCHEME}, which was not planned: name it with --scheme")
     found = certificate(planned)
+    if chosen is not planned:
+        remark(f"the certificate is of {SCHEME} for nominal values, which is not the recommended plan")
     from nutdamp.files.certificate_json import certificate_json
 
     def picture() -> Figure:
