@@ -21,6 +21,9 @@ def doubts(found: Fit) -> Iterator[str]:
             f"sampled below the nutation rate, every {aliases.interval(found.model):.4g} s: which C/A it is rests on "
             "the tolerance of the file (are the times in seconds?)"
         )
+    spin = found.model.spacecraft.spin
+    if found.named.get("omega_3", spin) * spin < 0.0:
+        yield "the body spins the other way than the file has it: is omega_3 reversed, or state.spin?"
     yield from _of_schedule(found)
 
 

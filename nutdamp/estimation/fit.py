@@ -183,13 +183,14 @@ def _expect_enough(model: Model) -> None:
     """Raises Infeasible for a record that cannot tell as much as is estimated."""
     if not SHOW_NUTATION & set(model.signals):
         raise Infeasible(
-            f"{' and '.join(model.signals)} do not tell the nutation (Sun pulses come once a spin turn); "
+            f"no nutation is seen in {' and '.join(model.signals)} alone (Sun pulses come once a spin turn); "
             "omega_1 or omega_2, the axis or an acceleration would"
         )
-    free = sum(math.isinf(one.prior) for one in model.parameters)
+    rows, free = len(np.unique(model.times)), sum(math.isinf(one.prior) for one in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
-            f"{len(model.measured)} samples cannot tell {free} unknowns; a longer record, or more samples, helps"
+            f"{rows} row{'s' * (rows != 1)} of samples, with {len(model.measured)} values in all, cannot tell {free} "
+            "unknowns; a longer record, or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
     period = cones.body_period(body.inertia.A, body.inertia.C, body.spin)

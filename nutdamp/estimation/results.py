@@ -224,14 +224,13 @@ def estimates(found: Fit, time: float) -> tuple[Estimate, ...]:
 def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
     model = found.model
     spacecraft = model.spacecraft
-    sense = math.copysign(1.0, spacecraft.spin)
     phase0 = math.atan2(*_transverse(model.at(found.named, time))[::-1])
 
     def motion(values: Values) -> Vector:
         body, state = model.at(values, time)
         x, y = _transverse((body, state))
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
-        nutation = arc_cones(body.moments, state.rates, sense).nutation
+        nutation = arc_cones(body.moments, state.rates, math.copysign(1.0, state.spin)).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
     slopes = derivatives(found, motion)
@@ -242,7 +241,7 @@ def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
     spin_prior = None if given is None or given.omega0[2] is None else prior_of(given.omega0[2], spacecraft.spin)[1]
     rows = (
         ("spin", "spin ω3", "deg/s"),
-        ("nutation", "nutation", "deg"),
+        ("nutation", "nutation" if model.body(found.named).symmetric else "largest nutation", "deg"),
         ("omega", "transverse rate |ω|", "deg/s"),
         ("phase", "phase arg(ω1 + iω2)", "deg"),
     )

@@ -21,6 +21,9 @@ MOST_BYTES = 32 << 20
 MOST_ROWS = 100_000
 """Rows of a file."""
 
+MOST_FAULTS = 5
+"""Faults of one column that are listed."""
+
 Cells = dict[str, str]
 
 
@@ -67,9 +70,19 @@ class Table:
                 self.warn(1, column, f"the column {shown(column)} is not known: ignored")
 
     def check(self) -> None:
-        """Raises FaultyFile with the faults so far, if there are any."""
+        """Raises FaultyFile with the faults so far, if there are any; of many in one column with the first."""
         if self.faults:
-            raise FaultyFile(self.faults)
+            raise FaultyFile(self._first())
+
+    def _first(self) -> list[Fault]:
+        """The faults, of more than `MOST_FAULTS` in one column the first and how many more there are."""
+        kept = []
+        for where in dict.fromkeys(fault.where for fault in self.faults):
+            every = [fault for fault in self.faults if fault.where == where]
+            kept += every[:MOST_FAULTS]
+            more = every[MOST_FAULTS:]
+            kept += more if len(more) < 2 else [more[0]._replace(problem=f"and {len(more)} more such rows")]
+        return kept
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""

@@ -36,6 +36,10 @@ UNIT = 0.01
 """By how much the length of a measured axis may differ from one."""
 
 
+SAME = 0.03
+"""Part by which a ratio of rates may differ from that of two units."""
+
+
 def read_telemetry(
     path: str | Path, spacecraft: Spacecraft, sun_pulses: str | Path | None = None, schedule: Schedule | None = None
 ) -> tuple[Record, list[str]]:
@@ -54,6 +58,7 @@ def read_telemetry(
             line = rows[int(np.nanargmax(np.abs(columns[name])))][0]
             table.fault(line, name, f"expected an angle of at most {360 if name == ANGLES[0] else 90} deg")
     signals = _signals(table, rows, columns)
+    _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, rows, times, columns.get(SUN_PULSE))
     table.check()
     warnings = table.warned
@@ -188,6 +193,26 @@ def _signals(table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, 
     if axis is not None:
         signals |= dict(zip(AXIS, axis.T, strict=True))
     return {name: values for name, values in signals.items() if np.isfinite(values).any()}
+
+
+def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> None:
+    """A fault where ω3 is so many times the spin of the file as one unit of rates is of another."""
+    name = GYROS[2]
+    if name not in signals:
+        return
+    column = next(one for one in table.header if RATES.get(one, ("",))[0] == name)
+    ratio = abs(float(np.nanmedian(signals[name])) / spin)
+    turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
+    of_values = (
+        {turned: "deg/s", per_minute: "rpm"} if RATES[column][1] == 1.0 else {1.0 / turned: "rad/s", 1.0 / 6.0: "rpm"}
+    )
+    of_file = {1.0 / turned: "deg/s", 1.0 / per_minute: "rpm"}
+    for units, where in ((of_values, "are the values of this column"), (of_file, "is the spin of the file")):
+        for size, unit in units.items():
+            if abs(ratio / size - 1.0) < SAME:
+                seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
+                table.fault(1, column, f"{seen}: {where} in {unit}?")
+                return
 
 
 def _sun_column(

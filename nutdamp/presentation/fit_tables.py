@@ -128,7 +128,7 @@ def _table(rows: tuple[Estimate, ...]) -> Table:
 
 def _changed(change: float) -> str:
     """A change in sigmas, to two digits or to whole ones."""
-    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+,.0f}".replace(",", " ")
+    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
 
 
 def _digits(one: Estimate) -> int:

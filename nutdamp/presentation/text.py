@@ -29,9 +29,10 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def sentence(clause: str) -> str:
-    """A clause with a full stop and a capital letter, unless it begins with a key of the file."""
+    """A clause with a capital letter, unless it begins with a key of the file, and a full stop, unless it asks."""
     first, _, _ = clause.partition(" ")
-    return f"{clause if '.' in first else clause[:1].upper() + clause[1:]}."
+    begun = clause if "." in first else clause[:1].upper() + clause[1:]
+    return begun if begun.endswith("?") else f"{begun}."
 
 
 def degrees(angle: float | None) -> str:

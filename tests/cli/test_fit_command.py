@@ -237,7 +237,10 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
         assert done.returncode == 0, done.stderr
         assert "e+0" not in done.stdout + done.stderr
         said[name] = " ".join((done.stdout + done.stderr).split())
-    assert "The times of +M2 in the schedule are 1.000 s late against the record" in said["late"]
+    assert (
+        "The times of +M2 in the schedule are 1.000 s late against the record: do both count from the same t = 0? The"
+        in said["late"]
+    )
     assert "the delay of +M2, -1000 ms, is not written" in said["late"]
     assert "it pushes the other way: another channel, or reversed?" in said["other"]
     assert "-M2 gave -100 % of its thrust: it pushes the other way" in said["other"]
@@ -261,3 +264,36 @@ def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path)
     assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -10.0, 0.0])
     assert now.dispersions is not None
     assert now.dispersions.thrust["+M1"].size == 0.02
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("omega_3_rad_s", 180.0, "is 57.3 times the spin of the spacecraft file (3.142 rad/s): are the values of"),
+        ("omega_3_rad_s", 30.0, "this column in rpm?"),
+        ("omega_3_deg_s", math.pi, "this column in rad/s?"),
+        ("omega_3_deg_s", -30.0, "this column in rpm?"),
+        ("omega_3_rad_s", math.pi**2 / 180.0, "is the spin of the file in deg/s?"),
+    ],
+)
+def test_rates_in_another_unit_are_a_fault_of_their_column(
+    run: Run, tmp_path: Path, column: str, value: float, said: str
+) -> None:
+    rows = "".join(f"{at},{0.1 * math.cos(at)},{value * (1.0 + 1e-3 * math.sin(at))}\n" for at in range(40))
+    (tmp_path / "unit.csv").write_text(f"t_s,omega_1_{column[8:]},{column}\n{rows}", encoding="utf-8")
+    done = run("fit", "unit.csv")
+    assert done.returncode == 2
+    assert f"unit.csv:1:1: {column}: its median" in done.stderr
+    assert said in done.stderr
+
+
+def test_of_many_faults_of_a_column_the_first_are_listed(run: Run, tmp_path: Path) -> None:
+    rows = "".join(f"{at},x,{'y' if at < 6 else 0.1}\n" for at in range(601))
+    (tmp_path / "bad.csv").write_text(f"t_s,omega_1_rad_s,omega_2_rad_s\n{rows}", encoding="utf-8")
+    done = run("fit", "bad.csv")
+    assert done.returncode == 2
+    of_first, of_second = ([line for line in done.stderr.splitlines() if name in line] for name in ("_1_", "_2_"))
+    assert len(of_first) == 6
+    assert of_first[-1] == "bad.csv:7:1: omega_1_rad_s: and 596 more such rows"
+    assert len(of_second) == 6
+    assert "more" not in of_second[-1]

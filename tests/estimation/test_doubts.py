@@ -14,6 +14,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.record import GYROS, Record
+from nutdamp.estimation.results import estimates
 
 NOISE = math.radians(0.01)
 SPIN = math.pi
@@ -67,3 +68,33 @@ def pushed(thrust: float) -> Record:
 def test_a_pulse_that_no_schedule_names_is_found_and_nothing_is_estimated(thrust: float) -> None:
     with pytest.raises(Infeasible, match=r"with a step at about (19\.|20\.|21\.).* --schedule"):
         fit(nutdamp.example(), pushed(thrust))
+
+
+def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> None:
+    found = fit(nutdamp.example(), record(np.linspace(0.0, 60.0, 601), 80.4, spin=-SPIN))
+    nutation = next(one for one in estimates(found, 0.0) if one.key == "nutation")
+    expected = math.atan2(120.0 * math.hypot(0.14, 0.12), 80.4 * SPIN)
+    assert nutation.value == pytest.approx(expected, abs=4.0 * nutation.sigma)
+    assert any("spins the other way than the file has it" in one for one in doubts(found))
+
+
+def test_of_three_moments_the_largest_nutation_is_named_so() -> None:
+    body = nutdamp.load(
+        {"name": "three", "inertia": {"tensor": [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}, "omega0": [0.1, 0.1, SPIN]}
+    )
+    times = np.linspace(0.0, 60.0, 601)
+    rates = motion((120.0, 110.0, 80.0), np.array([0.14, 0.12, SPIN]), times)
+    rates = rates + NOISE * np.random.default_rng(16).normal(size=rates.shape)
+    found = fit(body, Record(times, dict(zip(GYROS, rates.T, strict=True))))
+    row = next(one for one in estimates(found, 0.0) if one.key == "nutation")
+    assert row.label == "largest nutation"
+    momentum = rates * np.array([120.0, 110.0, 80.0])
+    largest = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), momentum[:, 2]).max()
+    assert row.value == pytest.approx(largest, abs=1e-3)
+
+
+def test_too_few_values_and_no_transverse_signal_are_said() -> None:
+    with pytest.raises(Infeasible, match="1 row of samples, with 3 values in all, cannot tell 4 unknowns"):
+        fit(nutdamp.example(), Record(np.zeros(1), dict.fromkeys(GYROS, np.ones(1))))
+    with pytest.raises(Infeasible, match="no nutation is seen in omega_3 alone"):
+        fit(nutdamp.example(), record(np.linspace(0.0, 60.0, 61), 80.4, gyros=GYROS[2:]))
