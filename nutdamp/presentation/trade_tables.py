@@ -37,8 +37,8 @@ def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[Renderab
 
 
 def fails(point: Point) -> bool:
-    """Whether it does not meet the requirement of the file."""
-    return point.plan.meets_requirement is False
+    """Whether it does not meet the requirement of the file, or breaks a cone."""
+    return point.plan.meets_requirement is False or point.plan.kept is False
 
 
 def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:

@@ -20,14 +20,17 @@ from matplotlib.patches import PathPatch, StepPatch
 from nutdamp import dispersion, planning
 from nutdamp.comparison import Comparison, compare
 from nutdamp.decision import cases_of, decide
+from nutdamp.demands import Keep
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Exact
 from nutdamp.dispersion.study import Results, run
+from nutdamp.fronts import Point
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.dispersion_tables import budget_rows, in_words
 from nutdamp.presentation.figures import dispersion as drawing
 from nutdamp.presentation.figures import schemes
+from nutdamp.presentation.trade_tables import fails
 from nutdamp.recommendation import Standing
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Steerable
@@ -362,6 +365,17 @@ def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
     assert [text.get_text() for text, _ in texts(figure)].count("no plan") == len(figure.axes)
     none = compare(spinner(), ("four-pulse",))
     check_layout(figures.schemes_figure(none))
+
+
+def test_a_scheme_that_breaks_a_cone_is_marked_as_not_met() -> None:
+    body = replace(BODY, keep=(Keep("Star", np.array([1.0, 0.0, 0.0]), least=math.radians(179.0)),))
+    found = compare(body, ("two-pulse", "four-pulse"))
+    assert all(plan.kept is False for plan in found.plans)
+    assert any(plan.meets_requirement for plan in found.plans)
+    figure = figures.schemes_figure(found)
+    check_layout(figure)
+    assert all(mark in "xX" for axes in figure.axes for _, mark, _ in dots(axes).values())
+    assert all(fails(Point(plan, 100.0, "N m s")) for plan in found.plans)
 
 
 # --- colours ---------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from matplotlib.text import Annotation
 from nutdamp import fronts
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
+from nutdamp.presentation.figures import style
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Requirement
 
@@ -49,6 +50,18 @@ def test_the_recommended_plan_is_marked_among_the_trade() -> None:
     assert chosen is not None
     (axes,) = figures.trade_figure(BODY, traded(), chosen).axes
     assert line(axes, f"recommended: {chosen.scheme}")[0] == pytest.approx([chosen.end, chosen.total_impulse])
+
+
+@pytest.mark.parametrize("front", [0, 1])
+def test_no_number_lies_under_the_star_of_the_recommended_plan(front: int) -> None:
+    for point in traded()[front].points:
+        (axes,) = figures.trade_figure(BODY, traded(), point.plan).axes
+        middle = axes.transData.transform((point.plan.end, point.cost))
+        radius = 0.45 * style.STAR * axes.figure.dpi / 72.0
+        for note in axes.texts:
+            box = note.get_window_extent()
+            nearest = np.clip(middle, box.min, box.max)
+            assert math.dist(nearest, middle) >= 0.8 * radius, note.get_text()
 
 
 def test_a_trade_without_points_says_why_and_draws_no_axes() -> None:

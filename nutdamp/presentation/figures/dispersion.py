@@ -283,7 +283,7 @@ def _budget(figure: Figure | SubFigure, results: Results) -> None:
             if row.bias:
                 bar.set(hatch="////", label="bias, not one sigma")
             text = f"{effect:.3g}" if effect >= NOTHING else "< 1e-6"
-            axes.annotate(text, (effect, place), (3, 0), textcoords="offset points", va="center", fontsize=style.SMALL)
+            axes.annotate(text, (effect, place), (3, 0), textcoords="offset points", va="center", **style.ON_PAPER)
         if limit is not None and limit <= right:
             right = max(right, 1.05 * limit)
             axes.axvline(limit, color=PULSE, linewidth=1.6, label="required")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.presentation.verdicts import exact_percent
 from nutdamp.robust import Candidate, RobustComparison, front
@@ -56,8 +56,8 @@ def front_figure(found: RobustComparison) -> Figure:
         )
     level = exact_percent(found.probability)
     axes.axhline(100.0 * found.probability, color=PULSE, linewidth=1.2, label=f"required: {level}")
-    axes.set(xlabel="propellant, g" if known else "impulse, N m s", ylabel="cases that comply, %", ylim=(0.0, 105.0))
-    figure.suptitle(f"{found.comparison.spacecraft.name}: what it costs that more cases comply")
+    axes.set(xlabel="propellant, g" if known else "impulse, N m s", ylabel="cases that comply, %", ylim=(-7.0, 105.0))
+    heading(figure, found.comparison.spacecraft, "what it costs that more cases comply")
     axes.grid()
     legend(figure, [axes])
     return figure

@@ -76,7 +76,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
         axes.remove()
     legend(figure, cells[: len(columns)], 3)
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
-    if chosen is not None and chosen.standing is Standing.MISSES:
+    if chosen is not None and _misses(chosen):
         verdict += f" ({_short(chosen)})"
     heading(figure, compared.spacecraft, f"schemes by real pulse widths\n{verdict}")
     style.settle(figure)
@@ -85,12 +85,20 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
 
 def _place(plan: Plan) -> int:
     """Schemes that reach more are higher up, those without a plan at the foot."""
-    return list(Standing).index(plan.standing) if plan.feasible else len(Standing)
+    if not plan.feasible:
+        return len(Standing)
+    return list(Standing).index(Standing.MISSES if _misses(plan) else plan.standing)
+
+
+def _misses(plan: Plan) -> bool:
+    """Whether the requirement or a cone is not kept, or nothing is damped."""
+    return plan.standing is Standing.MISSES or plan.kept is False
 
 
 def _short(plan: Plan) -> str:
     """What is to be said of a plan that misses what is required of it or of its cases."""
-    return "requirement NOT met" if compliance.required(plan.spacecraft) else "does not damp"
+    required = compliance.required(plan.spacecraft) or plan.kept is False
+    return "requirement NOT met" if required else "does not damp"
 
 
 def _columns(compared: Comparison) -> list[Quantity]:
@@ -154,11 +162,11 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
         if value is None:
             if not plan.feasible:
                 sides = axes.get_yaxis_transform()
-                axes.annotate("no plan", (0.5, -row), xycoords=sides, ha="center", fontsize=style.SMALL)
+                axes.annotate("no plan", (0.5, -row), xycoords=sides, ha="center", va="center", **style.ON_PAPER)
             continue
         few = column.most < math.inf and column.required is not None and value < column.required
         less, place = value < low, np.array([max(value, low), -row])
-        if few or plan.standing is Standing.MISSES:
+        if few or _misses(plan):
             name = ("recommended, " if plan is chosen else "") + _short(plan)
             axes.plot(*place, "X" if plan is chosen else "x", clip_on=False, **FAILS)
             axes.plot([], [], "X" if plan is chosen else "x", label=name, **FAILS)
@@ -180,7 +188,7 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
 
 def _name_rows(axes: Axes, plans: Sequence[Plan], chosen: Plan | None) -> None:
     """Schemes beside their rows; those that fall short say so there."""
-    short = [plan.feasible and plan.standing is Standing.MISSES for plan in plans]
+    short = [plan.feasible and _misses(plan) for plan in plans]
     names = [plan.scheme + f"\n{_short(plan)}" * fails for plan, fails in zip(plans, short, strict=True)]
     axes.set_yticks(-np.arange(len(plans)), names)
     axes.set_ylim(-len(plans) + 0.45, 0.7)

@@ -50,6 +50,9 @@ LINE, THIN, LEADER = 1.3, 0.7, 0.5
 SMALL = 7.5
 """Size of labels inside a panel, points."""
 
+ON_PAPER: dict[str, Any] = {"fontsize": SMALL, "bbox": {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8}}
+"""Look of words that a line may pass behind."""
+
 _SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
     "font.size": 8.5,
@@ -383,12 +386,22 @@ def joined(pieces: Sequence[Vector]) -> Vector:
     return np.concatenate(parts[:-1]) if parts else np.empty((0, 2))
 
 
+STAR = 13.0
+"""Points across of the star of what is recommended: labels keep off marks as large as they keep off curves."""
+
+
 def _inked(axes: Axes) -> Vector:
     """Points of all curves and bars in pixels, close enough together that none passes a label unseen."""
     points = [np.empty((0, 2))]
     outlines = [np.asarray(line.get_transform().transform(line.get_xydata())) for line in axes.lines]
     for bars in axes.collections:
         outlines += [np.asarray(bars.get_transform().transform(path.vertices)) for path in bars.get_paths()]
+    spot = np.exp(2j * math.pi * np.arange(16) / 16)
+    for line in axes.lines:
+        if line.get_marker() not in ("", "None", None) and line.get_markersize() >= STAR:
+            round_it = 0.5 * line.get_markersize() * axes.figure.dpi / 72.0 * np.outer([0.5, 0.9], spot).ravel()
+            for place in np.asarray(line.get_transform().transform(line.get_xydata())):
+                points.append(place + np.column_stack([round_it.real, round_it.imag]))
     for path in outlines:
         path = path[np.isfinite(path).all(axis=1)]
         if len(path) > 1:

@@ -69,7 +69,13 @@ def trade_figure(
         axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
-        look: dict[str, Any] = {"color": INK, "markersize": 13, "markerfacecolor": "none", "linestyle": "", "zorder": 4}
+        look: dict[str, Any] = {
+            "color": INK,
+            "markersize": style.STAR,
+            "markerfacecolor": "none",
+            "linestyle": "",
+            "zorder": 4,
+        }
         axes.plot(*place, "*", label=f"recommended: {chosen.scheme}", **look)
     axes.set_xlim(right=REACH * spacecraft.horizon)
     axes.margins(y=0.12)
