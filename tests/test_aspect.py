@@ -17,6 +17,7 @@ from builders import aimed, cross, events, spinner
 from numpy.typing import NDArray
 from process import Run
 from samples import some
+from spinners import commanded
 
 from nutdamp import planning, remarks
 from nutdamp.aspect import aspects
@@ -202,6 +203,56 @@ def test_in_random_cases_the_axis_never_enters_a_cone(seeds: Sequence[int]) -> N
     found = [enters(seed) for seed in seeds]
     assert True not in found
     assert found.count(None) <= 0.3 * len(found)
+
+
+def near_case(seed: int) -> Spacecraft:
+    """A spinner of strong channels, nutating by 0.2 deg, that is to turn by 2 to 12 deg past a cone near its way."""
+    rng = np.random.default_rng(seed)
+    A, spin, turn = 10 ** rng.uniform(1, 3), rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 4.0), rng.uniform(2.0, 12.0)
+    C = A * rng.choice([rng.uniform(0.3, 0.8), rng.uniform(1.2, 1.8)])
+    channels = cross(C * spin**2, max_on_time=0.3 / abs(spin))
+    body = aimed(spinner(A, C, spin, 0.2, rng.uniform(0.0, 6.0), channels=channels), turn, rng.uniform(0.0, 360.0))
+    aside = np.cross(between(body, 0.0), body.target_axis) / math.sin(math.radians(turn))
+    centre = between(body, rng.uniform(0.2, 0.8)) + math.radians(turn) * rng.uniform(-0.4, 0.4) * aside
+    centre /= np.linalg.norm(centre)
+    clear = min(float(attitude.angle_between(centre, end)) for end in (between(body, 0.0), body.target_axis))
+    keep = Keep("cone", centre, least=clear * rng.uniform(0.2, 0.8))
+    return replace(body, keep=(keep,), limits=Limits(horizon=600.0 / abs(spin)))
+
+
+def in_sunlight(seed: int) -> Spacecraft:
+    """`some_case` with command blocks, and the Sun in view, well off the spin axis."""
+    body, rng = some_case(seed), np.random.default_rng(1000 + seed)
+    aside = np.cross(body.axis, direction(rng))
+    return commanded(body, aside / np.linalg.norm(aside) + rng.uniform(-0.8, 0.8) * body.axis)
+
+
+OTHERS = [(scheme, first) for first in range(0, 20, 2) for scheme in ("half-cone", "optimal")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "first"), OTHERS)
+def test_nor_does_it_by_other_schemes_that_turn_it(scheme: str, first: int) -> None:
+    """40 cases in all, nutation on the way included; where no way round is found there is no plan."""
+    for seed in (first, first + 1):
+        check_never_within(near_case(seed), scheme)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 4])
+def test_nor_by_command_blocks(seed: int) -> None:
+    assert check_never_within(in_sunlight(seed), "command-block")
+
+
+def check_never_within(body: Spacecraft, scheme: str) -> bool:
+    """That the axis of a plan comes into no cone by the reference integrator; whether there is a plan."""
+    plan = planning.plan(body, scheme)
+    if not plan.feasible:
+        return False
+    path = axis_path(body, plan.pulses, plan.end + body.inertial_period)
+    for keep in body.keep:
+        assert attitude.angle_between(path, keep.direction).min() >= keep.least - 1e-6
+    return True
 
 
 FILE = """
