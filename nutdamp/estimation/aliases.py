@@ -61,14 +61,18 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 
     Raises Infeasible where these leave several.
     """
-    if len(fits) == 1:
-        return fits[0]
     model = fits[0].model
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
     costs = [2.0 * float(counts @ np.log(one.noise)) for one in fits]
     alike = [one for one, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
-    left = [one for one in alike if low < one.values[at] < high] or alike[:1]
+    left = [one for one in alike if low < one.values[at] < high]
+    if not left and too_slow(model, alike[0].values):
+        raise Infeasible(
+            f"with a sample every {interval(model):.4g} s several nutation rates fit alike, and none of their C/A is "
+            "as near to the file as its tolerances allow; check A and C in the file (are the times in seconds?)"
+        )
+    left = left or alike[:1]
     if len(left) == 1:
         return left[0]
     ratios = sorted(float(one.values[at]) for one in left)

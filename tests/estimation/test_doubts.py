@@ -38,6 +38,11 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(gyros: tup
         fit(body, record(np.linspace(0.0, 600.0, 61), 93.0, gyros=gyros))
 
 
+def test_nutation_rates_none_of_which_the_file_allows_are_refused() -> None:
+    with pytest.raises(Infeasible, match="none of their C/A is as near to the file"):
+        fit(nutdamp.example(), record(np.linspace(0.0, 600.0, 61), 93.0))
+
+
 def test_sampling_at_uneven_times_tells_them_apart() -> None:
     times = np.linspace(0.0, 600.0, 61) + np.random.default_rng(1).uniform(-1.0, 1.0, 61)
     found = fit(nutdamp.example().with_(dispersions=WIDE), record(times - times[0], 93.0))
