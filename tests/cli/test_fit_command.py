@@ -297,3 +297,18 @@ def test_of_many_faults_of_a_column_the_first_are_listed(run: Run, tmp_path: Pat
     assert of_first[-1] == "bad.csv:7:1: omega_1_rad_s: and 596 more such rows"
     assert len(of_second) == 6
     assert "more" not in of_second[-1]
+
+
+def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_path: Path) -> None:
+    """Of data without noise the third rate is constant: neither residuals nor autocorrelations say anything."""
+    times, example = np.arange(601) / 10.0, nutdamp.example()
+    A, C = example.inertia.A, example.inertia.C
+    rates = motion((A, A, C), example.omega0, times)
+    lines = ["t_s,omega_1_rad_s,omega_2_rad_s,omega_3_rad_s"]
+    lines += [f"{time:.1f}," + ",".join(map(repr, row.tolist())) for time, row in zip(times, rates, strict=True)]
+    (tmp_path / "flight.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    done = run("fit", "flight.csv", "--plot", "f.svg")
+    assert done.returncode == 0, done.stderr
+    picture = (tmp_path / "f.svg").read_text()
+    for text in (f"{example.name}: telemetry and fit", "only rounding:", "no autocorrelation"):
+        assert text in picture

@@ -8,7 +8,7 @@ import numpy as np
 
 from nutdamp.estimation.fit import Fit
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.presentation.fit_tables import in_shown
 
@@ -21,6 +21,9 @@ PERIODS = 4.0
 
 SPREAD = 6.0
 """Standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge."""
+
+ROUNDING = 1e-3
+"""Share of the noise taken for the digits below which all residuals are rounding: of real noise some are above it."""
 
 DIFFERENCES = ("axis", "sun_pulse")
 """Signals that are compared as differences: data less fit is all there is of them."""
@@ -38,11 +41,16 @@ def fit_figure(found: Fit) -> Figure:
         last = index == count - 1
         _data(row[0], found, index, factor, f"{name}, {unit}")
         _residuals(row[1], found, index, factor, f"residual, {unit}")
-        _white(row[2], found, index)
-        for axes, text in zip(row, ("time, s", "time, s", "lag, samples"), strict=True):
+        unseen = _no_correlation(found, index)
+        if unseen:
+            style.words(row[2], unseen)
+        else:
+            _white(row[2], found, index)
+        for axes, text in zip(row, ("time, s", "time, s", "" if unseen else "lag, samples"), strict=True):
             axes.set_xlabel(text if last else "")
             axes.grid()
     legend(figure, list(grid.ravel()))
+    heading(figure, model.spacecraft, "telemetry and fit, what is left, and whether that is white")
     return figure
 
 
@@ -54,6 +62,9 @@ def _data(axes: Axes, found: Fit, index: int, factor: float, name: str) -> None:
     rows = (model.signal == index) & (model.times <= end)
     times, measured = model.times[rows], model.measured[rows]
     axes.set_ylabel(name)
+    if model.signals[index] in DIFFERENCES and _rounding(found, index):
+        style.words(axes, "data and fit are the same\nbut for rounding")
+        return
     if model.signals[index] in DIFFERENCES:
         axes.plot(times, factor * measured, color=INK, label="fit")
         shown = found.residuals[rows]
@@ -71,6 +82,9 @@ def _data(axes: Axes, found: Fit, index: int, factor: float, name: str) -> None:
 def _residuals(axes: Axes, found: Fit, index: int, factor: float, name: str) -> None:
     model, noise = found.model, float(found.noise[index])
     rows = model.signal == index
+    if _rounding(found, index):
+        style.words(axes, "residuals: only rounding")
+        return
     limit = factor * SPREAD * noise
     left = np.clip(factor * found.residuals[rows], -limit, limit)
     kept = found.used[rows]
@@ -81,6 +95,22 @@ def _residuals(axes: Axes, found: Fit, index: int, factor: float, name: str) -> 
         axes.axhline(side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma")
     axes.set_ylim(-1.08 * limit, 1.08 * limit)
     axes.set_ylabel(name)
+
+
+def _rounding(found: Fit, index: int) -> bool:
+    """Whether data and fit are the same but for the rounding of their numbers."""
+    rows = (found.model.signal == index) & found.used
+    largest = np.abs(found.residuals[rows]).max(initial=0.0)
+    return bool(largest <= ROUNDING * float(found.noise[index]))
+
+
+def _no_correlation(found: Fit, index: int) -> str:
+    """Why there are no autocorrelations to be drawn; "" where there are."""
+    if len(found.whiteness(index)) == 0:
+        return "too few samples for\nautocorrelation"
+    if _rounding(found, index):
+        return "only rounding:\nno autocorrelation"
+    return ""
 
 
 def _white(axes: Axes, found: Fit, index: int) -> None:
