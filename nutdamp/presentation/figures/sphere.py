@@ -229,6 +229,8 @@ def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
             filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
             axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
             axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
+            if within is not rim:  # a rim that does not close: what it fills has an outline of its own
+                axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8)
     for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
