@@ -15,7 +15,7 @@ from nutdamp.dispersion.study import EARLY, Results
 from nutdamp.physics import attitude
 from nutdamp.presentation import geometry
 from nutdamp.presentation.dispersion_tables import budget_rows
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.verdicts import cases_verdict, exact_percent
@@ -65,7 +65,7 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
     heading(figure, study.model.spacecraft, shown + verdict)
-    style.settle(figure)
+    labels.settle(figure)
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.presentation.text import degrees, steering
@@ -175,7 +175,7 @@ def _bar(axes: Axes, flight: Flight, block: geometry.Block, row: int, *, brief: 
         pulse = flight.schedule.pulses[block.first - 1]
         text = _firing(block.first, pulse, flight) if block.many == 1 else f"{text}: {block.on:.3g} s in all"
     place = np.array([block.begins + 0.5 * size, row + 0.5 * BAR])
-    style.label(axes, text, place, INK, role="bar", short=block.name)
+    labels.add(axes, text, place, INK, role="bar", short=block.name)
 
 
 def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
@@ -198,7 +198,7 @@ def _numbers(axes: Axes, flight: Flight, track: Track) -> None:
     for number in style.thinned(len(flight.schedule)):
         pulse = flight.schedule.pulses[number]
         if pulse.t <= track.t[-1]:
-            style.label(axes, str(number + 1), np.array([pulse.t, top]), FIRED, role="number")
+            labels.add(axes, str(number + 1), np.array([pulse.t, top]), FIRED, role="number")
 
 
 def _finish(axes: Axes, flight: Flight, track: Track, values: np.ndarray, name: str, *, least: float = 0.0) -> None:

@@ -11,7 +11,7 @@ from nutdamp.loop.plan import LoopPlan
 from nutdamp.loop.sensor import Signal
 from nutdamp.loop.stability import Map
 from nutdamp.loop_settings import GYRO
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.history import TIME, firings
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.motion import title
@@ -54,7 +54,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     fired.set_xlabel(TIME)
     legend(figure, [signal, nutation])
     figure.suptitle(f"{title(run.flight)}\n{described(run.loop, thresholds=False)}")
-    style.settle(figure)
+    labels.settle(figure)
     return figure
 
 
@@ -67,8 +67,8 @@ def _signal(axes: Axes, plan: LoopPlan) -> None:
     else:
         times, values = _samples(plan, sensor.rate)
     scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
-    labels = ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
-    for column, (label, colour) in enumerate(zip(labels, (MOTION, PULSE), strict=False)):
+    names = ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
+    for column, (label, colour) in enumerate(zip(names, (MOTION, PULSE), strict=False)):
         axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=label)
     axes.set_ylabel("signal, deg/s" if sensor.kind == GYRO else "signal, m/s²")
     axes.grid()

@@ -11,9 +11,9 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.end_tables import direction_text
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import legend, short_name
-from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, Meant
+from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN
 from nutdamp.presentation.text import degrees, moment
 from nutdamp.spacecraft import Channel, Vector
 from nutdamp.track import Track
@@ -103,8 +103,10 @@ def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small:
     stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
         others = np.delete(stations, number + 1, axis=0)
-        style.label(axes, str(number + 1), stations[number + 1], FIRED, meant=Meant(stations[[number + 1]], others))
-    style.label(axes, "t = 0", stations[0], INK, role="vital")
+        labels.add(
+            axes, str(number + 1), stations[number + 1], FIRED, meant=labels.Meant(stations[[number + 1]], others)
+        )
+    labels.add(axes, "t = 0", stations[0], INK, role="vital")
     target = geometry.sky_target(flight, track)
     axes.plot(*target.T, **style.TARGET)
     style.square(axes, small, margin=0.25)
@@ -159,7 +161,7 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
-    style.label(axes, "t = 0", points[0], INK, role="vital")
+    labels.add(axes, "t = 0", points[0], INK, role="vital")
 
 
 def _number(axes: Axes, firings: Sequence[Vector]) -> None:
@@ -167,8 +169,8 @@ def _number(axes: Axes, firings: Sequence[Vector]) -> None:
     some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
     for number in style.thinned(len(firings), NUMBERED):
         others = [rows for other, rows in enumerate(some) if other != number]
-        meant = Meant(some[number], np.vstack([np.empty((0, 2)), *others]))
-        style.label(axes, str(number + 1), firings[number][len(firings[number]) // 2], FIRED, meant=meant)
+        meant = labels.Meant(some[number], np.vstack([np.empty((0, 2)), *others]))
+        labels.add(axes, str(number + 1), firings[number][len(firings[number]) // 2], FIRED, meant=meant)
 
 
 def _refined(rows: Vector) -> Vector:
@@ -203,7 +205,7 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         axes.plot(*np.outer(way, [1.1, 1.28]), color=GREY, linewidth=1.2)
         style.heads(axes, np.outer([1.1, 1.3], way), [1], GREY)
         names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
-        style.label(axes, names, 1.2 * way, INK, role="vital")
+        labels.add(axes, names, 1.2 * way, INK, role="vital")
     if groups:
         axes.plot([], [], color=GREY, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
     return bool(groups)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
-from nutdamp.presentation.figures import history, motion, sphere, style
+from nutdamp.presentation.figures import history, labels, motion, sphere, style
 from nutdamp.presentation.figures.legends import legend
 from nutdamp.track import Track
 
@@ -30,7 +30,7 @@ def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = Fal
             axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if cut else ""
     figure.suptitle(motion.title(flight) + part)
-    style.settle(figure)
+    labels.settle(figure)
     return figure
 
 

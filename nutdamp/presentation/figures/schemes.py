@@ -13,7 +13,7 @@ from nutdamp.comparison import Comparison
 from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
 from nutdamp.planning import Plan
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import in_degrees
@@ -79,7 +79,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     if chosen is not None and _misses(chosen):
         verdict += f" ({_short(chosen)})"
     heading(figure, compared.spacecraft, f"schemes by real pulse widths\n{verdict}")
-    style.settle(figure)
+    labels.settle(figure)
     return figure
 
 
@@ -175,7 +175,7 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
             look: dict[str, Any] = {"color": MOTION, "markerfacecolor": face, "markersize": 6, "linestyle": ""}
             axes.plot(*place, "<" if less else "o", clip_on=False, **look)
             axes.plot([], [], "o", label="recommended" if plan is chosen else "other schemes", **look)
-        style.label(axes, column.text(value), place, INK, role="vital")
+        labels.add(axes, column.text(value), place, INK, role="vital")
     if column.floor is not None:
         name = f"least to leave as little as {column.floor.scheme}"
         axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name)

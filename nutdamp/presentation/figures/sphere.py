@@ -11,9 +11,9 @@ import numpy as np
 
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import legend
-from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED, Meant
+from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
 from nutdamp.presentation.geometry import Cones
 from nutdamp.spacecraft import Vector
 from nutdamp.track import Track
@@ -171,8 +171,8 @@ def _name_tips(axes: Axes, found: Cones, place: Callable[[Vector], Vector]) -> N
     named = _directions(found)
     tips = np.array([place(direction) for direction, _, _ in named])
     for number, (_, colour, name) in enumerate(named):
-        meant = Meant(tips[[number]], np.delete(tips, number, axis=0))
-        style.label(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
+        meant = labels.Meant(tips[[number]], np.delete(tips, number, axis=0))
+        labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
 
 
 def _rims(found: Cones) -> tuple[tuple[Vector, Vector, str, float], ...]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from nutdamp.fronts import Front, numbered
 from nutdamp.planning import Plan
-from nutdamp.presentation.figures import style
+from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
@@ -85,7 +85,7 @@ def trade_figure(
         _graduate(axes)
     axes.grid(True, which="both")
     legend(figure, [axes], 3)
-    style.settle(figure)
+    labels.settle(figure)
     return figure
 
 
@@ -137,8 +137,8 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)
     places = np.array([one[:2] for one in shown])
     for row, (_, _, numbers) in enumerate(shown):
-        meant = style.Meant(places[[row]], np.delete(places, row, axis=0))
-        style.label(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
+        meant = labels.Meant(places[[row]], np.delete(places, row, axis=0))
+        labels.add(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
 
 
 def _alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
