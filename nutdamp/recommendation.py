@@ -50,6 +50,7 @@ class Ground(Enum):
     LEFT = "left"
     NEAREST = "nearest"
     COST = "cost"
+    NOMINAL = "nominal"
     SHIFT = "shift"
     END = "end"
 
@@ -129,10 +130,11 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
 
-def cheapest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
+def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Ground]:
     """The plan of least propellant (impulse where one is not known), and what decided.
 
-    Costs within `SAME_COST` are equal: then less shift of H (distance from the target axis), then the earlier end.
+    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with less shift of H
+    (distance from the target axis), then the earlier end.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
@@ -141,6 +143,8 @@ def cheapest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     equal = [one for one in plans if _cost(one, known) <= least * (1.0 + SAME_COST)]
     if len(equal) == 1:
         return equal[0], Ground.COST
+    if usual is not None and any(one is usual for one in equal):
+        return usual, Ground.NOMINAL
     least = min(map(_off, equal))
     still = [one for one in equal if _off(one) <= least + SAME_ANGLE]
     return min(still, key=lambda one: one.pulses.end), Ground.SHIFT if len(still) == 1 else Ground.END

@@ -17,17 +17,16 @@ import numpy as np
 
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
-from nutdamp.compliance import Part, aim, missed
-from nutdamp.decision import Cases, Decision, cases_of
+from nutdamp.decision import Decision
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
-from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.study import CONFIDENCE, PROBABILITY, Results, run, threads_here
+from nutdamp.dispersion.study import PROBABILITY
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
+from nutdamp.screening import AS_GOOD, Candidate, entered, equal_from, fly_all
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.tightening import Tightening, tightening
 
@@ -36,52 +35,6 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 
 WIDEST = 1.3
 """Largest margin of a front, over the sigmas of the probability required."""
-
-AS_GOOD = 1.05
-"""Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A plan and how it fares in dispersed cases.
-
-    ``variant`` says how it differs from what its scheme plans.
-    """
-
-    plan: Plan
-    variant: str
-    cases: Cases
-
-    @property
-    def nutation(self) -> float:
-        """Nutation, rad, not exceeded in the share of cases required."""
-        return self.cases.levels[Part.NUTATION]
-
-    @property
-    def off(self) -> float:
-        """How far H ends from where it shall, rad, not exceeded in the share of cases required."""
-        return self.cases.levels[aim(self.plan.spacecraft)]
-
-    @property
-    def met(self) -> float | None:
-        """The share that complies; None where nothing is required."""
-        return self.cases.complying
-
-    @property
-    def left(self) -> float:
-        """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
-        return float(missed(self.plan.spacecraft, self.nutation, self.off))
-
-    @property
-    def nominal(self) -> float | None:
-        """The same for nominal values, rad."""
-        flown = self.plan.flown
-        return None if flown is None else float(missed(self.plan.spacecraft, flown.nutation, flown.axis_error))
-
-    @property
-    def rank(self) -> float:
-        """What candidates are ranked by, the least first: the share that does not comply, or what is left."""
-        return self.left if self.met is None else 1.0 - self.met
 
 
 class Cost(NamedTuple):
@@ -190,13 +143,15 @@ def compare(
     watch: Callable[[int], None] = lambda _: None,
     *,
     samples: int = SAMPLES,
+    whole: bool = False,
     impulses: bool = False,
     force: bool = False,
 ) -> RobustComparison:
     """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases; ``watch`` is called with how many trials are done. ``impulses``: in closed form. Raises
-    BadRequest for a spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
+    ``samples`` cases of those that may be chosen, or, ``whole``, of all, see `screening`; ``watch`` is called with how
+    many trials are done, and then beyond that now and then. ``impulses``: in closed form. Raises BadRequest for a
+    spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
     """
     body = comparison.spacecraft
     requested = body.requirement
@@ -211,17 +166,35 @@ def compare(
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                found[kind] = _dispersed(own, variant, samples, impulses=impulses, force=force)
+                study = study_of(body, own.pulses, flown=not impulses)
+                if impulses and not force:
+                    check_impulses(study)
+                found[kind] = entered(own, variant, study, samples)
+    candidates = list(found.values())
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    equals = _equals(list(found.values()), samples, probability)
+    always = [one for one in candidates if whole or one is usual]
+    fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
+    return ranked(comparison, candidates, samples, probability, flown=not impulses)
+
+
+def ranked(
+    comparison: Comparison, candidates: Sequence[Candidate], samples: int, probability: float, *, flown: bool
+) -> RobustComparison:
+    """The comparison of candidates that have flown, and which of them to take.
+
+    That is the cheapest of the equals; of those that cost the same the plan that is recommended for nominal values.
+    """
+    recommended = None if comparison.recommended is None else _kind(comparison.recommended)
+    usual = next((one for one in candidates if _kind(one.plan) == recommended), None)
+    equals = _equals(candidates, samples, probability)
     chosen, ground = None, None
     if equals:
-        best, ground = cheapest([one.plan for one in equals])
+        best, ground = cheapest([one.plan for one in equals], None if usual is None else usual.plan)
         chosen = next(one for one in equals if one.plan is best)
-    short = chosen is not None and chosen.met is not None and chosen.met < probability and not impulses
+    short = chosen is not None and chosen.met is not None and chosen.met < probability and flown
     return RobustComparison(
         comparison,
-        tuple(sorted(found.values(), key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
+        tuple(sorted(candidates, key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
         usual,
         chosen,
         ground,
@@ -230,7 +203,7 @@ def compare(
         probability,
         samples,
         SEED,
-        not impulses,
+        flown,
         tightening(chosen.plan, probability) if chosen is not None and short else None,
     )
 
@@ -265,14 +238,6 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, attempt(body, scheme, options))]
 
 
-def _dispersed(plan: Plan, variant: str, samples: int, *, impulses: bool, force: bool) -> Candidate:
-    """How a plan fares in dispersed cases."""
-    study = study_of(plan.spacecraft, plan.pulses, flown=not impulses)
-    if impulses and not force:
-        check_impulses(study)
-    return Candidate(plan, variant, cases_of(run(Results(study, samples), threads=threads_here())))
-
-
 def _equals(candidates: Sequence[Candidate], samples: int, probability: float) -> list[Candidate]:
     """The candidates that comply as often as is required; without any those that are as good as the best.
 
@@ -284,5 +249,5 @@ def _equals(candidates: Sequence[Candidate], samples: int, probability: float) -
     best = min(candidates, key=lambda one: one.rank)
     if best.met is None:
         return [one for one in candidates if one.rank <= AS_GOOD * best.rank]
-    low, _ = binomial_interval(round(best.met * samples), samples, CONFIDENCE)
+    low = equal_from(best.met, samples)
     return [one for one in candidates if one.met is not None and one.met >= low]

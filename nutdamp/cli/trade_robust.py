@@ -35,7 +35,7 @@ def trade_robust(
     compared = compared_with(job, (), options)
     trials = robust.trials_of_front(compared, points)
     with progress("dispersing", len(trials), quiet=job.quiet) as advance:
-        found = robust.compare(compared, trials, advance)
+        found = robust.compare(compared, trials, advance, whole=True)
     outputs: list[Output] = [
         (csv, partial(front_csv, found)),
         (json, partial(front_json, found)),

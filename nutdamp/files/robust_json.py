@@ -9,7 +9,8 @@ from nutdamp import __version__
 from nutdamp.compliance import aim
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import final_json, plan_json, spacecraft_json, target_json
-from nutdamp.robust import Candidate, RobustComparison, front
+from nutdamp.robust import RobustComparison, front
+from nutdamp.screening import Candidate
 
 
 def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
@@ -88,6 +89,7 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "nominal_nutation_deg": None if plan.flown is None else math.degrees(plan.flown.nutation),
         "nutation_deg": math.degrees(one.nutation),
         aim(plan.spacecraft).value + "_deg": math.degrees(one.off),
+        "samples": one.cases.samples,
         "met_fraction": one.met,
         "final": final_json(plan.flight),
     }

@@ -16,7 +16,7 @@ NARROW = 60
 GAP = 2
 """Characters between two columns."""
 
-WORD = re.compile(r"(?:[<≤✗] )?\S+")
+WORD = re.compile(r"(?:[<≤✗] )?\S+(?: %(?!\S))?")
 """What a column keeps on one line."""
 
 
@@ -67,7 +67,7 @@ def _text(cell: RenderableType) -> Text:
 def _widths(columns: list[list[str]], room: int) -> list[int] | None:
     """Characters for each column such that no word is cut; None where there is no ``room`` for that.
 
-    A number with its sign, as in "< 1e-9", is one word.
+    A number with its sign, as in "< 1e-9", or with its percent sign is one word.
     """
     least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
     whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]

@@ -14,6 +14,7 @@ from nutdamp.presentation.plan_tables import derived_table, pulse_table
 from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison, front
+from nutdamp.words import listed
 
 MOST_ROWS = 12
 """Candidates that the table names."""
@@ -102,6 +103,10 @@ def _candidates(found: RobustComparison) -> RenderableType:
     what = verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
     more = f"{rest} more plan{'s rank' if rest > 1 else ' ranks'} below these. " if rest else ""
+    fewer = sorted({one.cases.samples for one in found.candidates} - {found.samples})
+    if fewer:
+        more += f"Plans that could not be chosen any more after {listed([f'{one:,}' for one in fewer], 'or')} cases "
+        more += "flew no more of them. "
     note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
     star = " * is recommended for nominal values." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))

@@ -304,6 +304,7 @@ def robust_reason(found: RobustComparison) -> str:
     cost = "propellant" if found.by_propellant else "impulse"
     then = {
         Ground.COST: f"least {cost}",
+        Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended for nominal values",
         Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
     }

@@ -97,7 +97,9 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     found = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     assert found["flown"]
     shares = {(one["scheme"], one["variant"]): one["met_fraction"] for one in found["candidates"]}
-    assert max(share for (_, made), share in shares.items() if not made.startswith("against")) == pytest.approx(0.8562)
+    assert max(share for (_, made), share in shares.items() if not made.startswith("against")) == pytest.approx(
+        0.8562, abs=0.025
+    )  # three sigmas of the first 2,048 cases, after which these plans cannot be chosen any more
     enough = [one["propellant_kg"] for one in found["candidates"] if one["met_fraction"] >= 0.997]
     assert found["recommended"]["propellant_kg"] == min(enough)
     assert found["against"]["scheme"] == "optimal"

@@ -8,7 +8,8 @@ from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.presentation.verdicts import exact_percent
-from nutdamp.robust import Candidate, RobustComparison, front
+from nutdamp.robust import RobustComparison, front
+from nutdamp.screening import Candidate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,0 +1,174 @@
+"""Flying many plans in dispersed cases: a few of all, all for those alone that can still be chosen after a few.
+
+All plans fly the same draws, the first cases first. What part of all cases complies is bounded by an exact interval
+about what the first ones show (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that
+could not be chosen even at the favourable end of its interval is flown no further.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from nutdamp import compliance
+from nutdamp.compliance import SAME_COST, Part
+from nutdamp.decision import Cases, cases_of
+from nutdamp.dispersion.binomial import binomial_interval
+from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.study import CONFIDENCE, Results, Study, run, threads_here
+from nutdamp.errors import Infeasible
+from nutdamp.planning import Plan
+
+STAGES = (2_048, 8_192)
+"""Cases after which it is looked whether a plan can still be chosen."""
+
+CERTAIN = 1.0 - 1e-6
+"""Confidence of the intervals by which plans are left out."""
+
+AS_GOOD = 1.05
+"""Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
+
+
+def equal_from(share: float, samples: int) -> float:
+    """The least share of ``samples`` cases that is equal to a ``share`` of them but for the sampling error."""
+    return binomial_interval(round(share * samples), samples, CONFIDENCE)[0]
+
+
+@dataclass(eq=False)
+class Candidate:
+    """A plan and how it fares in the dispersed cases of its ``results``.
+
+    ``variant`` says how it differs from what its scheme plans. Of all cases the share that complies lies between
+    ``low`` and ``high``; these are None where nothing is required.
+    """
+
+    plan: Plan
+    variant: str
+    cases: Cases
+    results: Results | None = None
+    low: float | None = field(init=False, default=None)
+    high: float | None = field(init=False, default=None)
+
+    @property
+    def nutation(self) -> float:
+        """Nutation, rad, not exceeded in the share of cases required."""
+        return self.cases.levels[Part.NUTATION]
+
+    @property
+    def off(self) -> float:
+        """How far H ends from where it shall, rad, not exceeded in the share of cases required."""
+        return self.cases.levels[compliance.aim(self.plan.spacecraft)]
+
+    @property
+    def met(self) -> float | None:
+        """The share that complies; None where nothing is required."""
+        return self.cases.complying
+
+    @property
+    def left(self) -> float:
+        """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
+        return float(compliance.missed(self.plan.spacecraft, self.nutation, self.off))
+
+    @property
+    def nominal(self) -> float | None:
+        """The same for nominal values, rad."""
+        body, flown = self.plan.spacecraft, self.plan.flown
+        return None if flown is None else float(compliance.missed(body, flown.nutation, flown.axis_error))
+
+    @property
+    def rank(self) -> float:
+        """What candidates are ranked by, the least first: the share that does not comply, or what is left."""
+        return self.left if self.met is None else 1.0 - self.met
+
+
+def entered(plan: Plan, variant: str, study: Study, samples: int) -> Candidate:
+    """A candidate that has flown the first of ``samples`` cases of a study."""
+    results = run(Results(study, min(STAGES[0], samples)), threads=threads_here())
+    made = Candidate(plan, variant, cases_of(results), results)
+    _bound(made, samples)
+    return made
+
+
+def _bound(one: Candidate, samples: int) -> None:
+    if one.met is not None:
+        known = one.cases.samples >= samples
+        count = round(one.met * one.cases.samples)
+        one.low, one.high = (one.met, one.met) if known else binomial_interval(count, one.cases.samples, CERTAIN)
+
+
+def _further(one: Candidate, samples: int) -> None:
+    """Fly the cases of the next stage."""
+    assert one.results is not None
+    stage = next((count for count in STAGES if one.cases.samples < count < samples), samples)
+    one.results = run(one.results.extended(stage), threads=threads_here())
+    one.cases = cases_of(one.results)
+    _bound(one, samples)
+
+
+def fly_all(
+    candidates: list[Candidate],
+    samples: int,
+    probability: float,
+    always: Sequence[Candidate] = (),
+    watch: Callable[[], None] = lambda: None,
+) -> None:
+    """Fly all ``samples`` cases of those that may be chosen, and of ``always``; ``watch`` is called after each step.
+
+    To be chosen is the cheapest of which the share ``probability`` complies; where there is none, the cheapest of
+    those that comply as often as the best but for the sampling error. Those that have a case that cannot be flown
+    leave the ``candidates``.
+    """
+    while candidates:
+        some = [one for one in always if one in candidates] + _hopeful(candidates, samples, probability)
+        some = [one for one in some if one.cases.samples < samples]
+        if not some:
+            return
+        first = min(some, key=lambda one: (one not in always, *_promise(one, probability)))
+        try:
+            _further(first, samples)
+        except Infeasible:
+            candidates.remove(first)
+        watch()
+
+
+def _promise(one: Candidate, probability: float) -> tuple[bool, float]:
+    """What the next to be flown is least in."""
+    may = one.high is not None and one.high >= probability
+    return not may, one.plan.pulses.cost if may else one.rank
+
+
+def _hopeful(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
+    """Those that may be chosen by what is known of all."""
+    if any(one.low is None for one in candidates):
+        return _as_near(candidates, samples, probability)
+    bounds = [(one, one.low or 0.0, one.high or 0.0) for one in candidates]
+    sure = [one.plan.pulses.cost for one, low, _ in bounds if low >= probability]
+    if sure:
+        comparable = len({one.plan.pulses.propellant is None for one in candidates}) == 1
+        most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
+        return [one for one, _, high in bounds if high >= probability and one.plan.pulses.cost <= most]
+    least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
+    return [one for one, _, high in bounds if high >= least]
+
+
+def _as_near(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
+    """Where nothing is required: those that may leave as little as the best of those that have flown all cases."""
+    ranks = [one.rank for one in candidates if one.cases.samples >= samples]
+    if not ranks:
+        return candidates
+    most = AS_GOOD * min(ranks)
+    return [one for one in candidates if _share_within(one, most) >= probability]
+
+
+def _share_within(one: Candidate, most: float) -> float:
+    """The largest share of all cases that may leave at most ``most`` rad."""
+    body = one.plan.spacecraft
+    if one.results is None or one.results.values is None:
+        return 1.0
+    parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, compliance.aim(body)]
+    rows = one.results.values[[OUTPUTS.index(part.value) for part in parts], : one.results.done]
+    count = min(int(np.count_nonzero(row <= most)) for row in rows)
+    return binomial_interval(count, one.results.done, CERTAIN)[1]
