@@ -35,7 +35,17 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
             "factor": found.tightening.factor,
             "tolerances": {
                 one.tolerance: {"sigma": one.sigma, "needed": found.tightening.factor * one.sigma}
-                for one in found.tightening.inputs
+                for one, _ in reversed(found.tightening.inputs)
+            },
+            "inputs": [
+                {"name": one.name, one.kind: one.size, "needed": found.tightening.factor * one.size, "unit": one.unit}
+                for one, _ in found.tightening.inputs
+            ],
+            "checked": {
+                "samples": found.tightening.cases,
+                "seed": found.tightening.seed,
+                "met_fraction": found.tightening.complied,
+                "at_least": found.tightening.least,
             },
         },
         "against": None if usual is None else _candidate(usual),

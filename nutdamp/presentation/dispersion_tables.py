@@ -282,6 +282,17 @@ def size_text(entry: Input) -> str:
     return quantity(scale * (entry.sigma or entry.size), unit, 3)
 
 
+def stated_text(entry: Input, relative: bool, *, down: bool = False) -> str:
+    """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
+    share = relative and entry.nominal != 0.0
+    unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
+    value = 100.0 * entry.size / abs(entry.nominal) if share or (unit == "" and entry.nominal) else scale * entry.size
+    if down and value > 0.0:
+        step = 10.0 ** (math.floor(math.log10(value)) - 2)
+        value = step * math.floor(value / step * (1.0 + 1e-12))
+    return quantity(value, "%" if share or (unit == "" and entry.nominal) else unit, 3).strip()
+
+
 def _of_nominal(entry: Input, value: float, form: str) -> str:
     """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
     return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"

@@ -334,17 +334,21 @@ def robust_cost(found: RobustComparison) -> str:
 
 def tightened(found: RobustComparison) -> str:
     """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
-    from nutdamp.presentation.dispersion_tables import in_words, size_text
+    from nutdamp.dispersion.study import CONFIDENCE
+    from nutdamp.presentation.dispersion_tables import in_words, stated_text
 
     needed, chosen = found.tightening, found.chosen
     if needed is None or chosen is None:
         return ""
-    sizes = []
-    for one in needed.inputs:
-        less = size_text(one._replace(size=needed.factor * one.size))
-        sizes.append(f"{in_words(one.tolerance)} {less} instead of {size_text(one)}")
-    level = exact_percent(found.probability)
-    return f"{level} of cases would comply with it, one sigma of {listed(sizes)}."
+    sizes, tolerances = [], [one.tolerance for one, _ in needed.inputs]
+    for one, relative in needed.inputs:
+        less = stated_text(one._replace(size=needed.factor * one.size), relative, down=True)
+        named = in_words(one.tolerance if tolerances.count(one.tolerance) == 1 else one.name)
+        sizes.append(f"{named} {{{one.kind}: {less}}} instead of {stated_text(one, relative)}")
+    level, least = exact_percent(found.probability), 100.0 * math.floor(1e4 * needed.least) / 1e4
+    checked = f"{percent(needed.complied, found.probability)} of {needed.cases:,} other cases (seed {needed.seed}) do"
+    shown = f"which shows at least {least:.4g} % with {exact_percent(CONFIDENCE)} confidence"
+    return f"{level} of cases would comply with it, given {listed(sizes)}: {checked}, {shown}."
 
 
 def left_name(spacecraft: Spacecraft) -> str:
