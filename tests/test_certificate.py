@@ -173,7 +173,21 @@ def test_without_optimal_the_command_says_what_to_name(tmp_path: Path) -> None:
     file = tmp_path / "proof.json"
     result = within(tmp_path, "plan", "--quiet", "--scheme", "two-pulse", "--certificate", str(file))
     assert result.returncode == 2
-    assert "a certificate is of optimal, which was not planned" in result.stderr
+    assert "a certificate is of optimal, which is not planned" in result.stderr
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("options", [(), ("--robust", "--set", "dispersions={A: {normal: 1 %}}")])
+def test_where_there_is_no_certificate_the_screen_is_shown_and_says_so(
+    tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    """Optimal is infeasible within half a second, which only planning shows."""
+    file = tmp_path / "proof.json"
+    schemes = ("--scheme", "optimal", "--set", "limits.horizon=0.5 s")
+    result = within(tmp_path, "plan", *schemes, *options, "--certificate", str(file))
+    assert result.returncode == 1
+    assert ("Robust plan: optimal" if options else "No recommendation: no scheme is feasible.") in result.stdout
+    assert f"cannot write {file}: there is no certificate: optimal has no least cost" in " ".join(result.stderr.split())
     assert not file.exists()
 
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import replace
 
 import pytest
 from builders import judged
 
-from nutdamp import robust, screening
+from nutdamp import planning, robust, screening
 from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
 from nutdamp.decision import Cases
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import DispersedCases
+from nutdamp.dispersion.kernel import Ends
+from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.spacecraft import Requirement, Spacecraft
@@ -89,3 +94,24 @@ def test_of_plans_that_cost_the_same_the_one_recommended_for_nominal_values() ->
         found = robust.ranked(compared, given, 1_000, 0.997, flown=False)
         assert found.equals == 2
         assert found.chosen is given[recommended]
+
+
+def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
+    """The flight of the first portion goes on until the interrupt has come out."""
+    body = example(None)
+    schedule = planning.plan(body, "two-pulse").pulses
+    study, begun, over = study_of(body, schedule), threading.Event(), threading.Event()
+
+    def fly(cases: DispersedCases) -> Ends:
+        begun.set()
+        over.wait(60.0)
+        return study.flies(cases)
+
+    def interrupt(_: int) -> None:
+        assert begun.wait(60.0)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(Results(replace(study, fly=fly), 2_048), watch=interrupt)
+    assert not over.is_set()
+    over.set()

@@ -34,8 +34,10 @@ if TYPE_CHECKING:
 
     from nutdamp.comparison import Comparison
     from nutdamp.decision import Decision
+    from nutdamp.errors import CannotWrite
     from nutdamp.planning import Plan
     from nutdamp.robust import RobustComparison
+    from nutdamp.spacecraft import Spacecraft
 
 
 SCHEMES, PRIMER = "schemes", "primer"
@@ -91,6 +93,8 @@ def command(
     job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
     if robust:
         require_dispersions(job.spacecraft)
+    if certificate is not None or curve is not None:
+        _expect_certified(names, job.spacecraft)
 
     from nutdamp.decision import decide
     from nutdamp.presentation import verdicts
@@ -101,17 +105,18 @@ def command(
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
         say(f"{path} was not written: no plan is feasible")
+    proofs, unproved = _outputs_of_proof(compared, chosen, certificate, curve, job.remark)
     outputs: list[Output] = [
         (json, partial(_data, compared, decided, dispersed)),
         (table, partial(_schemes, compared, decided)),
         (all_plans, partial(_schemes_picture, compared, decided)),
-        *_outputs_of_proof(compared, chosen, certificate, curve, job.remark),
+        *proofs,
         *_outputs_of(chosen, csv, one_plan, figure),
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
     ]
     if job.silent:
         job.warn(verdicts.warnings(compared))
-    job.deliver(outputs, partial(_screen, compared, dispersed))
+    job.deliver(outputs, partial(_screen, compared, dispersed), unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
@@ -169,18 +174,34 @@ def _pictured(figure: str) -> tuple[bool, bool, bool]:
     return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
 
 
+def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
+    """Raises BadRequest, before any work, where the scheme is not to be planned of whose plans there are certificates.
+
+    So it is too where it cannot plan, as without channels.
+    """
+    from nutdamp.comparison import usual
+    from nutdamp.schemes.registry import OPTIMAL
+
+    if OPTIMAL.name not in (names or usual(body)):
+        raise BadRequest(f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme")
+    if not body.channels:
+        raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
+
+
 def _outputs_of_proof(
     compared: Comparison, chosen: Plan | None, path: str | None, plot: str | None, remark: Callable[[str], None]
-) -> list[Output]:
-    """The files of the certificate of the plan of optimal, which must be among the plans."""
+) -> tuple[list[Output], list[CannotWrite]]:
+    """The files of the certificate of the plan of optimal; where it has none, why none of them is written."""
     if path is None and plot is None:
-        return []
+        return [], []
     from nutdamp.certificate import SCHEME, certificate
+    from nutdamp.errors import CannotWrite
 
-    planned = next((one for one in compared if one.scheme == SCHEME), None)
-    if planned is None:
-        raise BadRequest(f"a certificate is of {SCHEME}, which was not planned: name it with --scheme")
-    found = certificate(planned)
+    planned = next(one for one in compared if one.scheme == SCHEME)
+    try:
+        found = certificate(planned)
+    except BadRequest as reason:
+        return [], [CannotWrite(one, f"there is no certificate: {reason}") for one in (path, plot) if one is not None]
     if chosen is not planned:
         remark(f"the certificate is of {SCHEME} for nominal values, which is not the recommended plan")
     from nutdamp.files.certificate_json import certificate_json
@@ -190,7 +211,7 @@ def _outputs_of_proof(
 
         return figures.certificate_figure(found)
 
-    return [(path, partial(certificate_json, found)), (plot, picture)]
+    return [(path, partial(certificate_json, found)), (plot, picture)], []
 
 
 def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:

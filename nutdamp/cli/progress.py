@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from nutdamp.cli.screen import say
 from nutdamp.work import Watch, watched
 
 if TYPE_CHECKING:
@@ -20,18 +21,20 @@ if TYPE_CHECKING:
 PATIENCE = 1.0
 """Seconds that pass before a bar appears."""
 
+LONG = 10.0
+"""Seconds after which a line says how far the work is, where standard error is no terminal."""
+
 
 @contextmanager
 def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> Iterator[Callable[[int], None]]:
     """A function to call now and then with how many of ``total`` are done; ``done`` were before the run began.
 
-    It shows a bar with rate and time left on standard error: only on a terminal, only after a second, and it leaves
-    nothing behind.
+    It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
+    behind. Elsewhere one line says how far it is, after `LONG`.
     """
-    shown = _Bar(what, total, done)
-    silent = quiet or not sys.stderr.isatty()
+    shown = _Bar(what, total, done) if sys.stderr.isatty() else _Line(what, total, done)
     try:
-        yield (lambda _: None) if silent else shown.update
+        yield (lambda _: None) if quiet else shown.update
     finally:
         shown.close()
 
@@ -77,6 +80,26 @@ class _Doing:
         if budget is None:
             return self.what
         return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
+
+
+class _Line:
+    """What is shown where there is no terminal: one line, once, that names the share done and the time left."""
+
+    def __init__(self, what: str, total: int, done: int) -> None:
+        self.what, self.total, self.before = what, total, done
+        self.began, self.said = time.monotonic(), False
+
+    def update(self, done: int) -> None:
+        passed = time.monotonic() - self.began
+        if self.said or passed < LONG:
+            return
+        self.said = True
+        left = passed * (self.total - done) / max(done - self.before, 1)
+        rest = f", about {left:.0f} s left" if left > 0.0 else ""
+        say(f"{self.what}: {min(done, self.total):,} of {self.total:,} done after {passed:.0f} s{rest}")
+
+    def close(self) -> None:
+        """Nothing is to be cleared."""
 
 
 class _Bar:

@@ -50,7 +50,8 @@ class Round:
     def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
         """How many cases were flown, always the first ones, and how many draws were made again."""
         count = min(threads, len(self.portions))
-        workers = [threading.Thread(target=self._work, args=(stopped,)) for _ in range(count)]
+        # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses then.
+        workers = [threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)]
         for worker in workers:
             worker.start()
         try:
@@ -61,8 +62,6 @@ class Round:
                         watch(max(self._flown, self.first))
         except BaseException:
             self.taken = len(self.portions)  # nothing more is begun
-            for worker in workers:
-                worker.join()
             raise
         if self.failures:
             raise self.failures[0]

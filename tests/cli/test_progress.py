@@ -46,6 +46,16 @@ def test_only_a_terminal_is_shown_a_bar_and_only_where_it_is_wanted(monkeypatch:
     assert shown(monkeypatch, Terminal(), 0.0, quiet=True) == ""
 
 
+@pytest.mark.parametrize(("long", "quiet", "lines"), [(0.0, False, 1), (60.0, False, 0), (0.0, True, 0)])
+def test_elsewhere_one_line_says_how_far_long_work_is(
+    monkeypatch: pytest.MonkeyPatch, long: float, quiet: bool, lines: int
+) -> None:
+    monkeypatch.setattr(module, "LONG", long)
+    text = shown(monkeypatch, io.StringIO(), 0.0, quiet=quiet)
+    assert text.count("\n") == lines
+    assert not lines or text.startswith("flying: 200 of 1,000 done after 0 s, about 0 s left")
+
+
 @pytest.mark.parametrize(
     ("patience", "quiet", "reported"), [(0.0, False, True), (60.0, False, False), (0.0, True, False)]
 )
