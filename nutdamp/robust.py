@@ -118,12 +118,16 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
 
 
 def trials_of_front(comparison: Comparison, points: int) -> list[Attempt]:
-    """What the front of propellant against probability is of: the plans compared, and ``points`` margins."""
+    """What the front of propellant against probability is of: the plans compared, and ``points`` margins.
+
+    So that it has the plan with which just as many cases comply as must, those that lead to its margin too.
+    """
     body, found = comparison.spacecraft, list[Attempt]()
     found += [partial(list, [("as planned", base)]) for base in comparison.plans if base.failure is None]
     for number in range(points):
         margin = WIDEST * (number + 1) / points
         found.append(partial(surest.plans, body, None, [margin]))
+    found.append(partial(surest.plans, body))
     return found
 
 
