@@ -38,7 +38,10 @@ def robust_screen(found: RobustComparison) -> RenderableType:
         *(Text(one) for one in filter(None, [verdicts.tightened(found)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
-        Text(f"{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}", style="bold"),
+        Text(
+            f"{'Up to ' * bool(_fewer(found))}{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}",
+            style="bold",
+        ),
         *(Text(), _candidates(found), *reasons),
     ]
     if len(decided.plan.pulses):
@@ -78,6 +81,11 @@ def _why(plan: Plan) -> str:
     return f"infeasible: {infeasibility(plan)}" if plan.failure is None else f"{infeasibility(plan)}"
 
 
+def _fewer(found: RobustComparison) -> list[int]:
+    """With how many cases plans were given up."""
+    return sorted({one.cases.samples for one in found.candidates} - {found.samples})
+
+
 def _candidates(found: RobustComparison) -> RenderableType:
     level = verdicts.exact_percent(found.probability)
     counted = compliance.judged(found.comparison.spacecraft)
@@ -103,10 +111,9 @@ def _candidates(found: RobustComparison) -> RenderableType:
     what = verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
     more = f"{rest} more plan{'s rank' if rest > 1 else ' ranks'} below these. " if rest else ""
-    fewer = sorted({one.cases.samples for one in found.candidates} - {found.samples})
+    fewer = [f"{count:,}" for count in _fewer(found)]
     if fewer:
-        more += f"Plans that could not be chosen any more after {listed([f'{one:,}' for one in fewer], 'or')} cases "
-        more += "flew no more of them. "
+        more += f"Plans that could not be chosen any more after {listed(fewer, 'or')} cases flew no more of them. "
     note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
     star = " * is recommended for nominal values." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))
