@@ -35,8 +35,14 @@ OUTLIER = 5.0
 EVALUATIONS = 60
 """Jacobians of one least-squares search, at most."""
 
-ROUNDS = 3
-"""Fits in which noise and outliers are found anew."""
+ROUNDS = 8
+"""Fits in which noise and outliers are found anew, at most."""
+
+ADJUSTED = 3
+"""Rounds in which the noise is corrected for what the fit takes of it."""
+
+STILL = 1e-3
+"""Relative change of the noise from which on it is found anew."""
 
 POOR = 0.3
 """Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""
@@ -322,7 +328,7 @@ def _search(
 
     loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
     found = least_squares(
-        errors, values / units, derivatives, loss=loss, max_nfev=EVALUATIONS, x_scale=1.0, xtol=1e-10, ftol=1e-10
+        errors, values / units, derivatives, loss=loss, max_nfev=EVALUATIONS, x_scale="jac", xtol=1e-10, ftol=1e-10
     )
     return found.x * units, float(found.cost)
 
@@ -335,13 +341,15 @@ def _settled(model: Model, values: Vector) -> Fit:
     values, _ = _search(model, values, noise, every, robust=True)
     used = every
     for _ in range(ROUNDS):
-        left = _residuals(model, values)
+        before, left = (noise, used), _residuals(model, values)
         noise = np.maximum(noises.robust(model, left), floor)
         used = np.abs(left) < OUTLIER * noise[model.signal]
         noise = np.maximum(noises.plain(model, left, used), floor)
+        if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
+            break
         values, _ = _search(model, values, noise, used, robust=False)
     left, slopes = _residuals(model, values), _jacobian(model, values)
-    for _ in range(ROUNDS):
+    for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = _covariance(model, scaled)
         noise = np.maximum(noises.plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)

@@ -99,8 +99,10 @@ class Model:
         of_file, spacecraft = self.spacecraft.inertia, self.spacecraft
         A, C = in_moments(spacecraft, values)
         rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
-        turn = np.array([values.get(f"attitude_{number}", 0.0) for number in (1, 2, 3)])
-        quaternion = attitude.multiply(self.reference.quaternion, _turned(turn))
+        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
+        tilt = np.array([values.get("attitude_1", 0.0), values.get("attitude_2", 0.0), 0.0])
+        turn = np.array([0.0, 0.0, values.get("attitude_3", 0.0)])
+        quaternion = attitude.multiply(self.reference.quaternion, attitude.multiply(_turned(tilt), _turned(turn)))
         growth = values.get("growth", spacecraft.growth)
         e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
@@ -201,7 +203,9 @@ class Model:
         if name == ACCELERATION:
             assert self.spacecraft.loop is not None
             of_file = self.spacecraft.inertia
-            columns = felt(self.spacecraft.loop.sensor, self._moments(values), (rates @ of_file.axes).T)
+            moments, rates = np.array(self._moments(values)), rates @ of_file.axes
+            sinking = _sinking(moments * rates, values.get("growth", self.spacecraft.growth))
+            columns = felt(self.spacecraft.loop.sensor, moments, rates.T, sinking.T)
             return np.asarray(columns[0] + values.get("bias_acceleration", 0.0))
         if name == SUN_PULSE:
             return self._sun_late(rates, quaternion)
@@ -305,6 +309,16 @@ class _Flown:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         return self.flight.motion(np.maximum(times, 0.0))
+
+
+def _sinking(momentum: Vector, growth: float) -> Vector:
+    """The torque (n, 3) N m that would change H (n, 3) N m s in the body as dissipation does.
+
+    Of a body whose axis e turns at κ cos θ (t × e) besides, t along H: dH/dt = κ cos θ (cos θ H - |H| e).
+    """
+    size = np.linalg.norm(momentum, axis=1, keepdims=True)
+    cosine = momentum[:, 2:] / size
+    return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
 
 
 def _turned(angles: Vector) -> Vector:
