@@ -1,4 +1,4 @@
-"""Synthetic telemetry of every kind of column, as CSV files: bodies flown by DOP853, drawn from the file's tolerances."""
+"""Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files, flown by DOP853."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def telemetry(folder: Path, seed: int) -> Telemetry:
     quaternion = attitude.multiply(body.initial.quaternion, attitude.multiply(tilted, turned))
     period = 2.0 * math.pi / abs(1.0 - C / A) / abs(rates[2])
     length, count = draw.uniform(4.0, 12.0) * period, int(draw.integers(200, 500))
-    times = np.round(np.linspace(0.0, length, count), 6)
+    times: Array = np.linspace(0.0, length, count).round(6)
     fired = _fired(draw, body, length) if "fired" in kind else Schedule()
     flight = _Flight((A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length)
     columns = _columns(draw, kind, body, flight, times, truth)
@@ -123,11 +123,15 @@ def telemetry(folder: Path, seed: int) -> Telemetry:
     stamps = [begin.plus(float(one)).text if utc else f"{one:.6f}" for one in times]
     rows = [",".join(["utc" if utc else "t_s", *columns])]
     for at, stamp in enumerate(stamps):
-        rows.append(",".join([stamp, *("" if math.isnan(one[at]) else repr(float(one[at])) for one in columns.values())]))
+        rows.append(
+            ",".join([stamp, *("" if math.isnan(one[at]) else repr(float(one[at])) for one in columns.values())])
+        )
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     if "sun_times" in kind:
         sun = folder / f"{seed}-sun.csv"
-        seen = flight.sun(body, length) + 10.0 ** draw.uniform(-4, -2.5) * draw.normal(size=len(flight.sun(body, length)))
+        seen = flight.sun(body, length) + 10.0 ** draw.uniform(-4, -2.5) * draw.normal(
+            size=len(flight.sun(body, length))
+        )
         seen = seen[(draw.uniform(size=len(seen)) > 0.05) & (seen > 0.0)]
         sun.write_text("t_s\n" + "".join(f"{one:.6f}\n" for one in seen), encoding="utf-8")
     return Telemetry(body, read_telemetry(path, body, sun, fired)[0], truth, "+".join(kind))

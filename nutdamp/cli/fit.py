@@ -70,8 +70,8 @@ def command(
     if schedule is not None:
         fired, warnings = read_pulses(schedule, job.spacecraft)
         job.warn(warnings)
-    record, warnings = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
-    job.warn(warnings)
+    record, read = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
+    job.warn(read)
     with working("fitting", quiet=quiet):
         found = fit(job.spacecraft, record)
     now = carried(found, at)
@@ -79,7 +79,7 @@ def command(
     prospects = _outlook(found, at, quiet) if ahead else None
     outputs: list[Output] = [
         (output, partial(fitted_text, *job.source, spacecraft.settings, found, now)),
-        (json, partial(fit_json, found, now, prospects)),
+        (json, partial(fit_json, found, now, prospects, read)),
         (plot, partial(_picture, found)),
     ]
     job.deliver(outputs, partial(fit_screen, found, at, prospects))

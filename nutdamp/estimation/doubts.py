@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from nutdamp.estimation import aliases
 from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.parameters import shows_turn
+from nutdamp.estimation.unexplained import step
 
 LATE = 0.1
 """Delay of a channel from which on the times of the schedule are doubted, s: valves are faster."""
@@ -24,7 +26,27 @@ def doubts(found: Fit) -> Iterator[str]:
     spin = found.model.spacecraft.spin
     if found.named.get("omega_3", spin) * spin < 0.0:
         yield "the body spins the other way than the file has it: is omega_3 reversed, or state.spin?"
+    if not shows_turn(found.model.record):
+        yield (
+            "the axis alone does not show how the body is turned about it: the phase, and so the firing times of a "
+            "plan, rest on the attitude of the file; omega_1 or omega_2, an acceleration or Sun pulses would show it"
+        )
+    yield from _of_residuals(found)
     yield from _of_schedule(found)
+
+
+def _of_residuals(found: Fit) -> Iterator[str]:
+    """What residuals that are not white may come from, and what helps."""
+    left = [index for index in range(len(found.model.signals)) if found.resolved[index] and not found.white(index)]
+    if not left:
+        return
+    says = f"the residuals of {', '.join(found.model.signals[index] for index in left)} are not white"
+    time = step(found, left, small=True)
+    if time is None:
+        yield f"{says}: the noise of neighbouring samples is correlated, or a small motion is not in the model"
+        return
+    what = "check --schedule" if found.model.record.fired else "give the pulses fired with --schedule"
+    yield f"{says}: the nutation steps at about {time:.3g} s, as by a small pulse; {what}, or end the record before it"
 
 
 def _of_schedule(found: Fit) -> Iterator[str]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import aliases, noises
-from nutdamp.estimation.guess import starts
+from nutdamp.estimation.guess import once_a_turn, starts
 from nutdamp.estimation.model import Matrix, Model, Vector
 from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE, Record
 from nutdamp.estimation.unexplained import expect_explained
@@ -189,8 +189,8 @@ def _expect_enough(model: Model) -> None:
     """Raises Infeasible for a record that cannot tell as much as is estimated."""
     if not SHOW_NUTATION & set(model.signals):
         raise Infeasible(
-            f"no nutation is seen in {' and '.join(model.signals)} alone (Sun pulses come once a spin turn); "
-            "omega_1 or omega_2, the axis or an acceleration would"
+            f"no nutation is seen in {' and '.join(model.signals)} alone{once_a_turn(model.record)}; omega_1 or "
+            "omega_2, the axis or an acceleration beside them would show it"
         )
     rows, free = len(np.unique(model.times)), sum(math.isinf(one.prior) for one in model.parameters)
     if len(model.measured) <= free + 2:
@@ -212,9 +212,11 @@ def _expect_enough(model: Model) -> None:
 def _expect_seen(found: Fit) -> None:
     """Raises Infeasible where there is no nutation in the record."""
     at = [found.index("omega_1"), found.index("omega_2")]
-    size = math.hypot(*(found.values[one] for one in at if one is not None))
+    omega = np.array([found.values[one] for one in at if one is not None])
     across = found.covariance[np.ix_(at, at)]  # type: ignore[arg-type]
-    sigma = math.sqrt(float(np.linalg.eigvalsh(across)[-1]))
+    # Its size counts: where the phase is hardly known, the rate across it is not either.
+    size = float(np.linalg.norm(omega))
+    sigma = size / math.sqrt(float(omega @ np.linalg.pinv(across, hermitian=True) @ omega))
     if size < SEEN * sigma:
         least = math.degrees(SEEN * sigma)
         raise Infeasible(
@@ -243,7 +245,7 @@ def _grown(model: Model, share: float, values: Vector) -> tuple[Vector, float]:
     cost = math.inf
     while True:
         rows = model.times <= begin + share * length
-        values, cost = _search(model, values, _scales(model), rows, robust=True)
+        values, cost = _search(model, values, _scales(model), rows, robust=True, near=False)
         if share >= 1.0:
             return values, cost
         share = min(2.0 * share, 1.0)
@@ -258,7 +260,7 @@ def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, floa
         vectors = [vectors[index] for index in np.argsort(costs)[:STARTS]]
     found = []
     for one in vectors:
-        found.append(_search(model, one, scales, every, robust=True))
+        found.append(_search(model, one, scales, every, robust=True, near=False))
         if _size(model, found[-1][0]) < POOR:
             break
     return min(found, key=lambda one: one[1])
@@ -290,15 +292,14 @@ def _size(model: Model, values: Vector) -> float:
     return min(shares, default=0.0)
 
 
-def _jacobian(model: Model, values: Vector) -> Matrix:
-    """Derivatives (m, p) of the prediction, by central differences."""
+def _jacobian(model: Model, values: Vector, which: Iterable[int]) -> Matrix:
+    """Derivatives (m, k) of the prediction by the parameters at some positions, by central differences."""
     columns = []
-    for index, one in enumerate(model.parameters):
-        above, below = values.copy(), values.copy()
-        above[index] += one.step
-        below[index] -= one.step
-        difference = model.predicted(_named(model, above)) - model.predicted(_named(model, below))
-        columns.append(difference / (above[index] - below[index]))
+    for index in which:
+        ends = np.stack([values, values])
+        ends[:, index] += np.array([1.0, -1.0]) * model.parameters[index].step
+        above, below = (model.predicted(_named(model, one)) for one in ends)
+        columns.append((above - below) / (ends[0, index] - ends[1, index]))
     return np.column_stack(columns)
 
 
@@ -310,7 +311,7 @@ def _units(model: Model) -> Vector:
 
 
 def _search(
-    model: Model, values: Vector, noise: Vector, rows: NDArray[np.bool_], *, robust: bool
+    model: Model, values: Vector, noise: Vector, rows: NDArray[np.bool_], *, robust: bool, near: bool = True
 ) -> tuple[Vector, float]:
     """Values of the least cost over some of the samples, and that cost; ``noise`` of each signal."""
     from scipy.optimize import least_squares
@@ -319,16 +320,27 @@ def _search(
     bound, nominal = model.prior[0] * units, model.prior[1]
 
     def errors(scaled: Vector) -> Vector:
-        left = _residuals(model, scaled * units)[rows] * weights
+        try:
+            left = _residuals(model, scaled * units)[rows] * weights
+        except Infeasible:  # a trial too far to be flown: the search comes nearer
+            return np.full(int(rows.sum()) + len(nominal), math.inf)
         return np.concatenate([left, bound @ scaled - nominal])
 
     def derivatives(scaled: Vector) -> Matrix:
-        slopes = _jacobian(model, scaled * units)[rows] * units
+        slopes = _jacobian(model, scaled * units, range(len(units)))[rows] * units
         return np.concatenate([-slopes * weights[:, None], bound])
 
+    # Steps as long as the derivatives allow lead astray far from the minimum.
     loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
     found = least_squares(
-        errors, values / units, derivatives, loss=loss, max_nfev=EVALUATIONS, x_scale="jac", xtol=1e-10, ftol=1e-10
+        errors,
+        values / units,
+        derivatives,
+        loss=loss,
+        max_nfev=EVALUATIONS,
+        x_scale="jac" if near else 1.0,
+        xtol=1e-10,
+        ftol=1e-10,
     )
     return found.x * units, float(found.cost)
 
@@ -348,7 +360,7 @@ def _settled(model: Model, values: Vector) -> Fit:
         if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
             break
         values, _ = _search(model, values, noise, used, robust=False)
-    left, slopes = _residuals(model, values), _jacobian(model, values)
+    left, slopes = _residuals(model, values), _jacobian(model, values, range(len(values)))
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = _covariance(model, scaled)
@@ -358,7 +370,7 @@ def _settled(model: Model, values: Vector) -> Fit:
 
 def estimated(model: Model, values: Vector, noise: Vector) -> Fit:
     """The fit of a record that has no samples yet: ``values`` as they are, with the covariance that they would have."""
-    slopes, count = _jacobian(model, values), len(model.measured)
+    slopes, count = _jacobian(model, values, range(len(values))), len(model.measured)
     covariance = _covariance(model, slopes / noise[model.signal, None])
     return Fit(model, values, covariance, noise, np.ones(count, dtype=bool), np.zeros(count), slopes)
 
@@ -377,7 +389,7 @@ def _shown(found: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
     """Whether the residuals show parameters of a wider model: a score test, one step of least squares by them."""
     model, count = found.model, len(which)
     weights = 1.0 / found.noise[model.signal[found.used]]
-    slopes = _jacobian_of(wider, at, which)[found.used] * weights[:, None] * _units(wider)[list(which)]
+    slopes = _jacobian(wider, at, which)[found.used] * weights[:, None] * _units(wider)[list(which)]
     units, rows = _units(model), len(model.prior[0])
     known = found.jacobian[found.used] * weights[:, None] * units
     bound = np.concatenate([model.prior[0] * units, np.zeros((rows, count))], axis=1)
@@ -386,14 +398,3 @@ def _shown(found: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
     solved = np.linalg.lstsq(stacked, target, rcond=1e-13)[0][-count:]
     covariance = np.linalg.pinv(stacked.T @ stacked, rcond=1e-14)[-count:, -count:]
     return bool(solved @ np.linalg.solve(covariance, solved) > UNEQUAL**2)
-
-
-def _jacobian_of(model: Model, values: Vector, which: Sequence[int]) -> Matrix:
-    """Derivatives (m, k) by the parameters at some positions."""
-    columns = []
-    for index in which:
-        step = np.zeros(len(values))
-        step[index] = model.parameters[index].step
-        ends = [model.predicted(_named(model, values + sign * step)) for sign in (1.0, -1.0)]
-        columns.append((ends[0] - ends[1]) / (2.0 * step[index]))
-    return np.column_stack(columns)

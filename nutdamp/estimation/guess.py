@@ -13,7 +13,7 @@ import numpy as np
 
 from nutdamp.estimation.model import Model, Values, Vector
 from nutdamp.estimation.parameters import RATIO
-from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS
+from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, Record
 from nutdamp.physics import attitude
 
 FINER = 8
@@ -25,14 +25,24 @@ MOST = 1 << 16
 SMALL = 1e-3
 """Share of the spin that trial transverse rates have: the motion is linear there."""
 
+OTHER = 0.05
+"""Part by which a spin by Sun pulses may differ from that of the file before both are tried."""
+
 TURNS = 8
 """Starting values of the angle by which the body is turned about its axis."""
 
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
     """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
-    values = {one.name: one.file for one in model.parameters}
     spin = _spin(model)
+    yield from _starts(model, share, spin)
+    # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
+    if not model.record.has(GYROS[2]) and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
+        yield from _starts(model, share, model.spacecraft.spin)
+
+
+def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float]]:
+    values = {one.name: one.file for one in model.parameters}
     if "omega_3" in values:
         values["omega_3"] = spin
     rate = _peak(model, spin, share)
@@ -52,10 +62,31 @@ def _spin(model: Model) -> float:
     if record.has(GYROS[2]) and np.isfinite(record.signals[GYROS[2]]).any():
         return float(np.nanmedian(record.signals[GYROS[2]]))
     if len(record.sun_pulses) > 1:
-        gaps = np.diff(record.sun_pulses)
-        turns = np.rint(gaps / gaps.min()).sum()
-        return math.copysign(2.0 * math.pi * turns / float(gaps.sum()), spin)
+        return math.copysign(spin_of(record.sun_pulses)[0], spin)
     return spin
+
+
+def spin_of(pulses: Vector) -> tuple[float, float]:
+    """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma, rad/s.
+
+    The sigma is that of a straight line through the times, by what they are off it, a nutation included.
+    """
+    gaps = np.diff(pulses)
+    turns = np.concatenate([[0.0], np.cumsum(np.rint(gaps / gaps.min()))])
+    rate = 2.0 * math.pi * float(turns[-1]) / float(pulses[-1] - pulses[0])
+    if len(pulses) < 3:
+        return rate, math.inf
+    slope, left = np.polyfit(turns, pulses, 1, full=True)[:2]
+    spread = math.sqrt(float(left.sum()) / (len(pulses) - 2) / float(np.sum((turns - turns.mean()) ** 2)))
+    return 2.0 * math.pi / float(slope[0]), 2.0 * math.pi * spread / float(slope[0]) ** 2
+
+
+def once_a_turn(record: Record) -> str:
+    """What Sun pulses tell by themselves, in words; nothing without them."""
+    if len(record.sun_pulses) < 3:
+        return ""
+    spin, sigma = np.degrees(spin_of(record.sun_pulses))
+    return f": Sun pulses come once a spin turn and tell the spin, {spin:.7g} deg/s, with a sigma of {sigma:.2g} deg/s"
 
 
 def _peak(model: Model, spin: float, share: float) -> float | None:
@@ -130,7 +161,8 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     assert ratio is not None
     if A is None:
         return {RATIO: wanted}
-    part = (A.prior / A.file) ** 2 / (ratio.prior / ratio.file) ** 2
+    # Moments that are known together would be moved by many times what the ratio is: a start need not be.
+    part = min((A.prior / A.file) ** 2 / (ratio.prior / ratio.file) ** 2, 1.0)
     return {"A": A.file * (ratio.file / wanted) ** part, RATIO: wanted}
 
 

@@ -31,9 +31,6 @@ LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 CASES = 4000
 """Dispersed cases flown for each."""
 
-LEVEL = 0.997
-"""Share of the cases that stay below the nutation that is shown."""
-
 PAYS = 0.9
 """Share of that nutation, and less, down to which it must fall for another coast or a probe pulse to pay."""
 
@@ -43,10 +40,11 @@ MOST_SAMPLES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """What knowing as much as after ``length`` s of coast would leave: ``nutation`` rad, of 99.7 % of the cases.
+    """What knowing as much as after ``length`` s of coast would leave: ``nutation`` rad, which most cases stay below.
 
-    ``ratio``: sigma of C/A; ``met``: share that meets the requirement, None without one; ``probe``: the channel that
-    fires a pulse of ``on_time`` s meanwhile, and ``thrust``, sigma of its thrust factor; empty for none.
+    How many is said by `Outlook.probability`. ``ratio``: sigma of C/A; ``met``: share that meets the requirement, None
+    without one; ``probe``: the channel that fires a pulse of ``on_time`` s meanwhile, and ``thrust``, sigma of its
+    thrust factor; empty for none. ``propellant``: kg of that pulse, None where it is not known.
     """
 
     length: float
@@ -56,17 +54,22 @@ class Prospect:
     probe: str = ""
     on_time: float = 0.0
     thrust: float = math.nan
+    propellant: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """The prospects of coasts, from the shortest on, and of one probe pulse of each channel in the plan."""
+    """The prospects of coasts, from the shortest on, and of one probe pulse of each channel in the plan.
+
+    ``propellant``: kg of the plan, None where it is not known.
+    """
 
     scheme: str
     coasts: tuple[Prospect, ...]
     probes: tuple[Prospect, ...]
     probability: float = PROBABILITY
-    """Share of cases that must meet the requirement."""
+    """Share of cases that must meet the requirement, and that stay below the nutation shown."""
+    propellant: float | None = None
 
     @property
     def now(self) -> Prospect:
@@ -104,17 +107,17 @@ def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _:
     plan = comparison.compare(body, comparison.usual(body)).recommended
     if plan is None or not len(plan.pulses):
         raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
+    required = spacecraft.requirement
+    probability = PROBABILITY if required is None or required.probability is None else required.probability
     length, done, made = found.model.record.length, 0, []
     for share in LENGTHS:
-        made.append(_prospect(plan, found, time, share * length))
+        made.append(_prospect(plan, found, time, probability, share * length))
         progress(done := done + 1)
     probes = []
     for name, on_time in _probes(plan, body):
-        probes.append(_prospect(plan, found, time, length, name, on_time))
+        probes.append(_prospect(plan, found, time, probability, length, name, on_time))
         progress(done := done + 1)
-    required = spacecraft.requirement
-    probability = PROBABILITY if required is None or required.probability is None else required.probability
-    return Outlook(plan.scheme, tuple(made), tuple(probes), probability)
+    return Outlook(plan.scheme, tuple(made), tuple(probes), probability, plan.propellant)
 
 
 def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
@@ -126,7 +129,9 @@ def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
             yield name, math.fsum(lengths) / len(lengths)
 
 
-def _prospect(plan: Plan, found: Fit, time: float, length: float, probe: str = "", on_time: float = 0.0) -> Prospect:
+def _prospect(
+    plan: Plan, found: Fit, time: float, level: float, length: float, probe: str = "", on_time: float = 0.0
+) -> Prospect:
     imagined = _imagined(found, length, probe, on_time)
     known = carried(imagined, time - (found.model.record.end - length))
     body = plan.spacecraft
@@ -139,11 +144,12 @@ def _prospect(plan: Plan, found: Fit, time: float, length: float, probe: str = "
     return Prospect(
         length,
         float(imagined.sigmas[at]),
-        float(nutation.quantiles(np.array([LEVEL]))[0]),
+        float(nutation.quantiles(np.array([level]))[0]),
         results.met_fraction,
         probe,
         on_time,
         float(imagined.sigmas[imagined.index(f"thrust {probe}") or 0]) if probe else math.nan,
+        imagined.model.record.schedule.propellant if probe else None,
     )
 
 

@@ -155,8 +155,13 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
         sigma = 0.0 if given is None or given.attitude is None else prior_of(given.attitude, 0.0)[1]
     for number in (1, 2) if sigma > 0.0 else ():
         yield Parameter(f"attitude_{number}", "rad", 0.0, sigma, TINY)
-    if len(record.sun_pulses) or record.has(GYROS[0]) or record.has(GYROS[1]) or record.has(ACCELERATION):
+    if shows_turn(record):
         yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
+
+
+def shows_turn(record: Record) -> bool:
+    """Whether a signal shows how the body is turned about its axis."""
+    return len(record.sun_pulses) > 0 or any(record.has(name) for name in (*GYROS[:2], ACCELERATION))
 
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -213,5 +218,3 @@ def untold(record: Record) -> Iterator[str]:
         yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
     if not record.has(GYROS[2]) and not len(record.sun_pulses):
         yield f"no signal shows the spin (omega_3 or {SUN_PULSE}): it is that of the file"
-    if record.has(*AXIS) and not (record.has(GYROS[0]) or record.has(GYROS[1]) or len(record.sun_pulses)):
-        yield "the axis alone does not show how the body is turned about it: the phase is that of the file's attitude"

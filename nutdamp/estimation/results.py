@@ -11,7 +11,7 @@ import numpy as np
 
 from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import Body, Matrix, Values, Vector
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, thrust_prior
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_turn, thrust_prior
 from nutdamp.physics import attitude
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.spacecraft import Inertia, Spacecraft, SpinState
@@ -41,7 +41,7 @@ WORTH_NAMING = 0.9
 class Estimate(NamedTuple):
     """A ``value`` with its ``sigma`` in ``unit`` (SI times ``factor``); what the ``file`` says, to within ``prior``.
 
-    ``file`` and ``prior`` are None where it says nothing.
+    ``file`` and ``prior`` are None where it says nothing; the sigma is infinite where the data do not tell the value.
     """
 
     key: str
@@ -56,6 +56,8 @@ class Estimate(NamedTuple):
     @property
     def source(self) -> str:
         """Where it comes from."""
+        if math.isinf(self.sigma):
+            return UNTOLD
         if self.prior is None or self.sigma <= FROM_DATA * self.prior:
             return TOLD
         return UNTOLD if self.sigma > FROM_FILE * self.prior else SHARED
@@ -235,6 +237,8 @@ def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
 
     slopes = derivatives(found, motion)
     values, sigmas = motion(found.named), np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    if not shows_turn(model.record):
+        sigmas[3] = math.inf
     omega = complex(*spacecraft.rates[:2])
     file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
     given = spacecraft.dispersions

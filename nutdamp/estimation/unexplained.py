@@ -8,6 +8,7 @@ such as a pulse: their sigmas would mean nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,10 @@ SPLITS, SAMPLES = 120, 2000
 """Times at which a step is looked for, and samples of a signal used for that, at most."""
 
 STEP = 0.7
-"""Part of the residuals that is left beside a step, at most, for it to count as found."""
+"""Part of the residuals that is left beside a step, at most, for it to count as found where they are no noise."""
+
+SHOWN = 50.0
+"""Decrease of the sum of squares, in units of the noise, by which a step shows in residuals that are nearly noise."""
 
 
 def expect_explained(found: Fit) -> None:
@@ -45,7 +49,7 @@ def expect_explained(found: Fit) -> None:
     signals = ", ".join(model.signals[index] for index in left)
     more = max(found.noise[index] / _noise(found, index) for index in left)
     says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
-    time = _step(found, left)
+    time = step(found, left)
     where = "" if time is None else f", with a step at about {time:.4g} s"
     what = "pulses fired in the record are given with --schedule"
     if model.record.fired:
@@ -73,15 +77,18 @@ def _more_than_noise(found: Fit, signal: int) -> bool:
     return bool(found.noise[signal] > PART * varied) and not found.white(signal)
 
 
-def _step(found: Fit, signals: list[int]) -> float | None:
-    """When the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals."""
+def step(found: Fit, signals: Sequence[int], *, small: bool = False) -> float | None:
+    """When the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals.
+
+    None where no step shows; ``small``: one that may hide in noise.
+    """
     model = found.model
     chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION)]
     rate = aliases.nutation_rate(model, found.values)
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
     total, left = 0.0, np.zeros(len(splits))
     for index in chosen:
-        rows = np.flatnonzero(model.signal == index)
+        rows = np.flatnonzero((model.signal == index) & (found.used | (not small)))
         rows = rows[:: -(-len(rows) // SAMPLES)]
         times, values = model.times[rows], found.residuals[rows] / found.noise[index]
         turn = rate * (times - model.record.start)
@@ -91,7 +98,8 @@ def _step(found: Fit, signals: list[int]) -> float | None:
         total += _remains(smooth, values)
         left += [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
     best = int(np.argmin(left))
-    return float(splits[best]) if chosen and left[best] < STEP**2 * total else None
+    shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
+    return float(splits[best]) if chosen and shows else None
 
 
 def _remains(columns: Vector, values: Vector) -> float:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from nutdamp import __version__
+from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.outlook import Outlook
+from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import Carried, Estimate, estimates
+from nutdamp.files.fitted_file import notes
 from nutdamp.files.plan_json import spacecraft_json
 
 
-def fit_json(found: Fit, carried: Carried, ahead: Outlook | None = None) -> dict[str, Any]:
-    """Estimates with sigmas, what the file says, the signals, the covariance of what dispersions draw; prospects."""
+def fit_json(
+    found: Fit, carried: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Estimates with sigmas, what the file says, the signals, the covariance of what dispersions draw; prospects.
+
+    ``warnings`` of reading the record go into the notes, before all that makes the estimates doubtful.
+    """
     model = found.model
     return {
         "nutdamp": __version__,
@@ -46,6 +55,7 @@ def fit_json(found: Fit, carried: Carried, ahead: Outlook | None = None) -> dict
             "sigmas_SI": carried.sigmas.tolist(),
             "correlation": carried.correlation.tolist(),
         },
+        "notes": [*warnings, *doubts(found), *untold(model.record), *notes(found, carried)],
         "next": None if ahead is None else _outlook(ahead),
     }
 
@@ -54,6 +64,8 @@ def _outlook(ahead: Outlook) -> dict[str, Any]:
     longer, probe = ahead.longer, ahead.probe
     return {
         "scheme": ahead.scheme,
+        "propellant_kg": ahead.propellant,
+        "probability": ahead.probability,
         "longer_coast_s": None if longer is None else longer.length,
         "probe": None if probe is None else probe.probe,
         "prospects": [
@@ -63,8 +75,9 @@ def _outlook(ahead: Outlook) -> dict[str, Any]:
                 "on_time_s": one.on_time,
                 "sigma_C_over_A": one.ratio,
                 "sigma_thrust": one.thrust,
-                "nutation_99.7_deg": math.degrees(one.nutation),
+                "nutation_deg": math.degrees(one.nutation),
                 "met_fraction": one.met,
+                "propellant_kg": one.propellant,
             }
             for one in (*ahead.coasts, *ahead.probes)
         ],

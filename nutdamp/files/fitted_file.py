@@ -13,19 +13,29 @@ from dataclasses import replace
 import numpy as np
 
 from nutdamp.epoch import Epoch
+from nutdamp.estimation.doubts import LATE
 from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.record import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LEAST_THRUST, Carried, correlations, replaced
 from nutdamp.files.sections import KeyPath
 from nutdamp.files.settings import Setting
 from nutdamp.files.yaml_edit import edited
 from nutdamp.files.yaml_tree import Node, read_tree
 from nutdamp.physics import attitude, cones
+from nutdamp.physics.valve import Trapezoid
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.tolerances import Tolerance
 from nutdamp.units import parse
 
 SEEN = 3.0
 """Standard deviations from which on a growth of the nutation, or a delay, counts as seen."""
+
+UNWRITTEN = {
+    "bias": ("bias of {}", "deg/s"),
+    "misalignment": ("tilt of the gyros about {}", "deg"),
+    "wobble": ("tilt of the axis about {}", "deg"),
+}
+"""What is estimated of sensors but has no key in the file: the bias of a loop is one for both of its gyros."""
 
 Edits = Iterator[tuple[KeyPath, str]]
 
@@ -61,7 +71,9 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
         assert at is not None
         if abs(found.values[at]) > SEEN * found.sigmas[at]:
             channel = name.removeprefix("delay ")
-            yield f"the delay of {channel}, {1e3 * found.values[at]:.4g} ms, is not written: see the key valve"
+            if channel not in dict(_delays(found)):
+                yield f"the delay of {channel}, {1e3 * found.values[at]:.4g} ms, is not written: see the key valve"
+    yield from _off(found)
     for name in (one.name for one in found.model.parameters if one.name.startswith("thrust ")):
         if found.named[name] <= LEAST_THRUST:
             channel = name.removeprefix("thrust ")
@@ -85,6 +97,9 @@ def _edits(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
     yield from _dissipation(tree, found, carried)
     yield from _goal(tree, found, carried, made)
     yield from _thrusts(tree, carried)
+    for channel, late in _delays(found):
+        yield from _valve(tree, channel, late)
+    yield from _sensor(tree, found)
     yield from _dispersions(found, carried)
 
 
@@ -205,6 +220,62 @@ def _dispersions(found: Fit, carried: Carried) -> Edits:
     if pairs:
         rows = ", ".join(f"[{_quoted(one)}, {_quoted(other)}, {value:.{DIGITS}f}]" for one, other, value in pairs)
         yield ("dispersions", "correlation"), f"[{rows}]"
+
+
+def _delays(found: Fit) -> Iterator[tuple[str, float]]:
+    """Channels whose thrust is later than by the file, s, as far as a valve of their own can have such delays."""
+    for channel in found.model.spacecraft.channels:
+        at, known = found.index(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
+        if at is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
+            continue
+        late = float(found.values[at])
+        possible = abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0
+        if possible and abs(late) > SEEN * found.sigmas[at]:
+            yield channel.thrusters[0].name, late
+
+
+def _valve(tree: Node, name: str, late: float) -> Edits:
+    """The delays of the valve of a thruster, ``late`` s longer; one with the valve of the whole file gets its own."""
+    entries = tree.get("thrusters")
+    for index, entry in entries.children() if entries is not None else ():
+        named = entry.get("name")
+        if named is None or named.value != name:
+            continue
+        own = entry.get("valve")
+        known = own or tree.get("valve")
+        values = {} if known is None else {str(key): str(node.value) for key, node in known.children()}
+        for key in ("open_delay", "close_delay"):
+            before = None if known is None else known.get(key)
+            values[key] = _as_before(
+                before, (0.0 if before is None else parse(before.value, "time")) + late, "time", "s"
+            )
+        if own is None:
+            yield (
+                ("thrusters", index, "valve"),
+                "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}",
+            )
+        else:
+            yield from ((("thrusters", index, "valve", key), values[key]) for key in ("open_delay", "close_delay"))
+
+
+def _sensor(tree: Node, found: Fit) -> Edits:
+    """The bias of the accelerometer of the loop."""
+    at = found.index("bias_acceleration")
+    if at is not None and abs(found.values[at]) > SEEN * found.sigmas[at]:
+        given = tree.get("loop", "sensor", "bias")
+        yield ("loop", "sensor", "bias"), _as_before(given, float(found.values[at]), "acceleration", "m/s^2")
+
+
+def _off(found: Fit) -> Iterator[str]:
+    """What sensors are off that no key of the file holds; in words."""
+    seen = []
+    for one, value, sigma in zip(found.model.parameters, found.values, found.sigmas, strict=True):
+        kind, _, which = one.name.partition("_")
+        if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
+            what, unit = UNWRITTEN[kind]
+            seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
+    if seen:
+        yield f"not written, as the file has no key for it: {', '.join(seen)}"
 
 
 def _tolerance(one: Tolerance) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nutdamp import arguments
 from nutdamp.errors import BadRequest
@@ -16,12 +16,21 @@ from nutdamp.library.craft import Source, expected, read
 from nutdamp.planning import Plan
 from nutdamp.spacecraft import Spacecraft
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nutdamp.estimation.outlook import Outlook
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What telemetry tells of a spacecraft; ``core`` holds parameters, covariance, noise and residuals."""
+    """What telemetry tells of a spacecraft; ``core`` holds parameters, covariance, noise and residuals.
+
+    ``warnings`` are those of reading the record.
+    """
 
     core: fits.Fit
+    warnings: tuple[str, ...] = ()
 
     def estimates(self, at: float = 0.0) -> tuple[results.Estimate, ...]:
         """Estimates with their sigmas; the motion is that at ``at`` s."""
@@ -47,12 +56,24 @@ class Fitted:
         """The spacecraft of that file."""
         return read(self.text(at), "fitted")
 
-    def to_dict(self, at: float = 0.0) -> dict[str, Any]:
-        """What ``fit --json`` gives."""
+    def write(self, path: str | PathLike[str], at: float = 0.0) -> None:
+        """Write `text` to a file, as ``fit -o`` does; raises BadRequest or CannotWrite."""
+        from nutdamp.files.output import write_whole
+
+        write_whole(arguments.path("path", path), self.text(at))
+
+    def figure(self) -> Figure:
+        """Data, fit and residuals, as ``fit --plot`` draws them."""
+        from nutdamp.presentation.figures.fit import fit_figure
+
+        return fit_figure(self.core)
+
+    def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
+        """What ``fit --json`` gives; with an `outlook`, what ``fit --next --json`` gives."""
         from nutdamp.files.fit_json import fit_json
         from nutdamp.files.output import finite
 
-        return finite(fit_json(self.core, results.carried(self.core, at)))
+        return finite(fit_json(self.core, results.carried(self.core, at), ahead, self.warnings))
 
 
 def fit(
@@ -77,4 +98,4 @@ def fit(
     found = fits.fit(body, record)
     for remark in (*remarks, *doubts(found)):
         warnings.warn(remark, stacklevel=2)
-    return Fitted(found)
+    return Fitted(found, tuple(remarks))

@@ -15,7 +15,7 @@ from nutdamp.estimation.outlook import Outlook
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import SHARED, TOLD, Estimate, correlated, estimates
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees, sentence
+from nutdamp.presentation.text import MISSING, degrees, mass, sentence
 from nutdamp.presentation.verdicts import exact_percent, percent
 
 SHOWN = {
@@ -50,9 +50,8 @@ def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> Rendera
 
 def _prospects(ahead: Outlook) -> Table:
     """A row for each coast and probe pulse that was looked at."""
-    table = columns(
-        "coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", "nutation\n99.7 %, deg", "comply\n%"
-    )
+    nutation = f"nutation\n{exact_percent(ahead.probability)}, deg"
+    table = columns("coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", nutation, "comply\n%")
     for one in (*ahead.coasts, *ahead.probes):
         probe = f"{one.probe}, {one.on_time:.3g} s" if one.probe else MISSING
         thrust = f"{100.0 * one.thrust:.2g} %" if one.probe else MISSING
@@ -65,9 +64,10 @@ def _prospects(ahead: Outlook) -> Table:
 def advice(ahead: Outlook) -> Iterator[str]:
     """Whether more telemetry would pay: clauses."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
-    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in 99.7 % of cases"
+    level = exact_percent(ahead.probability)
+    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
     if ahead.enough:
-        met, level = percent(now.met or 0.0, ahead.probability), exact_percent(ahead.probability)
+        met = percent(now.met or 0.0, ahead.probability)
         yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
         return
     if longer is None:
@@ -78,6 +78,9 @@ def advice(ahead: Outlook) -> Iterator[str]:
     if probe is not None:
         pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
         yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
+        if probe.propellant is not None and ahead.propellant is not None:
+            spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
+            yield f"the probe pulse takes {spent}"
     elif ahead.probes:
         yield "no single probe pulse of a channel of the plan pays"
 
@@ -120,8 +123,11 @@ def _table(rows: tuple[Estimate, ...]) -> Table:
         digits = _digits(one)
         file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
         change = MISSING if one.change is None else _changed(one.change) if abs(one.change) > NOTHING else "0"
-        shown = one.value if abs(one.value) > NOTHING * one.sigma else 0.0
-        value, sigma = f"{shown * one.factor:.{digits}g}", f"{one.sigma * one.factor:.2g}"
+        shown = one.value if math.isinf(one.sigma) or abs(one.value) > NOTHING * one.sigma else 0.0
+        value, sigma = (
+            f"{shown * one.factor:.{digits}g}",
+            f"{one.sigma * one.factor:.2g}" if math.isfinite(one.sigma) else MISSING,
+        )
         table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
     return table
 
@@ -133,7 +139,7 @@ def _changed(change: float) -> str:
 
 def _digits(one: Estimate) -> int:
     """Significant digits of a value that its sigma leaves, and one more."""
-    if one.value == 0.0 or one.sigma <= 0.0:
+    if one.value == 0.0 or one.sigma <= 0.0 or math.isinf(one.sigma):
         return 4
     return min(max(2 + math.ceil(math.log10(max(abs(one.value) / one.sigma, 1.0))), 2), 9)
 

@@ -14,6 +14,7 @@ from synthetic import Array, motion
 import nutdamp
 from nutdamp.files.examples import example_text
 from nutdamp.flight import flown
+from nutdamp.physics.valve import Trapezoid
 
 
 def flight(folder: Path, seed: int, *, phase: float = 0.0) -> tuple[float, float, Array]:
@@ -145,10 +146,26 @@ def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Pa
     probes = [one for one in ahead["prospects"] if one["probe"] is not None]
     assert ahead["probe"] in {one["probe"] for one in probes}
     assert f"One probe pulse of {ahead['probe']}" in said
-    now = coasts[2]["nutation_99.7_deg"]
-    assert min(one["nutation_99.7_deg"] for one in probes) < 0.9 * now
+    now = coasts[2]["nutation_deg"]
+    assert min(one["nutation_deg"] for one in probes) < 0.9 * now
     # 2 % of thrust becomes what is left of it beside A, whose scale no record tells.
     assert all(0.0034 < one["sigma_thrust"] < 0.006 for one in probes)
+
+
+def test_the_nutation_shown_is_that_of_as_many_cases_as_the_file_requires(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 6)
+    limits = ("--set", "requirement.nutation=0.1 deg", "--set", "requirement.probability=90%")
+    done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", *limits, columns=100)
+    assert done.returncode == 0, done.stderr
+    said, ahead = " ".join(done.stdout.split()), json.loads((tmp_path / "f.json").read_text())["next"]
+    assert ahead["probability"] == 0.9
+    assert "in 90 % of cases" in said
+    assert "99.7 %" not in said
+    probes = [one for one in ahead["prospects"] if one["probe"] is not None]
+    assert all(0.0 < one["propellant_kg"] < ahead["propellant_kg"] for one in probes)
+    assert all(one["propellant_kg"] is None for one in ahead["prospects"] if one["probe"] is None)
+    if ahead["probe"] is not None:
+        assert "The probe pulse takes" in said
 
 
 def test_nothing_pays_where_as_many_cases_comply_as_must(run: Run, tmp_path: Path) -> None:
@@ -173,6 +190,9 @@ def test_the_library_gives_the_same_file(run: Run, tmp_path: Path) -> None:
     assert run("fit", "flight.csv", "-q", "-o", "now.yaml", "--at", "80s", "--json", "f.json").returncode == 0
     found = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
     assert found.text(80.0) == (tmp_path / "now.yaml").read_text()
+    found.write(tmp_path / "library.yaml", 80.0)
+    assert (tmp_path / "library.yaml").read_bytes() == (tmp_path / "now.yaml").read_bytes()
+    assert len(found.figure().axes) >= 3
     assert json.loads(json.dumps(found.to_dict(80.0))) == json.loads((tmp_path / "f.json").read_text())
     assert found.spacecraft(80.0).omega0 == pytest.approx(nutdamp.load(tmp_path / "now.yaml").omega0, rel=1e-12)
     with pytest.raises(nutdamp.errors.BadRequest, match="no field replaced"):
@@ -217,6 +237,46 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     assert known.thrust["-M1"].size == 0.02  # did not fire: stays as it was
     pairs = {frozenset(one[:2]): one[2] for one in known.correlation}
     assert pairs[frozenset(("thrust +M1", "A"))] > 0.99
+
+
+def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n8,0.3,+M1\n16,0.3,-M2\n", encoding="utf-8")
+    late = "valve={open_delay: 40 ms, close_delay: 40 ms}"
+    made = run(
+        "simulate", "-q", "--schedule", "probe.csv", "--flown", "--until", "24s", "--samples", "161", "--csv", "t.csv",
+        "--set", late,
+    )  # fmt: skip
+    assert made.returncode in (0, 4), made.stderr
+    lines = [line.split(",")[:4] for line in (tmp_path / "t.csv").read_text().splitlines()]
+    (tmp_path / "gyro.csv").write_text("\n".join(",".join(row) for row in lines) + "\n", encoding="utf-8")
+    done = run("fit", "gyro.csv", "--schedule", "probe.csv", "-o", "now.yaml", "--json", "f.json")
+    assert done.returncode == 0, done.stderr
+    assert "is not written" not in done.stderr
+    for name in ("+M1", "-M2"):
+        valve = next(one for one in nutdamp.load(tmp_path / "now.yaml").channels if one.name == name).valve
+        assert isinstance(valve, Trapezoid)
+        assert (valve.open_delay, valve.close_delay) == pytest.approx((0.04, 0.04), abs=1e-5)
+    done = run("fit", "gyro.csv", "now.yaml", "-q", "--schedule", "probe.csv", "--json", "f.json")
+    assert done.returncode == 0, done.stderr
+    rows = {one["quantity"]: one for one in json.loads((tmp_path / "f.json").read_text())["estimates"]}
+    assert max(abs(rows[f"delay {name}"]["value"]) for name in ("+M1", "-M2")) < 0.01  # ms
+
+
+def test_remarks_are_in_the_json_and_biases_without_a_key_are_named(run: Run, tmp_path: Path) -> None:
+    flight(tmp_path, 11)
+    lines = (tmp_path / "flight.csv").read_text().splitlines()
+    moved = [f"{t},{float(x) + 0.05:.5f},{y},{z}" for t, x, y, z in (line.split(",") for line in lines[1:])]
+    (tmp_path / "biased.csv").write_text("\n".join([lines[0], *moved]) + "\n", encoding="utf-8")
+    done = run("fit", "biased.csv", "--schedule", "late.csv", "--json", "f.json")
+    assert done.returncode == 1
+    (tmp_path / "late.csv").write_text("start_s,on_time_s,channel\n99,0.3,+M1\n", encoding="utf-8")
+    done = run("fit", "biased.csv", "--schedule", "late.csv", "--json", "f.json", columns=200)
+    assert done.returncode == 0, done.stderr
+    said = json.loads((tmp_path / "f.json").read_text())["notes"]
+    assert any(one.startswith("the whole schedule is outside the record") for one in said)
+    assert any(one.startswith("a coast fixes C/A only") for one in said)
+    flat = " ".join((done.stdout + done.stderr).split()).lower()
+    assert all(" ".join(one.split()).lower() in flat for one in said)
 
 
 def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:

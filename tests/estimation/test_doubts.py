@@ -75,6 +75,15 @@ def test_a_pulse_that_no_schedule_names_is_found_and_nothing_is_estimated(thrust
         fit(nutdamp.example(), pushed(thrust))
 
 
+def test_of_a_pulse_that_hides_in_the_noise_the_time_and_what_helps_are_said() -> None:
+    found = fit(nutdamp.example(), pushed(0.06))
+    said = next(one for one in doubts(found) if "not white" in one)
+    time = float(said.split("at about ")[1].split()[0])
+    assert abs(time - 20.25) < 1.5
+    assert "give the pulses fired with --schedule, or end the record before it" in said
+    assert not any("white" in one for one in doubts(fit(nutdamp.example(), pushed(0.0))))
+
+
 def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> None:
     found = fit(nutdamp.example(), record(np.linspace(0.0, 60.0, 601), 80.4, spin=-SPIN))
     nutation = next(one for one in estimates(found, 0.0) if one.key == "nutation")

@@ -12,10 +12,11 @@ from synthetic import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
+from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit, fit
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, Record, quantisation
-from nutdamp.estimation.results import carried
+from nutdamp.estimation.results import carried, estimates
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Spacecraft
@@ -96,6 +97,35 @@ def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin
     state = carried(found, float(times[-1])).state
     axis = attitude.rotate(state.quaternion, np.array([0.0, 0.0, math.copysign(1.0, spin)]))
     assert reference.angle(axis, truth) < 5e-5
+
+
+def test_the_phase_of_the_axis_alone_is_that_of_the_file() -> None:
+    body, times = nutdamp.load(FILE), np.linspace(0.05, 60.0, 300)
+    seen = axes(flown(times, body), 1.0, np.random.default_rng(1))
+    found = fit(body, Record(times, seen))
+    row = next(one for one in estimates(found, 0.0) if one.key == "phase")
+    assert (row.source, row.sigma) == ("file", math.inf)
+    assert any("the axis alone does not show how the body is turned" in one for one in doubts(found))
+    beside = fit(body, Record(times, seen | gyros(flown(times, body), np.random.default_rng(2))))
+    row = next(one for one in estimates(beside, 0.0) if one.key == "phase")
+    assert row.source == "data"
+    assert row.sigma < math.radians(0.5)
+
+
+def test_an_accelerometer_feels_dissipation() -> None:
+    """By differences of the rates that DOP853 flies: dω/dt has the part that dissipation gives it."""
+    body = nutdamp.load(FILE, set={"loop": ACCELEROMETER, "state.nutation": "12 deg"})
+    times, step, arm = np.linspace(0.05, 60.0, 300), 1e-5, np.array([0.8, 0.0, 0.0])
+    near = np.sort(np.concatenate([times - step, times + step]))
+    around = motion((TRUE[0], TRUE[0], TRUE[1]), body.omega0, near, 0.003)
+    rates, change = 0.5 * (around[1::2] + around[::2]), (around[1::2] - around[::2]) / (2.0 * step)
+    felt = (np.cross(change, arm) + np.cross(rates, np.cross(rates, arm)))[:, 2]
+    model = Model(body, Record(times, {ACCELERATION: felt}))
+    start = motion((TRUE[0], TRUE[0], TRUE[1]), body.omega0, times[:1], 0.003)[0]
+    truth = {"A": TRUE[0], "C/A": TRUE[1] / TRUE[0], "growth": 0.003}
+    truth |= {f"omega_{at + 1}": float(one) for at, one in enumerate(start)}
+    off = np.abs(model.predicted(truth) - felt).max()
+    assert off < 1e-5 * np.abs(felt).max()
 
 
 def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> None:
@@ -232,7 +262,10 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
 
 
 def test_sun_pulses_alone_are_not_taken_for_a_nutation() -> None:
-    with pytest.raises(Infeasible, match=r"no nutation is seen in sun_pulse alone .*the axis or an acceleration would"):
+    with pytest.raises(
+        Infeasible,
+        match=r"no nutation is seen in sun_pulse alone: .*spin, 171.88.* deg/s.*or an acceleration beside them would",
+    ):
         fit(nutdamp.load(FILE), Record(np.empty(0), {}, 2.0944 * np.arange(1.0, 60.0)))
 
 
