@@ -358,7 +358,7 @@ def test_long_lines_are_short_in_a_page_and_stay_in_place() -> None:
             found.append(here)
     assert np.abs(np.array(found) - places).max() <= 0.0501
     assert [name for name in brief if name.isalpha()] == ["M", "l", "M", "l"]
-    assert _brief("M 0 0 \nL 1.23456 3.5 \nz") == "M 0 0 \nL 1.23 3.5 \nz"
+    assert _brief("M 0 0 \nL 1.23456 3.5 \nz") == "M 0 0L 1.23 3.5z"
 
 
 def test_inline_svg_stands_in_any_page() -> None:

@@ -392,3 +392,18 @@ def test_odd_flights_are_drawn_whole(case: str) -> None:
     """All words inside the sheet, and none over another in the same panel."""
     for name in NAMES:
         check_layout(drawn(name, case))
+
+
+@pytest.mark.parametrize(("required", "beside"), [(0.02, False), (0.12, True)])
+def test_a_required_nutation_above_the_angles_is_written_there(required: float, beside: bool) -> None:
+    body = spinner(channels=cross(20.0), requirement=Requirement(required))  # 5° of nutation, 0.087 rad
+    figure = figures.flight_figure("history", *figures.shown(planning.plan(body, "two-pulse")))
+    check_layout(figure)
+    cones, decay = figure.axes[2:]
+    said = f"required θ {math.degrees(required):.4g}°, outside the view"
+    assert (cones.get_title(loc="right") == said) is beside
+    for axes, drawn in ((cones, not beside), (decay, True)):
+        levels = [float(np.asarray(one.get_ydata())[0]) for one in axes.lines if one.get_label() == "required θ"]
+        assert levels == pytest.approx([math.degrees(required)] * drawn)
+        assert all(axes.get_ylim()[0] < level < 0.99 * axes.get_ylim()[1] for level in levels)
+    assert "required θ" in {text.get_text() for text in figure.legends[0].get_texts()}

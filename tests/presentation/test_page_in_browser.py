@@ -68,13 +68,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def page(name: str) -> Path:
         target = folder / f"{name}.html"
         if not target.exists():
-            source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == name.rstrip("+")), None)
+            stem = name.rstrip("+").removesuffix(f" {DISPERSED}")
+            source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == stem), None)
             source = source or example_text()
             commanded = (*CLASSIC, *COMMANDED) if name.endswith("+") else CLASSIC
             compared = compare(read_spacecraft(source, f"{name}.yaml"), commanded)
             repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
             flown = {}
-            if name == DISPERSED:
+            if name.endswith(DISPERSED):
                 assert compared.recommended is not None
                 results = Results(study_of(compared.spacecraft, compared.recommended.pulses, flown=True), 500)
                 flown[compared.recommended.scheme] = run(results, threads=1)
@@ -110,6 +111,16 @@ def test_it_fits_phones_screens_and_paper(tab: Browse, name: str) -> None:
     with tab(name, round(A4)) as page:
         page.emulate_media(media="print")
         assert page.evaluate(BEYOND, "table, svg, pre") == []
+
+
+def test_no_table_is_cut_on_a_screen(tab: Browse) -> None:
+    """This one has the most columns: an attitude, a thruster that changes the spin, and dispersed cases."""
+    with tab(f"single-thruster {DISPERSED}", 1280) as page:
+        assert (
+            page.evaluate("""[...document.querySelectorAll(".wide")].filter((one) => one.checkVisibility()
+          && one.scrollWidth > one.clientWidth).map((one) => one.innerText.slice(0, 80))""")
+            == []
+        )
 
 
 def test_paper_has_every_sentence(tab: Browse) -> None:

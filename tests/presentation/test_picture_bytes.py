@@ -8,11 +8,13 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 from builders import cross, spinner
 
 from nutdamp import planning
 from nutdamp.presentation import figures
+from nutdamp.schedule import Schedule, channel_pulse
 
 
 def test_svg_has_its_text_as_text() -> None:
@@ -25,6 +27,16 @@ def test_svg_has_its_text_as_text() -> None:
         assert any(word.startswith("1: ") for word in words)
         assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
     assert not re.search(r'\sd="[^"]*\.\d{3}', shown)
+
+
+def test_a_page_has_the_bands_of_all_pulses_of_a_panel_as_one_path() -> None:
+    body = spinner(channels=cross(20.0))
+    fired = Schedule(tuple(channel_pulse(body.channels[n % 4], 0.5 + 0.7 * n, 0.1) for n in range(30)))
+    drawn = figures.flight_figure("history", *figures.shown(planning.Plan(body, "kicks", fired)))
+    content = figures.svg(drawn)
+    assert ElementTree.fromstring(content).tag.endswith("svg")
+    outlines = re.findall(r'<path d="([^"]*)"[^>]*fill-opacity: 0\.25', content)
+    assert sorted(outline.count("M") for outline in outlines) == [1, 30, 30, 30, 30]  # the first is in the legend
 
 
 def digest() -> str:

@@ -8,10 +8,11 @@ import numpy as np
 
 from nutdamp.certificate import Certificate
 from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LINES = tuple((colour, line) for line in ("-", "--", ":") for colour in (MOTION, PULSE, MOMENTUM, GREY))
@@ -20,35 +21,52 @@ LINES = tuple((colour, line) for line in ("-", "--", ":") for colour in (MOTION,
 MOST = len(LINES)
 """Channels that are drawn, those that come highest."""
 
+CLOSER = 0.5
+"""Share of the horizon before which a plan ends that is drawn a second time, until its end."""
+
 
 @style.styled
 def certificate_figure(found: Certificate) -> Figure:
-    """q over time in the windows in which pulses may be on; marks show where program and plan fire."""
-    figure = style.sheet(7.4, 4.2)
-    axes = figure.subplots()
+    """q over time in the windows in which pulses may be on; marks show where program and plan fire.
+
+    Where the plan ends early in the horizon, the time until then is drawn again below.
+    """
+    end, last = found.plan.pulses.end, float(found.moments()[-1][-1])
+    closer = 0.0 < end < CLOSER * last
+    figure = style.sheet(7.4, 6.4 if closer else 4.2)
+    panels = figure.subplots(2 if closer else 1, 1, squeeze=False)[:, 0]
+    for axes in panels:
+        _draw(axes, found, 1.0 if axes is panels[-1] and closer else last / found.spacecraft.body_period)
+    if closer:
+        panels[0].set_title("until the horizon")
+        panels[1].set(title="until the last pulse of the plan", xlim=(-0.03 * end, 1.06 * end))
+    panels[-1].set_xlabel("time, s")
+    figure.supylabel("q: worth of a second over what it costs", fontsize=style.TICK_SIZE)
+    some = f" ({MOST} of {len(found.program.channels)} channels)" if len(found.program.channels) > MOST else ""
+    heading(figure, found.spacecraft, f"primer curve{some}; no less than {found.proof.bound:.6g} {found.problem.unit}")
+    legend(figure, [panels[-1]])
+    return figure
+
+
+def _draw(axes: Axes, found: Certificate, turns: float) -> None:
+    """Curves and marks; lines are thin where so many ``turns`` lie side by side."""
     spans = found.moments()
     curves = [found.primer(times) for times in spans]
     channels = found.program.channels
     highest = np.max([curve.max(axis=0) for curve in curves], axis=0)
     drawn = sorted(np.argsort(-highest, kind="stable")[:MOST].tolist())
+    width = min(style.thickness(curves[0], turns), 1.1)
     for (colour, line), index in zip(LINES, drawn, strict=False):
         name: str | None = channels[index].name
         for times, curve in zip(spans, curves, strict=True):
-            axes.plot(times, curve[:, index], color=colour, linestyle=line, linewidth=1.1, label=name)
+            axes.plot(times, curve[:, index], color=colour, linestyle=line, linewidth=width, label=name)
             name = None
     for label, fired, look in _firings(found):
         places = [(t, found.primer(np.array([t]))[0, index]) for t, index in fired]
         axes.plot(*np.array(places).reshape(-1, 2).T, look, color=INK, markersize=4.5, label=label, fillstyle="none")
     axes.axhline(1.0, color=INK, linewidth=0.9, linestyle="-", label="what it costs")
-    some = f" ({len(drawn)} of {len(channels)} channels)" if len(drawn) < len(channels) else ""
-    axes.set(xlabel="time, s", ylabel="q: worth of a second over what it costs")
-    figure.suptitle(
-        f"{found.spacecraft.name}: primer curve{some}; no less than {found.proof.bound:.6g} {found.problem.unit}"
-    )
     axes.set_ylim(min(-1.1, float(min(curve.min() for curve in curves)) - 0.1), max(1.25, float(highest.max()) + 0.2))
     axes.grid()
-    legend(figure, [axes])
-    return figure
 
 
 def _firings(found: Certificate) -> list[tuple[str, list[tuple[float, int]], str]]:

@@ -61,7 +61,7 @@ def _brief(path: str) -> str:
     """
     parts = [(part[0], part[1:].split()) for part in re.findall(r"[A-Za-z][^A-Za-z]*", path)]
     if len(parts) < LONG or {letter for letter, _ in parts} - {"M", "L"}:
-        return re.sub(r"(\.\d\d)\d+", r"\1", path)
+        return re.sub(r"(\.\d\d)\d+", r"\1", path.replace(" \n", "").rstrip())
     made, (x, y), before = "", (0, 0), ""
     for letter, numbers in parts:
         to = round(10.0 * float(numbers[0])), round(10.0 * float(numbers[1]))
@@ -71,6 +71,12 @@ def _brief(path: str) -> str:
         made += name + across + (along if along[0] == "-" else " " + along)
         (x, y), before = to, letter
     return made
+
+
+def _joined(alike: re.Match[str]) -> str:
+    """Neighbouring paths of one look, each in a group of its own, as one path."""
+    paths = "".join(re.findall(r' d="([^"]*)"', alike[0]))
+    return f'<path d="{paths}"{alike[1]}/>'
 
 
 @style.styled
@@ -96,5 +102,6 @@ def svg(figure: Figure) -> str:
     # Roles of labels end up as ids, several times over: only ids that something refers to stay.
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
     text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)
+    text = re.sub(r'<path d="[^"]*"([^>]*)/>(?:</g><g><path d="[^"]*"\1/>)+', _joined, text)
     mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)

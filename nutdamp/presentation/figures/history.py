@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,6 +37,9 @@ EDGE = 0.012
 FULL, PALE = 0.9, 0.35
 """Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
 
+NOTE: dict[str, Any] = {"fontsize": style.SMALL, "fontweight": "normal"}
+"""Look of a remark above a panel."""
+
 BAR = 0.46
 """Height of a bar; the distance between two rows is 1."""
 
@@ -59,7 +62,7 @@ def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
     decay_history(decay, flight, track)
     for axes in (spin, cones, decay):
         axes.set_xlabel(TIME)
-    legend(figure, [rates, cones])
+    legend(figure, [rates, cones, decay])
     return figure
 
 
@@ -99,35 +102,43 @@ def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, angles[:, 1], color=MOTION, linestyle=(0, (5, 1.5)), label="body cone μ")
     axes.plot(track.t, angles[:, 2], color=MOMENTUM, linestyle=(0, (5, 1.5, 1, 1.5)), label="space cone λ")
     _finish(axes, flight, track, np.append(angles.ravel(), 0.0), "angles, deg")
-    _required(axes, flight)
+    most, top = required_nutation(flight), axes.get_ylim()[1]
+    if most is not None and most > top:
+        axes.set_title(f"required θ {most:.4g}°, outside the view", loc="right", **NOTE)
+    else:
+        _required(axes, most)
     axes.axhline(0.0, color=GREY, linewidth=0.5)
 
 
 def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Nutation angle θ on a log axis; what it ends with is written above where the axis does not reach so far."""
     angles = np.degrees(track.nutation)
-    most, required = max(float(angles.max()), geometry.LEAST), _required(axes, flight) or math.inf
+    limit = required_nutation(flight)
+    _required(axes, limit)
+    most, required = max(float(angles.max()), geometry.LEAST), math.inf if limit is None else limit
     least = min(most * 10.0**-DECADES, 0.1 * required)
     low = max(0.5 * min(float(angles.min()), required, 0.1 * most), least)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=INK)
     _finish(axes, flight, track, angles, "nutation θ, deg (log)")
     axes.set_yscale("log")
-    axes.set_ylim(low, 2.0 * most)
+    axes.set_ylim(low, 2.0 * (most if limit is None else max(most, limit)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("")
     if angles[-1] <= low:
         note = f"ends at {degrees(float(track.nutation[-1]))}"
-        axes.set_title(note, loc="right", fontsize=style.SMALL, fontweight="normal")
+        axes.set_title(note, loc="right", **NOTE)
 
 
-def _required(axes: Axes, flight: Flight) -> float | None:
-    """A line at the nutation that may be left, which is returned in degrees; none where none is required."""
+def required_nutation(flight: Flight) -> float | None:
+    """The nutation that may be left, deg; None where none is required."""
     requested = flight.spacecraft.requirement
-    if requested is None or requested.nutation is None:
-        return None
-    most = math.degrees(requested.nutation)
-    axes.axhline(most, color=GREY, linewidth=0.9, linestyle=":", label="required θ")
-    return most
+    return None if requested is None or requested.nutation is None else math.degrees(requested.nutation)
+
+
+def _required(axes: Axes, most: float | None) -> None:
+    """A line at the nutation that may be left, deg."""
+    if most is not None:
+        axes.axhline(most, color=GREY, linewidth=0.9, linestyle=":", label="required θ")
 
 
 def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) -> None:

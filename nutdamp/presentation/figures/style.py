@@ -46,6 +46,9 @@ LINE, THIN, LEADER = 1.3, 0.7, 0.5
 STAR = 13.0
 """Points across of the star of what is recommended."""
 
+CROSS: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
+"""Look of an x over the mark of what falls short of the requirement."""
+
 SMALL, TICK_SIZE = 7.5, 8
 """Sizes of labels inside a panel and of those of its ticks, points."""
 

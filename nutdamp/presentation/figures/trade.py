@@ -130,8 +130,7 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
             axes.plot(*np.transpose(alone), mark, color=colour, markersize=5, zorder=3.5)
     failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(found) if fails(point)]
     if failing:
-        cross: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
-        axes.plot(*np.transpose(failing), "x", label="does not meet the requirement", **cross)
+        axes.plot(*np.transpose(failing), "x", label="does not meet the requirement", **style.CROSS)
     if covered:
         ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)
