@@ -407,3 +407,18 @@ def test_a_required_nutation_above_the_angles_is_written_there(required: float, 
         assert levels == pytest.approx([math.degrees(required)] * drawn)
         assert all(axes.get_ylim()[0] < level < 0.99 * axes.get_ylim()[1] for level in levels)
     assert "required θ" in {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 5.0, 355.0, 8.0])
+def test_no_label_lies_under_the_star_of_the_target(azimuth: float) -> None:
+    body = aimed(spinner(channels=cross(20.0)), 6.0, azimuth)  # 5° of nutation: it is beside the spin axis at t = 0
+    axes = figures.flight_figure("motion", *figures.shown(planning.Plan(body, "kicks", kicks(body, 5, 0.9, 0.2)))).axes[
+        1
+    ]
+    (star,) = (one for one in axes.lines if one.get_label() == "target")
+    middle = axes.transData.transform(star.get_xydata())[0]
+    radius = 0.45 * star.get_markersize() * axes.figure.dpi / 72.0
+    for note in axes.texts:
+        box = note.get_window_extent()
+        nearest = np.clip(middle, [box.x0, box.y0], [box.x1, box.y1])
+        assert np.hypot(*(nearest - middle)) > radius, note.get_text()

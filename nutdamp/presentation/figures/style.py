@@ -32,8 +32,11 @@ TURNED = "#007a58"
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
 """Text and ω; marks; the circles of the sphere."""
 
+STAR = 13.0
+"""Points across of the stars of the target and of what is recommended."""
+
 TARGET: dict[str, Any] = {
-    "marker": "*", "color": INK, "markersize": 12, "markerfacecolor": "none", "linestyle": "", "zorder": 4
+    "marker": "*", "color": INK, "markersize": STAR, "markerfacecolor": "none", "linestyle": "", "zorder": 4
 }  # fmt: skip
 """Mark of the target axis: larger than the marks of what ends there, and over them."""
 
@@ -42,9 +45,6 @@ PAPER = "#fefefe"
 
 LINE, THIN, LEADER = 1.3, 0.7, 0.5
 """Line widths, points; the last is that from a label to what it is of."""
-
-STAR = 13.0
-"""Points across of the star of what is recommended."""
 
 CROSS: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
 """Look of an x over the mark of what falls short of the requirement."""
