@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -151,6 +152,20 @@ def test_the_cloud_says_how_many_of_how_many_cases_it_shows() -> None:
     for count, words in ((3000, "2,000 of the 3,000 cases"), (500, "the 500 cases")):
         figure = figures.dispersion_figure("momentum", study("shift", count), scheme="two-pulse")
         assert words in {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+@pytest.mark.parametrize("size", [0.0005, 0.001])
+def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
+    thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
+    body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
+    found = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False), 500))
+    figure = figures.dispersion_figure("momentum", found, scheme="two-pulse")
+    check_layout(figure)
+    ticks = figure.axes[0].get_xticklabels()
+    boxes = sorted((box for text, box in texts(figure) if text in ticks), key=lambda box: float(box[0]))
+    assert len(boxes) >= 3
+    gaps = [float(right[0] - left[2]) * 72.0 / figure.dpi for left, right in pairwise(boxes)]
+    assert min(gaps) > 4.0
 
 
 @pytest.mark.parametrize(("which", "output"), [("shift", "momentum_shift"), ("target", "axis_error")])

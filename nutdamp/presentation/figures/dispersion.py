@@ -257,6 +257,7 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
         axes.plot(*shown[-1].T, color=PULSE, linewidth=1.6, label=f"required: {limit:.4g}°")
     axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
     style.square(axes, np.vstack(shown), margin=0.08)
+    axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
     axes.set(xlabel=sky.x, ylabel=sky.y, title=title)
     legend(figure, [axes], 2)
 
