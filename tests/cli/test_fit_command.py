@@ -372,3 +372,4 @@ def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_
     picture = (tmp_path / "f.svg").read_text()
     for text in (f"{example.name}: telemetry and fit", "only rounding:", "no autocorrelation"):
         assert text in picture
+    assert picture.count(">time, s<") == 1  # of the data; the panels of residuals are words, which have no scale

@@ -38,7 +38,6 @@ def fit_figure(found: Fit) -> Figure:
     grid = figure.subplots(count, 3, squeeze=False, width_ratios=[1.25, 1.25, 0.9])
     for index, (name, row) in enumerate(zip(model.signals, grid, strict=True)):
         unit, factor = in_shown(name)
-        last = index == count - 1
         _data(row[0], found, index, factor, f"{name}, {unit}")
         _residuals(row[1], found, index, factor, f"residual, {unit}")
         unseen = _no_correlation(found, index)
@@ -46,9 +45,11 @@ def fit_figure(found: Fit) -> Figure:
             style.words(row[2], unseen)
         else:
             _white(row[2], found, index)
-        for axes, text in zip(row, ("time, s", "time, s", "" if unseen else "lag, samples"), strict=True):
-            axes.set_xlabel(text if last else "")
+        for axes in row:
             axes.grid()
+    for column, text in zip(grid.T, ("time, s", "time, s", "lag, samples"), strict=True):
+        for axes in [axes for axes in column if axes.has_data()][-1:]:  # words have no scale
+            axes.set_xlabel(text)
     legend(figure, list(grid.ravel()))
     heading(figure, model.spacecraft, "telemetry and fit, what is left, and whether that is white")
     return figure
