@@ -38,16 +38,17 @@ settings.load_profile("project")
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """What the marks ``few`` and ``orekit`` say.
+    """What the marks ``few``, ``orekit`` and ``browser`` say.
 
-    Orekit's Java machine and the solver do not share a process well: its tests run when they are requested.
+    Orekit's Java machine and the solver do not share a process well, and a browser takes as long as a sixth of all
+    other tests: these run when they are requested.
     """
     mark_few(items)
-    if "orekit" in config.getoption("markexpr"):
-        return
-    for item in items:
-        if "orekit" in item.keywords:
-            item.add_marker(pytest.mark.skip(reason="NOT CHECKED against Orekit here: pytest -m orekit"))
+    for mark, what in (("orekit", "against Orekit"), ("browser", "in a browser")):
+        if mark not in config.getoption("markexpr"):
+            for item in items:
+                if mark in item.keywords:
+                    item.add_marker(pytest.mark.skip(reason=f"NOT CHECKED {what} here: pytest -m {mark}"))
 
 
 @pytest.fixture(autouse=True, scope="module")

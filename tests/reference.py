@@ -131,18 +131,32 @@ def through_valve(
     ]
 
 
+def _turning(rotation: Sequence[float], p: float, q: float, r: float) -> list[float]:
+    """R [ω]× row by row, (9,) 1/s."""
+    a, b, c, d, e, f, g, h, i = rotation
+    return [
+        b * r - c * q, c * p - a * r, a * q - b * p,
+        e * r - f * q, f * p - d * r, d * q - e * p,
+        h * r - i * q, i * p - g * r, g * q - h * p,
+    ]  # fmt: skip
+
+
 def coast(
     moments: Sequence[float], motion: Motion, torque: Array, times: Array, growing: Array | None = None
 ) -> list[Motion]:
     """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so many (3,) N m/s."""
-    moments_ = np.asarray(moments, dtype=float)
-    rate = np.zeros(3) if growing is None else growing
+    A, B, C = (float(one) for one in moments)
+    m1, m2, m3 = (float(one) for one in torque)
+    g1, g2, g3 = (0.0, 0.0, 0.0) if growing is None else (float(one) for one in growing)
 
-    def slope(t: float, y: Array) -> Array:
-        w, rotation = y[:3], y[3:].reshape(3, 3)
-        cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        acceleration = (torque + rate * t - cross @ (moments_ * w)) / moments_
-        return np.concatenate([acceleration, (rotation @ cross).ravel()])
+    def slope(t: float, y: Array) -> list[float]:
+        p, q, r, *rotation = y.tolist()  # component by component: quicker than small arrays
+        return [
+            (m1 + g1 * t - (C - B) * q * r) / A,
+            (m2 + g2 * t - (A - C) * r * p) / B,
+            (m3 + g3 * t - (B - A) * p * q) / C,
+            *_turning(rotation, p, q, r),
+        ]
 
     y0 = np.concatenate([motion.rates, motion.rotation.ravel()])
     scale = max(float(np.linalg.norm(motion.rates)), 1e-3)
@@ -161,15 +175,18 @@ def coast(
 
 def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Array, growth: float) -> list[Motion]:
     """`coast` of a body in which energy dissipation lets a small nutation grow at the rate ``growth`` κ, 1/s."""
-    moments_ = np.asarray(moments, dtype=float)
+    A, B, C = (float(one) for one in moments)
+    x, y_, z = (float(one) for one in torque)
 
-    def slope(_: float, y: Array) -> Array:
-        h, rotation = y[:3], y[3:].reshape(3, 3)
-        w = rotation.T @ h / moments_
-        axis, towards = rotation[:, 2], h / np.linalg.norm(h)
-        w = w + growth * (towards @ axis) * (rotation.T @ np.cross(towards, axis))
-        cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        return np.concatenate([rotation @ torque, (rotation @ cross).ravel()])
+    def slope(_: float, y: Array) -> list[float]:
+        hx, hy, hz, a, b, c, d, e, f, g, h, i = y.tolist()
+        size = math.sqrt(hx * hx + hy * hy + hz * hz)
+        u1, u2, u3 = ((a * hx + d * hy + g * hz), (b * hx + e * hy + h * hz), (c * hx + f * hy + i * hz))
+        # s = κ (u·e3) (u × e3), u the direction of H in the body.
+        sinks = growth * u3 / (size * size)
+        p, q, r = u1 / A + sinks * u2, u2 / B - sinks * u1, u3 / C
+        rates = [a * x + b * y_ + c * z, d * x + e * y_ + f * z, g * x + h * y_ + i * z]
+        return [*rates, *_turning([a, b, c, d, e, f, g, h, i], p, q, r)]
 
     h0 = momentum(moments, motion)
     y0 = np.concatenate([h0, motion.rotation.ravel()])
@@ -177,7 +194,7 @@ def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Arra
     solution = solve_ivp(slope, (0.0, float(times[-1])), y0, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * atol)
     assert solution.success
     found = [(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
-    return [Motion(rotation.T @ h / moments_, rotation) for h, rotation in found]
+    return [Motion(rotation.T @ h / np.asarray(moments), rotation) for h, rotation in found]
 
 
 def euler_angles(A: float, C: float, size: float, growth: float, start: Array, times: Array) -> Array:

@@ -198,8 +198,9 @@ def enters(seed: int) -> bool | None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seeds", some([(9, 10), *(range(first, first + 10) for first in range(0, 200, 10))], always=1))
+@pytest.mark.parametrize("seeds", [range(first, first + 10) for first in range(0, 160, 10)], ids=str)
 def test_in_random_cases_the_axis_never_enters_a_cone(seeds: Sequence[int]) -> None:
+    """160 cases; with the 40 below they are 200."""
     found = [enters(seed) for seed in seeds]
     assert True not in found
     assert found.count(None) <= 0.3 * len(found)
@@ -239,9 +240,8 @@ def test_nor_does_it_by_other_schemes_that_turn_it(scheme: str, first: int) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 4])
-def test_nor_by_command_blocks(seed: int) -> None:
-    assert check_never_within(in_sunlight(seed), "command-block")
+def test_nor_by_command_blocks() -> None:
+    assert check_never_within(in_sunlight(0), "command-block")
 
 
 def check_never_within(body: Spacecraft, scheme: str) -> bool:

@@ -130,6 +130,7 @@ def test_a_tampered_file_proves_nothing(name: str, what: str) -> None:
         check(json.dumps(content))
 
 
+@pytest.mark.slow
 def test_firing_in_the_dark_would_be_worth_more() -> None:
     """The prices know of the windows: where they end, q goes above the price of a channel that acts at once."""
     limits = Limits(earliest=0.0, horizon=2.0)

@@ -22,7 +22,7 @@ from process import within
 
 from nutdamp import schemes
 
-SEEDS, BLOCKS, QUICK = 2000, 80, 20
+SEEDS, BLOCKS, QUICK = 600, 24, 20
 """Spacecraft that run with the slow tests, in how many blocks, and how many more that run always."""
 STATUSES = (0, 2, 3, 4)
 SCHEMES = ("one-pulse", "two-pulse", "four-pulse", "half-cone", "rhumb-line")
@@ -245,12 +245,12 @@ def test_every_command_meets_every_scheme() -> None:
     for seed in range(SEEDS):
         for arguments in commands(seed, spacecraft(np.random.default_rng(seed))):
             met.update((arguments[0], part) for part in arguments if part in (*SCHEMES, "optimal"))
-    for name, least in {"plan": 80, "simulate": 10, "disperse": 8, "export": 6, "verify": 6, "report": 3}.items():
+    for name, least in {"plan": 24, "simulate": 3, "disperse": 2, "export": 2, "verify": 2, "report": 1}.items():
         for scheme in (*SCHEMES, "optimal"):
             assert met[name, scheme] >= least, (name, scheme)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(BLOCKS))
-def test_thousands_of_spacecraft_get_results_or_reasons(block: int, tmp_path: Path, planner: Planner) -> None:
+def test_hundreds_of_spacecraft_get_results_or_reasons(block: int, tmp_path: Path, planner: Planner) -> None:
     assert [one for seed in range(block, SEEDS, BLOCKS) for one in faults(seed, tmp_path, planner)] == []

@@ -176,6 +176,7 @@ def test_a_report_of_replaced_fields_names_no_file(craft: nutdamp.Spacecraft, tm
     assert f"nutdamp.report(spacecraft, {str(tmp_path / 'own.md')!r}, ['two-pulse'])" in text
 
 
+@pytest.mark.slow
 def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
     craft = nutdamp.load(dispersed / "spacecraft.yaml")
     options = nutdamp.Options(on_time=0.2)

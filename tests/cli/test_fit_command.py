@@ -130,6 +130,7 @@ def test_settings_become_part_of_the_file(run: Run, tmp_path: Path) -> None:
     assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -12.0, 0.0])
 
 
+@pytest.mark.slow
 def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 6)
     tight = "requirement.nutation=0.1 deg"
@@ -168,6 +169,7 @@ def test_the_nutation_shown_is_that_of_as_many_cases_as_the_file_requires(run: R
         assert "The probe pulse takes" in said
 
 
+@pytest.mark.slow
 def test_nothing_pays_where_as_many_cases_comply_as_must(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 6)
     done = run("fit", "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json")
@@ -178,6 +180,7 @@ def test_nothing_pays_where_as_many_cases_comply_as_must(run: Run, tmp_path: Pat
     assert (ahead["longer_coast_s"], ahead["probe"]) == (None, None)
 
 
+@pytest.mark.slow
 def test_the_prospect_of_the_record_as_it_is_agrees_with_its_fit(tmp_path: Path) -> None:
     flight(tmp_path, 7)
     found = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
@@ -279,6 +282,7 @@ def test_remarks_are_in_the_json_and_biases_without_a_key_are_named(run: Run, tm
     assert all(" ".join(one.split()).lower() in flat for one in said)
 
 
+@pytest.mark.slow
 def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
     """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the record."""
     (tmp_path / "fired.csv").write_text("start_s,on_time_s,channel\n20,0.5,+M2\n", encoding="utf-8")
@@ -312,6 +316,7 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
     assert thrust.thrust["+M1"].size == 0.02
 
 
+@pytest.mark.slow
 def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 10)
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n20,0.3,+M1\n", encoding="utf-8")

@@ -84,6 +84,7 @@ def test_a_film_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None
     assert left(tmp_path) == ["a.gif"]
 
 
+@pytest.mark.slow
 def test_standard_output_takes_the_picture_alone(run: Run) -> None:
     environment = {**os.environ, "COLUMNS": "80"}
     command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--plot", "-", "--figure", "timeline"]

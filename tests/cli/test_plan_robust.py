@@ -52,12 +52,14 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_plan(run: Run, sat: Pa
     assert "b" not in {row["channel"] for row in rows}
 
 
+@pytest.mark.slow
 @pytest.mark.plans_anew
 def test_the_same_again(run: Run, sat: Path) -> None:
     arguments = ("plan", "sat.yaml", "--scheme", "one-pulse", "--robust", "--json", "-")
     assert run(*arguments).stdout == run(*arguments).stdout
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("degrees", "status"), [(3.0, 0), (0.001, 4)])
 def test_the_requirement_with_its_probability(run: Run, sat: Path, degrees: float, status: int) -> None:
     requirement = f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\n"
@@ -124,6 +126,7 @@ def test_impulses_are_flown_where_they_must(run: Run) -> None:
     assert "by the impulse sum (17)" in done.stdout
 
 
+@pytest.mark.slow
 def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Run, sat: Path, tmp_path: Path) -> None:
     options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
     done = run("plan", sat.name, *options, "--json", "plan.json")
@@ -136,6 +139,7 @@ def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Ru
     assert re.search(r"^target +tilt 3\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_the_front_of_propellant_against_the_share_that_complies(run: Run, tmp_path: Path) -> None:
     files = ("--csv", "front.csv", "--json", "front.json", "--plot", "front.svg")
     done = run("trade", "--robust", "--quiet", "--points", "3", *files)

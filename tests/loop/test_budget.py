@@ -135,7 +135,7 @@ def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
     assert cycle.high == pytest.approx(0.5 * math.atan(6.0 * 0.1 / (80.0 * 3.0)), rel=0.05)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "pauses"), [(2.0, True), (2.07, False)])
 def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(degrees: float, pauses: bool) -> None:
     """Pulses all alike, half of each above stop: what is left of the first nutation decides whether it ever pauses."""
@@ -153,6 +153,7 @@ def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(d
         assert held.other.pulses < 0.01 * held.cycle.pulses
 
 
+@pytest.mark.slow
 def test_dissipation_slows_the_spin_as_in_flight() -> None:
     body, made = craft(), loop(Sensor(delay=0.05), start=rad(5.0), stop=rad(1.0), predict=False)
     cycle = Map(body, made).cycle()
@@ -268,6 +269,7 @@ def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until
     assert run.fired[-1].pulse.t - run.fired[0].pulse.t == pytest.approx(held.lasts, rel=0.02)
 
 
+@pytest.mark.slow
 def test_noise_above_a_tenth_of_start_widens_what_is_known() -> None:
     start = Law(craft(), loop(gyro())).size(rad(0.5), 3.0)
     for share, noisy in ((0.05, False), (0.2, True)):

@@ -139,7 +139,7 @@ def test_the_target_is_marked_where_h_ends() -> None:
 
 @pytest.mark.parametrize(
     ("name", "case"),
-    [slow(*one) if number % 4 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
+    [slow(*one) if number % 8 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
 )
 def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str) -> None:
     for axes in drawn(name, case).axes:

@@ -79,6 +79,7 @@ def drawn(name: str, case: str) -> Figure:
 # --- time axes -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", CASES)
 def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
     body, pulses = ODD[case]

@@ -161,9 +161,9 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
 
 
 @pytest.mark.few(2)
-@pytest.mark.parametrize("seed", range(136))
+@pytest.mark.parametrize("seed", [*(seed for seed in range(133) if seed % 4 != 3), *range(3, 132, 16)])
 def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
-    """In 102 cases with a target 1 to 60 deg away, and 34 of damping alone; one in three of the former nutates."""
+    """In 100 cases with a target 1 to 60 deg away, and 9 of damping alone; one in three of the former nutates."""
     body = some_body(seed, target=seed % 4 != 3)
     body = body if seed % 4 != 3 else replace(body, omega0=np.array([0.02, 0.01, 1.0]) * body.spin)
     commands = body.commands
@@ -251,7 +251,7 @@ def check_flown_ones_are_not_beaten(seed: int, required: Requirement) -> None:
     assert plan.severity <= 1.02 * max(min(shares()), 1.0)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "required"), [(9, (0.1, 0.05)), (11, (0.1, 0.05)), (12, (0.3, 0.02))])
 def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int, required: tuple[float, float]) -> None:
     """The closed form leaves it out: its best ones left up to nine times as much as others of the same search."""
@@ -373,7 +373,7 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
 
 
-@pytest.mark.parametrize("seed", some(range(20), always=0))
+@pytest.mark.parametrize("seed", some(range(6), always=0))
 def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> None:
     """Flown by the reference, nutation included, with a cone near the way."""
     body, rng = some_body(seed), np.random.default_rng(seed)

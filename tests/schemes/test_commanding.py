@@ -193,7 +193,7 @@ def test_a_requested_on_time_is_a_command() -> None:
     assert all(0.027 - 0.0005 <= on_time <= 0.033 + 1e-9 for on_time in on_times)  # what closes the train differs
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("valve", [None, SLOW], ids=["cold alone", "through valves"])
 @pytest.mark.parametrize("scheme", CASES)
 def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
@@ -250,7 +250,7 @@ def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     assert all(pulse.magnitude > 0.0 for pulse in made.pulses)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("moments", [(123.0, 117.0, 80.0), (130.0, 110.0, 80.0), (95.0, 105.0, 150.0)])
 @pytest.mark.parametrize(("degrees", "on_time"), [(0.0, 0.03), (0.0, 0.04), (0.05, 0.03)])
 def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(

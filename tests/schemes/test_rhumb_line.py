@@ -64,7 +64,7 @@ def test_a_nutation_goes_along_or_first(degrees: float) -> None:
         ends_on_the_target(train(aimed(spinner(degrees=degrees, channels=channels), 25.0, -60.0)))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("on_time", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("torque", [40.0, 10.0])
 def test_arc_efficiency(torque: float, on_time: float) -> None:
@@ -175,7 +175,7 @@ def test_unequal_moments_change_the_width_of_all_pulses_alike() -> None:
     ends_on_the_target(train(body))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("degrees", "turn", "on_time"), [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)])
 def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     degrees: float, turn: float, on_time: float

@@ -54,7 +54,7 @@ def test_as_cheap_as_the_rival(row: dict[str, float]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", GOLDEN[QUICK:], ids=lambda row: row["seed"])
+@pytest.mark.parametrize("row", GOLDEN[QUICK:200], ids=lambda row: row["seed"])
 def test_as_cheap_as_the_rival_on_many_layouts(row: dict[str, float]) -> None:
     beats(int(row["seed"]), row["cost_kg"])
 
