@@ -66,10 +66,11 @@ def _spin(model: Model) -> float:
     return spin
 
 
-def spin_of(pulses: Vector) -> tuple[float, float]:
+def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
     """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma, rad/s.
 
-    The sigma is that of a straight line through the times, by what they are off it, a nutation included.
+    The sigma is that of a straight line through the times, by what they are off it, a nutation included, or by the
+    ``step`` (s, full width) to within which they are known.
     """
     gaps = np.diff(pulses)
     turns = np.concatenate([[0.0], np.cumsum(np.rint(gaps / gaps.min()))])
@@ -77,7 +78,8 @@ def spin_of(pulses: Vector) -> tuple[float, float]:
     if len(pulses) < 3:
         return rate, math.inf
     slope, left = np.polyfit(turns, pulses, 1, full=True)[:2]
-    spread = math.sqrt(float(left.sum()) / (len(pulses) - 2) / float(np.sum((turns - turns.mean()) ** 2)))
+    variance = max(float(left.sum()) / (len(pulses) - 2), step * step / 12.0)
+    spread = math.sqrt(variance / float(np.sum((turns - turns.mean()) ** 2)))
     return 2.0 * math.pi / float(slope[0]), 2.0 * math.pi * spread / float(slope[0]) ** 2
 
 
@@ -85,7 +87,7 @@ def once_a_turn(record: Record) -> str:
     """What Sun pulses tell by themselves, in words; nothing without them."""
     if len(record.sun_pulses) < 3:
         return ""
-    spin, sigma = np.degrees(spin_of(record.sun_pulses))
+    spin, sigma = np.degrees(spin_of(record.sun_pulses, record.sun_step))
     return f": Sun pulses come once a spin turn and tell the spin, {spin:.7g} deg/s, with a sigma of {sigma:.2g} deg/s"
 
 

@@ -14,6 +14,7 @@ import nutdamp
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.guess import spin_of
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, Record, quantisation
 from nutdamp.estimation.results import carried, estimates
@@ -267,6 +268,13 @@ def test_sun_pulses_alone_are_not_taken_for_a_nutation() -> None:
         match=r"no nutation is seen in sun_pulse alone: .*spin, 171.88.* deg/s.*or an acceleration beside them would",
     ):
         fit(nutdamp.load(FILE), Record(np.empty(0), {}, 2.0944 * np.arange(1.0, 60.0)))
+
+
+def test_the_spin_of_sun_pulses_in_a_column_is_no_surer_than_its_samples_allow() -> None:
+    """Of n even turns T the line through times of variance s²/12 has the sigma of its slope s/√(12 Σ(k - mean)²)."""
+    sigma = spin_of(2.0 * np.arange(20.0), 0.1)[1]
+    expected = 0.1 / math.sqrt(12.0 * float(np.sum((np.arange(20.0) - 9.5) ** 2)))
+    assert sigma == pytest.approx(2.0 * math.pi * expected / 2.0**2)
 
 
 def test_signals_need_what_explains_them_in_the_file() -> None:
