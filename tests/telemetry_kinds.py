@@ -42,6 +42,9 @@ EPOCH = "2026-03-01T12:00:00Z"
 BIAS, TILT, ATTITUDE = math.radians(0.02), math.radians(1.0), math.radians(0.3)
 """Standard deviations of gyro biases, of tilts of sensors, and of the attitude of the file."""
 
+FARTHEST = math.cos(math.radians(25.0))
+"""Cosine of the angle of the Sun from the axis, at most: nutations are half of that."""
+
 
 @dataclass(frozen=True, eq=False)
 class Telemetry:
@@ -54,7 +57,18 @@ class Telemetry:
 
 
 def file_of(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
-    """A spacecraft file, and whether it is prolate."""
+    """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes round the sensor."""
+    body, prolate = _any_file(draw, seed)
+    again, up = np.random.default_rng([18, seed]), np.array([0.0, 0.0, 1.0])
+    assert body.sun is not None
+    while abs(float(attitude.rotate(body.initial.quaternion, up) @ body.sun)) > FARTHEST:
+        facing = again.normal(size=4)
+        body = body.with_(attitude={"quaternion": (facing / np.linalg.norm(facing)).tolist()})
+        assert body.sun is not None
+    return body, prolate
+
+
+def _any_file(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
     prolate = bool(draw.uniform() < 0.6)
     C = 120.0 * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.7))
     spin = (-1.0 if draw.uniform() < 0.5 else 1.0) * draw.uniform(0.8, 4.0)
