@@ -27,6 +27,16 @@ class Requirement:
     probability: float | None = None
 
 
+PROBABILITY = 0.997
+"""Share of cases that must comply where the requirement gives none."""
+
+
+def required_share(requirement: Requirement | None) -> float:
+    """Share of dispersed cases that must comply, 0 to 1."""
+    given = None if requirement is None else requirement.probability
+    return PROBABILITY if given is None else given
+
+
 @dataclass(frozen=True, slots=True)
 class Goal:
     """Where the motion is to end, besides without nutation.

@@ -18,9 +18,9 @@ import numpy as np
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
 from nutdamp.decision import Decision
+from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
-from nutdamp.dispersion.study import PROBABILITY
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
@@ -158,8 +158,7 @@ def compare(
     spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
     """
     body = comparison.spacecraft
-    requested = body.requirement
-    probability = PROBABILITY if requested is None or requested.probability is None else requested.probability
+    probability = required_share(body.requirement)
     found: dict[object, Candidate] = {}
     for number, trial in enumerate(trials):
         watch(number)

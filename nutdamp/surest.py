@@ -15,11 +15,12 @@ import numpy as np
 
 from nutdamp import compliance, flight, planning, schemes
 from nutdamp.compliance import Part
+from nutdamp.demands import required_share
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.correlation import mixing
 from nutdamp.dispersion.inputs import Input
-from nutdamp.dispersion.study import PROBABILITY, Results, run, threads_here
+from nutdamp.dispersion.study import Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
@@ -189,10 +190,7 @@ class _Search:
         self.program.forbid(None, last, math.inf)
         self.goal = np.zeros(5)
         self.goal[Equations(True, True).chosen] = small_angles(flat, Equations(True, True)).goal
-        requested = spacecraft.requirement
-        self.probability = PROBABILITY
-        if requested is not None and requested.probability is not None:
-            self.probability = requested.probability
+        self.probability = required_share(spacecraft.requirement)
 
     @property
     def sigmas(self) -> float:

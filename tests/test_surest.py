@@ -24,7 +24,7 @@ from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import plan
 from nutdamp.presentation import verdicts
-from nutdamp.presentation.dispersion_tables import stated_text
+from nutdamp.presentation.tolerance_tables import stated_text
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes.optimal.chance import ChanceProgram
 from nutdamp.schemes.optimal.columns import Columns

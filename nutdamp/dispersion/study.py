@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nutdamp import compliance, flight
 from nutdamp.aspect import aspects
 from nutdamp.compliance import Left
+from nutdamp.demands import required_share
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.cases import DispersedCases, Model
 from nutdamp.dispersion.correlation import independent
@@ -43,9 +44,6 @@ EARLY = 2 * BLOCK
 
 KEPT_WORST = 1_000
 """Worst cases that are kept."""
-
-PROBABILITY = 0.997
-"""Share of cases that must comply where the file does not say."""
 
 CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
@@ -221,8 +219,7 @@ class Results:
     @property
     def probability(self) -> float:
         """Share of cases that must comply."""
-        required = self.study.model.spacecraft.requirement
-        return PROBABILITY if required is None or required.probability is None else required.probability
+        return required_share(self.study.model.spacecraft.requirement)
 
     @property
     def meets_requirement(self) -> bool | None:

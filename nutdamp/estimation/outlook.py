@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nutdamp import comparison, dispersion
-from nutdamp.dispersion.study import PROBABILITY, Results, run
+from nutdamp.demands import required_share
+from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.fit import Fit, estimated
 from nutdamp.estimation.model import Model
@@ -67,9 +68,9 @@ class Outlook:
     scheme: str
     coasts: tuple[Prospect, ...]
     probes: tuple[Prospect, ...]
-    probability: float = PROBABILITY
+    probability: float
     """Share of cases that must meet the requirement, and that stay below the nutation shown."""
-    propellant: float | None = None
+    propellant: float | None
 
     @property
     def now(self) -> Prospect:
@@ -107,8 +108,7 @@ def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _:
     plan = comparison.compare(body, comparison.usual(body)).recommended
     if plan is None or not len(plan.pulses):
         raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
-    required = spacecraft.requirement
-    probability = PROBABILITY if required is None or required.probability is None else required.probability
+    probability = required_share(spacecraft.requirement)
     length, done, made = found.model.record.length, 0, []
     for share in LENGTHS:
         made.append(_prospect(plan, found, time, probability, share * length))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from nutdamp import compliance
 from nutdamp.compliance import Left
+from nutdamp.demands import required_share
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
@@ -22,7 +23,7 @@ from nutdamp.dispersion.elementwise import rotated
 from nutdamp.dispersion.kernel import carried
 from nutdamp.dispersion.outputs import angle
 from nutdamp.dispersion.statistics import Exact, Worst
-from nutdamp.dispersion.study import CONFIDENCE, KEPT_WORST, PROBABILITY
+from nutdamp.dispersion.study import CONFIDENCE, KEPT_WORST
 from nutdamp.dispersion.watched import cones_used
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.cases import LoopModel
@@ -286,8 +287,7 @@ class LoopResults:
     @property
     def probability(self) -> float:
         """Share of cases that must comply."""
-        required = self.study.spacecraft.requirement
-        return PROBABILITY if required is None or required.probability is None else required.probability
+        return required_share(self.study.spacecraft.requirement)
 
     @property
     def meets_requirement(self) -> bool | None:

@@ -209,7 +209,8 @@ def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
     """How far the true values may differ from the file's, and which tolerances touch nothing that can fire."""
     from nutdamp.dispersion.inputs import reachable  # few files have dispersions
-    from nutdamp.presentation.dispersion_tables import in_words, size_text, unused_table
+    from nutdamp.presentation.dispersion_tables import unused_table
+    from nutdamp.presentation.tolerance_tables import in_words, size_text
 
     inputs, unused = reachable(spacecraft)
     alike: dict[tuple[str, str, str], list[str]] = {}

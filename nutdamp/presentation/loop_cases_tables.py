@@ -16,22 +16,20 @@ from nutdamp.loop.fleet import Flown
 from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.dispersion_tables import (
-    MOST_ROWS,
     PERCENTS,
     add_angles,
     beside,
     bounded,
     bounded_heads,
     cone_lines,
-    in_words,
     inputs_table,
     requirement_lines,
-    size_text,
     unused_table,
 )
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.loop_tables import described
 from nutdamp.presentation.text import MISSING, degrees, duration
+from nutdamp.presentation.tolerance_tables import MOST_ROWS, in_words, size_text
 
 NAMES = {
     "settled": ("first quiet, s", 1.0),

@@ -335,7 +335,7 @@ def robust_cost(found: RobustComparison) -> str:
 def tightened(found: RobustComparison) -> str:
     """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
     from nutdamp.dispersion.study import CONFIDENCE
-    from nutdamp.presentation.dispersion_tables import in_words, stated_text
+    from nutdamp.presentation.tolerance_tables import in_words, stated_text
 
     needed, chosen = found.tightening, found.chosen
     if needed is None or chosen is None:

@@ -23,7 +23,7 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Trapezoid, Valve
-from nutdamp.presentation.dispersion_tables import in_words, size_text
+from nutdamp.presentation.tolerance_tables import in_words, size_text
 from nutdamp.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft import Requirement, Spacecraft
 from nutdamp.supply import supplied

@@ -28,9 +28,9 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.fronts import Point
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
-from nutdamp.presentation.dispersion_tables import budget_rows, in_words
 from nutdamp.presentation.figures import dispersion as drawing
 from nutdamp.presentation.figures import schemes
+from nutdamp.presentation.tolerance_tables import budget_rows, in_words
 from nutdamp.presentation.trade_tables import fails
 from nutdamp.recommendation import Standing
 from nutdamp.schedule import Schedule

@@ -14,10 +14,10 @@ from nutdamp.dispersion.statistics import Distribution
 from nutdamp.dispersion.study import EARLY, Results
 from nutdamp.physics import attitude
 from nutdamp.presentation import geometry
-from nutdamp.presentation.dispersion_tables import budget_rows
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.tolerance_tables import budget_rows
 from nutdamp.presentation.verdicts import cases_verdict, exact_percent
 from nutdamp.spacecraft import Vector
 
