@@ -53,8 +53,8 @@ def command(
       nutdamp fit flight.csv -o now.yaml --at 90s
       nutdamp plan now.yaml
 
-    Exit status 3 where nothing can be estimated, several nutation rates fit alike, or residuals are no noise, as with
-    a pulse that --schedule does not have. SPACECRAFT and FILE are as for `nutdamp plan`.
+    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, or residuals are no noise,
+    as with a pulse that --schedule does not have. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     job = begin(spacecraft, telemetry, schedule, sun_pulses, quiet=quiet, output=output, json=json, plot=plot)
 

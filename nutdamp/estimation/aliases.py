@@ -69,8 +69,8 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     left = [one for one in alike if low < one.values[at] < high]
     if not left and too_slow(model, alike[0].values):
         raise Infeasible(
-            f"with a sample every {interval(model):.4g} s several nutation rates fit alike, and none of their C/A is "
-            "as near to the file as its tolerances allow; check A and C in the file (are the times in seconds?)"
+            f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, and none of their "
+            "C/A is as near to the file as its tolerances allow; check A and C in the file (are the times in seconds?)"
         )
     left = left or alike[:1]
     if len(left) == 1:
@@ -78,7 +78,7 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     ratios = sorted(float(one.values[at]) for one in left)
     fastest = max(abs(nutation_rate(model, one.values)) for one in left)
     raise Infeasible(
-        f"with a sample every {interval(model):.4g} s several nutation rates fit alike: C/A may be "
+        f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: C/A may be "
         f"{', '.join(f'{one:.4f}' for one in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at uneven "
         "intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
     )

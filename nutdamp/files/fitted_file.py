@@ -1,4 +1,4 @@
-"""A spacecraft file with what telemetry told of it: values, how well they are known, and the motion at an epoch.
+"""A spacecraft file with what a fit of telemetry found: values, how well they are known, and the motion at an epoch.
 
 Only values change: comments, the order of the keys and units stay as they were.
 """

@@ -298,3 +298,23 @@ def test_an_axis_towards_the_sun_has_no_phase() -> None:
     why = infeasibility(planning.plan(facing, "rhumb-line"))
     assert why is not None
     assert "has no phase" in why
+
+
+@pytest.mark.parametrize(
+    ("torque", "turns", "pulses", "actuator"),
+    [(15.0, 2, 2, "steerable"), (15.0, 3, 2, "channels"), (5.0, 8, 6, "channels")],
+)
+def test_in_a_short_horizon_pulses_are_long_but_less_than_half_a_turn(
+    torque: float, turns: int, pulses: int, actuator: str
+) -> None:
+    actuators: dict[str, dict[str, Any]] = {
+        "steerable": {"steerable": Steerable(torque)},
+        "channels": {"channels": cross(torque)},
+    }
+    turn = 2.0 * math.pi / 3.0
+    body = spinner(80.0, 120.0, 3.0, 0.0, limits=Limits(horizon=turns * turn), **actuators[actuator])
+    plan = train(aimed(body, 3.0, 45.0))
+    assert len(plan.pulses) == pulses
+    # Pulses of the default length, a tenth of a turn or so, would not reach the target in time; what a pulse adds in
+    # its second half of a turn it takes away from the first.
+    assert all(0.35 * turn < pulse.on_time < 0.5 * turn for pulse in plan.pulses)
