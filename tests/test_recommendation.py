@@ -27,7 +27,7 @@ from nutdamp.comparison import Comparison, compare, usual
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Ground, Standing, recommend
+from nutdamp.recommendation import Ground, Standing, cheapest, recommend
 from nutdamp.remarks import infeasibility
 from nutdamp.spacecraft import Goal, Requirement
 
@@ -172,6 +172,16 @@ def test_costs_count_as_equal_within_a_thousandth_and_no_further(share: float, g
     late, early = judged("late", 0.0, propellant=1.0, end=9.0), judged("early", 0.0, propellant=share, end=1.0)
     assert recommend([late, early]).ground is ground
     assert chosen(late, early) == best
+
+
+@pytest.mark.parametrize(
+    ("share", "ground", "best"),
+    [(1.0, Ground.NOMINAL, "late"), (1.0005, Ground.NOMINAL, "late"), (1.002, Ground.COST, "early")],
+)
+def test_of_equal_costs_the_plan_for_nominal_values_stays(share: float, ground: Ground, best: str) -> None:
+    late, early = judged("late", 0.0, propellant=share, end=9.0), judged("early", 0.0, propellant=1.0, end=1.0)
+    plan, why = cheapest([early, late], late)
+    assert (plan.scheme, why) == (best, ground)
 
 
 @pytest.mark.parametrize(
