@@ -167,7 +167,8 @@ def test_the_command_writes_the_file_and_draws_the_curve(tmp_path: Path) -> None
     assert f"first-order least within 120 s {1e3 * bound:.4g} g" in " ".join(result.stdout.split())
     drawn = picture.read_text()
     assert "primer curve" in drawn
-    assert "the program fires" in drawn
+    assert f"first-order least (small angles): {1e3 * bound:.4g} g" in drawn
+    assert "burns of the linear program" in drawn
 
 
 def test_without_optimal_the_command_says_what_to_name(tmp_path: Path) -> None:

@@ -62,6 +62,11 @@ def mass(value: float | None) -> str:
     return quantity(1e3 * value, "g") if value < 1.0 else quantity(value, "kg")
 
 
+def cost(value: float | None, unit: str) -> str:
+    """Propellant in kg as `mass` has it, an impulse with its ``unit``."""
+    return mass(value) if unit == "kg" else quantity(value, unit)
+
+
 def duration(value: float | None) -> str:
     """A time given in s, in ms below a tenth of a second."""
     if value is None or not math.isfinite(value) or value == 0.0 or value >= 0.1:

@@ -11,7 +11,7 @@ from rich.text import Text
 from nutdamp.fronts import Front, Point, numbered
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import NOT, header
-from nutdamp.presentation.text import degrees, mass, moment, quantity
+from nutdamp.presentation.text import cost, degrees, moment
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
@@ -48,13 +48,10 @@ def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> Renderab
     dearest = front.points[0].cost
     for index, owner, point in numbered(found):
         if owner is front:
-            cost, least = (
-                mass(value) if point.unit == "kg" else quantity(value, point.unit)
-                for value in (point.cost, point.bounds.first_order)
-            )
+            spent, least = (cost(value, point.unit) for value in (point.cost, point.bounds.first_order))
             plan, saved = point.plan, 100.0 * (1.0 - point.cost / dearest)
             shift = degrees(plan.flight.residual.momentum_shift)
-            cells = moment(plan.pulses.end), cost, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
+            cells = moment(plan.pulses.end), spent, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
             table.add_row(f"{index} {NOT}" if fails(point) else str(index), *cells, *[plan.scheme] * by_others)
     return table
 

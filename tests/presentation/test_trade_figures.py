@@ -203,7 +203,7 @@ def test_a_plan_that_ends_early_is_drawn_again_where_its_pulses_can_be_told_apar
     figure = figures.certificate_figure(certificate(made))
     check_layout(figure)
     *_, closer = figure.axes
-    fired = line(closer, "the plan fires")
+    fired = line(closer, "pulses of the plan")
     assert sorted(fired[:, 0]) == pytest.approx([pulse.t for pulse in made.pulses])
     places = closer.transData.transform(fired)
     assert closer.get_window_extent().count_contains(places) == len(places)

@@ -1,4 +1,4 @@
-"""The picture of ``plan --certificate``: the primer curve of each channel, and where the program fires."""
+"""The picture of ``plan --certificate``: the primer curve of each channel, and the moments of the pulses."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from nutdamp.certificate import Certificate
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.presentation.text import cost
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +28,7 @@ CLOSER = 0.5
 
 @style.styled
 def certificate_figure(found: Certificate) -> Figure:
-    """q over time in the windows in which pulses may be on; marks show where program and plan fire.
+    """q over time in the windows in which pulses may be on; marks show the burns of program and plan.
 
     Where the plan ends early in the horizon, the time until then is drawn again below.
     """
@@ -43,7 +44,8 @@ def certificate_figure(found: Certificate) -> Figure:
     panels[-1].set_xlabel("time, s")
     figure.supylabel("q: worth of a second over what it costs", fontsize=style.TICK_SIZE)
     some = f" ({MOST} of {len(found.program.channels)} channels)" if len(found.program.channels) > MOST else ""
-    heading(figure, found.spacecraft, f"primer curve{some}; no less than {found.proof.bound:.6g} {found.problem.unit}")
+    least = f"first-order least (small angles): {cost(found.proof.bound, found.problem.unit)}"
+    heading(figure, found.spacecraft, f"primer curve{some}\n{least}")
     legend(figure, [panels[-1]])
     return figure
 
@@ -70,8 +72,8 @@ def _draw(axes: Axes, found: Certificate, turns: float) -> None:
 
 
 def _firings(found: Certificate) -> list[tuple[str, list[tuple[float, int]], str]]:
-    """Moments, s, and channels at which the program and the plan fire, with name and mark."""
+    """Moments, s, and channels of the burns of the linear program and of the pulses of the plan, with name and mark."""
     names = [channel.name for channel in found.program.channels]
     program = [(burn.t, names.index(burn.channel.name)) for burn in found.burns]
     plan = [(pulse.t, names.index(pulse.channel)) for pulse in found.plan.pulses]
-    return [("the program fires", program, "o"), ("the plan fires", plan, "x")]
+    return [("burns of the linear program", program, "o"), ("pulses of the plan", plan, "x")]
