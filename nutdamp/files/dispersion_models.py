@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from nutdamp.files.fields import Quantity
 from nutdamp.files.sections import Field, Length, Rule, Section
@@ -21,43 +21,10 @@ if TYPE_CHECKING:  # so that the keys can be known without numpy
 READING = "reading"
 """The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
 
-QUANTITIES = {
-    "A": "inertia",
-    "C": "inertia",
-    "omega0": "rate",
-    "thrust": "force",
-    "thrust_per_pulse": "ratio",
-    "thrust_direction": "angle",
-    "position": "length",
-    "timing": "time",
-    "timing_offset": "time",
-    "attitude": "angle",
-    "open_delay": "time",
-    "close_delay": "time",
-    "rise_time": "time",
-    "fall_time": "time",
-    "impulse_bit": "ratio",
-    "cold": "ratio",
-    "sensor_bias": READING,
-    "sensor_scale": "ratio",
-    "sensor_noise": "ratio",
-    "sensor_delay": "time",
-    "cold_pulses": "ratio",
-    "tank_propellant": "mass",
-    "tank_pressure": "pressure",
-    "tank_final_pressure": "pressure",
-    "tank_exponent": "ratio",
-    "inertia_per_kg": "ratio",
-}
-"""The keys of dispersions with the kind of quantity that they hold."""
-
 RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
-
-BY_THRUSTER = ("thrust", "thrust_direction", "position", *VALVE_TIMES, "impulse_bit")
-"""The keys that hold one tolerance for all thrusters, or one by name."""
 
 ALL = ""
 """Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
@@ -96,22 +63,10 @@ def by_name(value: Mapping[str, object]) -> bool:
 class ToleranceSection(Section):
     """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
 
-    normal: Any = Field(
-        default=None,
-        description="One sigma of a normal distribution, in its unit or in %.",
-        examples=["2 %"],
-    )
-    uniform: Any = Field(
-        default=None,
-        description="Half the width of a uniform distribution, in its unit or in %.",
-        examples=["5 ms"],
-    )
-    triangular: Any = Field(
-        default=None,
-        description="Half the width of a triangular distribution, in its unit or in %.",
-        examples=["5 %"],
-    )
-    bias: Any = Field(default=None, description="Fixed offset, signed, in its unit or in %.", examples=["-2 ms"])
+    normal: Any = Field("One sigma of a normal distribution, in its unit or in %.", "2 %", default=None)
+    uniform: Any = Field("Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None)
+    triangular: Any = Field("Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None)
+    bias: Any = Field("Fixed offset, signed, in its unit or in %.", "-2 ms", default=None)
 
     def tolerance(self, key: str) -> Tolerance:
         """The checked tolerance, which is at ``key`` of the dispersions."""
@@ -120,25 +75,25 @@ class ToleranceSection(Section):
         return Tolerance(kind, size, relative)
 
 
-class _Alike(Rule):
-    """Annotation of what is at ``key``: several tolerances, or one for all; in the schema with their units."""
+class _Tolerance(Rule):
+    """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which may be for all."""
 
-    def __init__(self, key: str) -> None:
-        self.key = key
+    def __init__(self, kind: str, each: Literal["", "axis", "thruster"] = "") -> None:
+        self.kind, self.each = kind, each
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """A single tolerance is that of all three rates, or for all thrusters."""
-        if isinstance(value, dict) and self.key == "omega0":
+        """A single tolerance is that of all three axes, or for all thrusters."""
+        if isinstance(value, dict) and self.each == "axis":
             return inner([value] * 3)
-        alone = isinstance(value, dict) and self.key in BY_THRUSTER and not by_name(value)
+        alone = isinstance(value, dict) and self.each == "thruster" and not by_name(value)
         return inner({ALL: value} if alone else value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
-        """One tolerance or several."""
-        single = _json_schema(QUANTITIES[self.key])
-        if self.key == "omega0":
+        """One tolerance or several, with their units."""
+        single = _json_schema(self.kind)
+        if self.each == "axis":
             return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
-        if self.key in BY_THRUSTER:
+        if self.each == "thruster":
             return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
         return single
 
@@ -163,132 +118,103 @@ _ByThruster = dict[str, ToleranceSection]
 class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
 
-    A: Annotated[ToleranceSection, _Alike("A")] | None = Field(
-        default=None, description="Of the transverse moment of inertia, kg m² or %.", examples=[{"normal": "2 %"}]
+    A: Annotated[ToleranceSection, _Tolerance("inertia")] | None = Field(
+        "Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"}
     )
-    C: Annotated[ToleranceSection, _Alike("C")] | None = Field(
-        default=None,
-        description="Of the moment of inertia about the spin axis, kg m² or %.",
-        examples=[{"normal": "1.6 kg m^2"}],
+    C: Annotated[ToleranceSection, _Tolerance("inertia")] | None = Field(
+        "Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"}
     )
-    omega0: Annotated[_Three, _Alike("omega0")] | None = Field(
-        default=None,
-        description="Of each body rate at t = 0, rad/s or %; or a list of three.",
-        examples=[{"normal": "0.1 deg/s"}],
+    omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
+        "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
     )
-    thrust: Annotated[_ByThruster, _Alike("thrust")] | None = Field(
-        default=None,
-        description="Of each thruster, the same in all its pulses, % or N; or by name.",
-        examples=[{"normal": "3 %"}],
+    thrust: Annotated[_ByThruster, _Tolerance("force", "thruster")] | None = Field(
+        "Of each thruster, the same in all its pulses, % or N; or by name.", {"normal": "3 %"}
     )
-    thrust_per_pulse: Annotated[ToleranceSection, _Alike("thrust_per_pulse")] | None = Field(
-        default=None, description="Of the thrust, in each pulse anew, %.", examples=[{"normal": "1 %"}]
+    thrust_per_pulse: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the thrust, in each pulse anew, %.", {"normal": "1 %"}
     )
-    thrust_direction: Annotated[_ByThruster, _Alike("thrust_direction")] | None = Field(
-        default=None,
-        description="Tilt of each force about two axes across it, rad; or by name.",
-        examples=[{"normal": "0.5 deg"}],
+    thrust_direction: Annotated[_ByThruster, _Tolerance("angle", "thruster")] | None = Field(
+        "Tilt of each force about two axes across it, rad; or by name.", {"normal": "0.5 deg"}
     )
-    position: Annotated[_ByThruster, _Alike("position")] | None = Field(
-        default=None,
-        description="Of each thruster's position, each component, m; or by name.",
-        examples=[{"normal": "5 mm"}],
+    position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
+        "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
     )
-    timing: Annotated[ToleranceSection, _Alike("timing")] | None = Field(
-        default=None, description="Shift of each pulse, s.", examples=[{"uniform": "5 ms"}]
+    timing: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
+        "Shift of each pulse, s.", {"uniform": "5 ms"}
     )
-    timing_offset: Annotated[ToleranceSection, _Alike("timing_offset")] | None = Field(
-        default=None, description="One shift of the whole schedule, s.", examples=[{"bias": "2 ms"}]
+    timing_offset: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
+        "One shift of the whole schedule, s.", {"bias": "2 ms"}
     )
-    attitude: Annotated[ToleranceSection, _Alike("attitude")] | None = Field(
-        default=None,
-        description="Of the direction of the spin axis at t = 0, about two axes across it, rad.",
-        examples=[{"normal": "0.2 deg"}],
+    attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
+        "Of the direction of the spin axis at t = 0, about two axes across it, rad.", {"normal": "0.2 deg"}
     )
-    open_delay: Annotated[_ByThruster, _Alike("open_delay")] | None = Field(
-        default=None,
-        description="Of each valve's open_delay, the same in all its pulses, s; or by name.",
-        examples=[{"normal": "1 ms"}],
+    open_delay: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+        "Of each valve's open_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
-    close_delay: Annotated[_ByThruster, _Alike("close_delay")] | None = Field(
-        default=None,
-        description="Of each valve's close_delay, the same in all its pulses, s; or by name.",
-        examples=[{"normal": "1 ms"}],
+    close_delay: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+        "Of each valve's close_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
-    rise_time: Annotated[_ByThruster, _Alike("rise_time")] | None = Field(
-        default=None,
-        description="Of each valve's rise_time, the same in all its pulses, s; or by name.",
-        examples=[{"normal": "0.5 ms"}],
+    rise_time: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+        "Of each valve's rise_time, the same in all its pulses, s; or by name.", {"normal": "0.5 ms"}
     )
-    fall_time: Annotated[_ByThruster, _Alike("fall_time")] | None = Field(
-        default=None,
-        description="Of each valve's fall_time, the same in all its pulses, s; or by name.",
-        examples=[{"normal": "1 ms"}],
+    fall_time: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+        "Of each valve's fall_time, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
-    impulse_bit: Annotated[_ByThruster, _Alike("impulse_bit")] | None = Field(
-        default=None,
-        description="Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.",
-        examples=[{"normal": "2 %"}],
+    impulse_bit: Annotated[_ByThruster, _Tolerance("ratio", "thruster")] | None = Field(
+        "Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.", {"normal": "2 %"}
     )
-    cold: Annotated[ToleranceSection, _Alike("cold")] | None = Field(
-        default=None,
-        description="Of the factor of a first cold pulse, cold.first, in % of it.",
-        examples=[{"normal": "2 %"}],
+    cold: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"}
     )
-    sensor_bias: Annotated[ToleranceSection, _Alike("sensor_bias")] | None = Field(
-        default=None,
-        description="Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².",
-        examples=[{"normal": "0.01 deg/s"}],
+    sensor_bias: Annotated[ToleranceSection, _Tolerance(READING)] | None = Field(
+        "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", {"normal": "0.01 deg/s"}
     )
-    sensor_scale: Annotated[ToleranceSection, _Alike("sensor_scale")] | None = Field(
-        default=None,
-        description="Of the scale of each gyro of a loop, or of its accelerometer, %.",
-        examples=[{"normal": "1 %"}],
+    sensor_scale: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the scale of each gyro of a loop, or of its accelerometer, %.", {"normal": "1 %"}
     )
-    sensor_noise: Annotated[ToleranceSection, _Alike("sensor_noise")] | None = Field(
-        default=None, description="Of the noise of the sensor of a loop, %.", examples=[{"uniform": "20 %"}]
+    sensor_noise: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the noise of the sensor of a loop, %.", {"uniform": "20 %"}
     )
-    sensor_delay: Annotated[ToleranceSection, _Alike("sensor_delay")] | None = Field(
-        default=None,
-        description="Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.",
-        examples=[{"uniform": "2 ms"}],
+    sensor_delay: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
+        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", {"uniform": "2 ms"}
     )
-    cold_pulses: Annotated[ToleranceSection, _Alike("cold_pulses")] | None = Field(
-        default=None,
-        description="Of the number of pulses over which nozzles warm up, in %.",
-        examples=[{"normal": "10 %"}],
+    cold_pulses: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"}
     )
-    tank_propellant: Annotated[ToleranceSection, _Alike("tank_propellant")] | None = Field(
-        default=None,
-        description="Of the propellant in the tank at t = 0, kg or %.",
-        examples=[{"normal": "1 %"}],
+    tank_propellant: Annotated[ToleranceSection, _Tolerance("mass")] | None = Field(
+        "Of the propellant in the tank at t = 0, kg or %.", {"normal": "1 %"}
     )
-    tank_pressure: Annotated[ToleranceSection, _Alike("tank_pressure")] | None = Field(
-        default=None,
-        description="Of the pressure at t = 0, for which the file gives the thrust, Pa or %.",
-        examples=[{"normal": "0.2 bar"}],
+    tank_pressure: Annotated[ToleranceSection, _Tolerance("pressure")] | None = Field(
+        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", {"normal": "0.2 bar"}
     )
-    tank_final_pressure: Annotated[ToleranceSection, _Alike("tank_final_pressure")] | None = Field(
-        default=None,
-        description="Of the pressure with nothing left, Pa or %.",
-        examples=[{"normal": "0.2 bar"}],
+    tank_final_pressure: Annotated[ToleranceSection, _Tolerance("pressure")] | None = Field(
+        "Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"}
     )
-    tank_exponent: Annotated[ToleranceSection, _Alike("tank_exponent")] | None = Field(
-        default=None,
-        description="Of the power of the pressure that the thrust goes with, in %.",
-        examples=[{"normal": "5 %"}],
+    tank_exponent: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of the power of the pressure that the thrust goes with, in %.", {"normal": "5 %"}
     )
-    inertia_per_kg: Annotated[ToleranceSection, _Alike("inertia_per_kg")] | None = Field(
-        default=None,
-        description="Of what each kg that is used takes off the moments of inertia, of all alike, in %.",
-        examples=[{"normal": "10 %"}],
+    inertia_per_kg: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", {"normal": "10 %"}
     )
     correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
-        default=[],
-        description="Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
+        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
         " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
-        examples=[[["A", "C", 0.99]]],
+        [["A", "C", 0.99]],
+        default=[],
     )
+
+
+_TOLERANCES = {
+    key: rule
+    for key, field in DispersionsSection.fields().items()
+    for rule in get_args(get_args(field.type)[0])
+    if isinstance(rule, _Tolerance)
+}
+QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}
+"""The keys of dispersions with the kind of quantity that they hold."""
+
+BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")
+"""The keys that hold one tolerance for all thrusters, or one by name."""
 
 
 def dispersions(

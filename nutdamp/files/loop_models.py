@@ -42,100 +42,63 @@ class LoopSensorSection(Section):
     """What the loop sees: two rate gyros about the axes 1 and 2, or an accelerometer."""
 
     kind: Literal["gyro", "accelerometer"] = Field(
-        description="gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", examples=["gyro"]
+        "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
     )
-    rate: Frequency | None = Field(
-        default=None, description="Samples a second, Hz; default: a continuous signal.", examples=["100 Hz"]
-    )
+    rate: Frequency | None = Field("Samples a second, Hz; default: a continuous signal.", "100 Hz")
     quantisation: Least = Field(
-        default=0.0,
-        description="Step of a sample: rad/s, of an accelerometer m/s²; default 0.",
-        examples=["0.002 deg/s"],
+        "Step of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.002 deg/s", default=0.0
     )
     noise: Least = Field(
-        default=0.0,
-        description="One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.",
-        examples=["0.01 deg/s"],
+        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.01 deg/s", default=0.0
     )
     bias: Annotated[float, Reading()] = Field(
-        default=0.0,
-        description="What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.",
-        examples=["0.02 deg/s"],
+        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.", "0.02 deg/s", default=0.0
     )
     scale: Annotated[float, Quantity("ratio")] = Field(
-        default=1.0,
-        description="Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.",
-        examples=["101 %"],
+        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.", "101 %", default=1.0
     )
-    delay: Time = Field(
-        default=0.0, description="Time until a sample reaches the valves, s; default 0.", examples=["20 ms"]
-    )
+    delay: Time = Field("Time until a sample reaches the valves, s; default 0.", "20 ms", default=0.0)
     low_pass: Time = Field(
-        default=0.0,
-        description="Time constant of a first-order low-pass filter over the samples, s; default 0: none.",
-        examples=["50 ms"],
+        "Time constant of a first-order low-pass filter over the samples, s; default 0: none.", "50 ms", default=0.0
     )
-    position: Position | None = Field(
-        default=None,
-        description="Where an accelerometer is, from the centre of mass, m.",
-        examples=[["0.8 m", 0, 0]],
-    )
+    position: Position | None = Field("Where an accelerometer is, from the centre of mass, m.", ["0.8 m", 0, 0])
     axis: Direction | None = Field(
-        default=None,
-        description="Along which an accelerometer measures, any length but zero; default [0, 0, 1].",
-        examples=[[0, 0, 1]],
+        "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
     )
 
 
 class LoopFaultsSection(Section):
     """Faults that the loop is flown with and does not know of."""
 
-    reversed: list[Name] = Field(
-        default=[], description="Channels that push the other way when they are fired.", examples=[["+M1"]]
-    )
+    reversed: list[Name] = Field("Channels that push the other way when they are fired.", ["+M1"], default=[])
 
 
 class LoopSection(Section):
     """A closed loop, for `nutdamp loop`: it fires from where the sensor shows start down to stop."""
 
-    sensor: LoopSensorSection = Field(
-        description="The sensor.", examples=[{"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"}]
-    )
+    sensor: LoopSensorSection = Field("The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"})
     law: Literal["four-pulse", "one-pulse", "bang"] = Field(
-        default="four-pulse",
-        description="four-pulse: each channel that comes into line, as long as what is left requires, at most "
+        "four-pulse: each channel that comes into line, as long as what is left requires, at most "
         "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. Default four-pulse.",
-        examples=["four-pulse"],
+        "four-pulse",
+        default="four-pulse",
     )
-    start: AcuteAngle = Field(
-        description="Nutation angle from which the loop fires, rad; above stop.", examples=["0.5 deg"]
-    )
-    stop: Threshold = Field(
-        default=0.0, description="Nutation angle down to which it fires, rad; default 0.", examples=["0.05 deg"]
-    )
-    settle: Time = Field(
-        default=0.0, description="Time after a firing in which samples are not used, s; default 0.", examples=["0.2 s"]
-    )
-    min_interval: Time = Field(
-        default=0.0, description="Least time from firing to firing, s; default 0.", examples=["0.5 s"]
-    )
+    start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
+    stop: Threshold = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
+    settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
+    min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
     predict: bool = Field(
-        default=True,
-        description="Whether delay, filter and half the on-time are compensated, so that firings are centred on "
+        "Whether delay, filter and half the on-time are compensated, so that firings are centred on "
         "their moments; default true.",
-        examples=[True],
+        True,
+        default=True,
     )
     alias: bool = Field(
-        default=False,
-        description="Whether fewer than four samples a nutation period are meant; default false.",
-        examples=[True],
+        "Whether fewer than four samples a nutation period are meant; default false.", True, default=False
     )
     on_time: PositiveTime | None = Field(
-        default=None,
-        description="Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: an eighth of the "
+        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: an eighth of the "
         "nutation period, within min_on_time and max_on_time.",
-        examples=["50 ms"],
+        "50 ms",
     )
-    faults: LoopFaultsSection | None = Field(
-        default=None, description="Faults to fly with, default none.", examples=[{"reversed": ["+M1"]}]
-    )
+    faults: LoopFaultsSection | None = Field("Faults to fly with, default none.", {"reversed": ["+M1"]})

@@ -53,46 +53,30 @@ class InertiaSection(Section):
 
     schema_extra: ClassVar = {"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
 
-    A: Moment | None = Field(default=None, description="Transverse moment of inertia, kg m².", examples=["120 kg m^2"])
-    C: Moment | None = Field(
-        default=None, description="Moment of inertia about the spin axis 3, kg m²; at most 2 A.", examples=["80 kg m^2"]
-    )
+    A: Moment | None = Field("Transverse moment of inertia, kg m².", "120 kg m^2")
+    C: Moment | None = Field("Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2")
     tensor: Tensor | None = Field(
-        default=None,
-        description="Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
-        examples=[[[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]]],
+        "Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
+        [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
     )
 
 
 class StateSection(Section):
     """The motion at t = 0 by spin and nutation angle."""
 
-    spin: Rate = Field(description="Spin rate about axis 3, signed, rad/s; not zero.", examples=["30 rpm"])
+    spin: Rate = Field("Spin rate about axis 3, signed, rad/s; not zero.", "30 rpm")
     nutation: Nutation = Field(
-        description="Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.",
-        examples=["5 deg"],
+        "Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.", "5 deg"
     )
-    phase: Angle = Field(
-        default=0.0,
-        description="Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.",
-        examples=["20 deg"],
-    )
+    phase: Angle = Field("Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.", "20 deg", default=0.0)
 
 
 class AttitudeSection(Section):
     """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
 
-    quaternion: Quaternion = Field(
-        description="Turn from body to frame, scalar first; normalised when read.", examples=[[1, 0, 0, 0]]
-    )
-    epoch: Epoch | None = Field(
-        default=None,
-        description="Date and time of t = 0, ISO 8601; without a zone it is UTC.",
-        examples=["2026-03-01T12:00:00Z"],
-    )
-    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field(
-        default=None, description="Inertial frame of the quaternion.", examples=["EME2000"]
-    )
+    quaternion: Quaternion = Field("Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0])
+    epoch: Epoch | None = Field("Date and time of t = 0, ISO 8601; without a zone it is UTC.", "2026-03-01T12:00:00Z")
+    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the quaternion.", "EME2000")
 
 
 class ThrusterSection(Section):
@@ -105,73 +89,47 @@ class ThrusterSection(Section):
         ]
     }
 
-    name: Name = Field(description="Name of the thruster, used by channels and in schedules.", examples=["T1"])
-    position: Position | None = Field(
-        default=None, description="Where the force acts, from the centre of mass, m.", examples=[[0, "0.5 m", "0.8 m"]]
-    )
+    name: Name = Field("Name of the thruster, used by channels and in schedules.", "T1")
+    position: Position | None = Field("Where the force acts, from the centre of mass, m.", [0, "0.5 m", "0.8 m"])
     direction: Direction | None = Field(
-        default=None,
-        description="Direction of the force on the spacecraft (against the plume), any length but zero.",
-        examples=[[1, 0, 0]],
+        "Direction of the force on the spacecraft (against the plume), any length but zero.", [1, 0, 0]
     )
-    force: Force | None = Field(default=None, description="Thrust, N.", examples=["10 N"])
+    force: Force | None = Field("Thrust, N.", "10 N")
     torque: Torques | None = Field(
-        default=None,
-        description="Torque about the centre of mass, N m; instead of position, direction and force.",
-        examples=[[0, "-8 N m", 0]],
+        "Torque about the centre of mass, N m; instead of position, direction and force.", [0, "-8 N m", 0]
     )
-    lever_arm: Lever | None = Field(
-        default=None,
-        description="Lever arm, m, that gives the thrust of a torque, for the propellant.",
-        examples=["0.8 m"],
-    )
-    isp: PositiveTime | None = Field(
-        default=None, description="Specific impulse, s, for the propellant.", examples=["220 s"]
-    )
-    min_on_time: Time = Field(default=0.0, description="Shortest firing, s; default 0.", examples=["20 ms"])
-    max_on_time: PositiveTime | None = Field(
-        default=None, description="Longest firing, s; default: no limit.", examples=["2 s"]
-    )
+    lever_arm: Lever | None = Field("Lever arm, m, that gives the thrust of a torque, for the propellant.", "0.8 m")
+    isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
+    min_on_time: Time = Field("Shortest firing, s; default 0.", "20 ms", default=0.0)
+    max_on_time: PositiveTime | None = Field("Longest firing, s; default: no limit.", "2 s")
     valve: ValveSection | None = Field(
-        default=None,
-        description="How the thrust follows a command; default: that of the file, or full thrust at once.",
-        examples=[{"open_delay": "8 ms", "close_delay": "12 ms"}],
+        "How the thrust follows a command; default: that of the file, or full thrust at once.",
+        {"open_delay": "8 ms", "close_delay": "12 ms"},
     )
     impulse_bit: ImpulseBits | None = Field(
-        default=None,
-        description="Instead of valve a table from tests: rows of on-time, s, impulse, N s, and its centroid after the "
+        "Instead of valve a table from tests: rows of on-time, s, impulse, N s, and its centroid after the "
         "start of the command, s.",
-        examples=[[["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]]],
+        [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
     )
 
 
 class SteerableSection(Section):
     """A torquer for any transverse axis; body-fixed during one pulse."""
 
-    torque: Torque | None = Field(
-        default=None, description="Torque, N m; without it ideal impulses of no duration.", examples=["20 N m"]
-    )
-    isp: PositiveTime | None = Field(
-        default=None, description="Specific impulse, s, for the propellant.", examples=["220 s"]
-    )
-    lever_arm: Lever | None = Field(default=None, description="Lever arm, m, for the propellant.", examples=["1 m"])
+    torque: Torque | None = Field("Torque, N m; without it ideal impulses of no duration.", "20 N m")
+    isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
+    lever_arm: Lever | None = Field("Lever arm, m, for the propellant.", "1 m")
 
 
 class RequirementSection(Section):
     """What a plan must reach at its end."""
 
-    nutation: AcuteAngle | None = Field(
-        default=None, description="Largest nutation angle, rad, above 0 and below 90 deg.", examples=["0.5 deg"]
-    )
+    nutation: AcuteAngle | None = Field("Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg")
     momentum_shift: AcuteAngle | None = Field(
-        default=None,
-        description="Largest turn of the angular momentum, rad, above 0 and below 90 deg.",
-        examples=["0.2 deg"],
+        "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
     )
     probability: Probability | None = Field(
-        default=None,
-        description="How surely dispersed flights must meet it, above 0 and below 1 (or in %).",
-        examples=["99.7 %"],
+        "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"
     )
 
 
@@ -179,45 +137,30 @@ class GoalSection(Section):
     """Where the motion is to end; without it the angular momentum stays where it is, and the spin may change."""
 
     tilt: Tilt | None = Field(
-        default=None,
-        description="Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.",
-        examples=["10 deg"],
+        "Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.", "10 deg"
     )
     azimuth: Angle | None = Field(
-        default=None,
-        description="Azimuth of the target axis about the angular momentum, rad, from the side to which the spin axis "
+        "Azimuth of the target axis about the angular momentum, rad, from the side to which the spin axis "
         "leans at t = 0.",
-        examples=["45 deg"],
+        "45 deg",
     )
     right_ascension: Angle | None = Field(
-        default=None,
-        description="Right ascension of the target axis in the attitude's frame, rad.",
-        examples=["83.6 deg"],
+        "Right ascension of the target axis in the attitude's frame, rad.", "83.6 deg"
     )
-    declination: Declination | None = Field(
-        default=None, description="Declination of the target axis in the attitude's frame, rad.", examples=["22 deg"]
-    )
-    spin: Rate | None = Field(
-        default=None, description="Spin rate about axis 3 at the end, rad/s, signed.", examples=["31 rpm"]
-    )
+    declination: Declination | None = Field("Declination of the target axis in the attitude's frame, rad.", "22 deg")
+    spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
 
 
 class LimitsSection(Section):
     """What every schedule respects."""
 
-    horizon: PositiveTime | None = Field(
-        default=None, description="End of the planning time, s; default: 20 nutation periods.", examples=["120 s"]
-    )
-    earliest: Time = Field(default=0.0, description="Earliest start of a pulse, s; default 0.", examples=["5 s"])
-    gap: Time = Field(default=0.0, description="Least time between two pulses, s; default 0.", examples=["0.5 s"])
-    tick: PositiveTime | None = Field(
-        default=None, description="Resolution of commanded starts and on-times, s; default: none.", examples=["1 ms"]
-    )
-    max_pulses: Count | None = Field(
-        default=None, description="Largest number of pulses; default: no limit.", examples=[8]
-    )
+    horizon: PositiveTime | None = Field("End of the planning time, s; default: 20 nutation periods.", "120 s")
+    earliest: Time = Field("Earliest start of a pulse, s; default 0.", "5 s", default=0.0)
+    gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
+    tick: PositiveTime | None = Field("Resolution of commanded starts and on-times, s; default: none.", "1 ms")
+    max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
     blackout: list[Window] = Field(
-        default=[], description="Windows [begin, end], s, in which no pulse may be on.", examples=[[["10 s", "20 s"]]]
+        "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
     )
 
 
@@ -235,27 +178,22 @@ class DisturbanceSection(Section):
 
     schema_extra: ClassVar = {"oneOf": _KINDS}
 
-    name: Name | None = Field(default=None, description="Name of the disturbance, for reports.", examples=["leak"])
+    name: Name | None = Field("Name of the disturbance, for reports.", "leak")
     kind: Literal["constant", "rotating", "axial"] | None = Field(
-        default=None,
-        description="constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
+        "constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
         "Default: rotating where rate or fixed_in is given, else constant.",
-        examples=["rotating"],
+        "rotating",
     )
     torque: DisturbingTorques = Field(
-        description="Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
+        "Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
         "of an axial one a single torque.",
-        examples=[["20 mN m", 0, 0]],
+        ["20 mN m", 0, 0],
     )
     rate: Rate | None = Field(
-        default=None,
-        description="Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.",
-        examples=["-3 rad/s"],
+        "Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.", "-3 rad/s"
     )
     fixed_in: Literal["inertial"] | None = Field(
-        default=None,
-        description="inertial: a rotating torque nearly fixed in space; its rate is minus the spin.",
-        examples=["inertial"],
+        "inertial: a rotating torque nearly fixed in space; its rate is minus the spin.", "inertial"
     )
 
 
@@ -263,8 +201,7 @@ class DissipationSection(Section):
     """Energy dissipation within the body, by flexible parts or liquids."""
 
     time_constant: PositiveTime = Field(
-        description="Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e.",
-        examples=["600 s"],
+        "Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e.", "600 s"
     )
 
 
@@ -273,114 +210,78 @@ class SpacecraftFile(Section):
 
     schema_extra: ClassVar = {"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]}
 
-    name: Name = Field(description="Name of the spacecraft.", examples=["Sounder-1"])
-    mass: Mass | None = Field(
-        default=None, description="Mass, kg; without it no velocity change is worked out.", examples=["250 kg"]
-    )
+    name: Name = Field("Name of the spacecraft.", "Sounder-1")
+    mass: Mass | None = Field("Mass, kg; without it no velocity change is worked out.", "250 kg")
     inertia: InertiaSection = Field(
-        description="Moments of inertia: A and C, or tensor, kg m².", examples=[{"A": "120 kg m^2", "C": "80 kg m^2"}]
+        "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
     )
     omega0: Rates | None = Field(
-        default=None,
-        description="Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.",
-        examples=[[0.12, "2 deg/s", "30 rpm"]],
+        "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]
     )
     state: StateSection | None = Field(
-        default=None,
-        description="Motion at t = 0 by spin and nutation; or instead omega0.",
-        examples=[{"spin": "30 rpm", "nutation": "5 deg"}],
+        "Motion at t = 0 by spin and nutation; or instead omega0.", {"spin": "30 rpm", "nutation": "5 deg"}
     )
     attitude: AttitudeSection | None = Field(
-        default=None,
-        description="Attitude at t = 0.",
-        examples=[{"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}],
+        "Attitude at t = 0.", {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
     )
     object_id: Name | None = Field(
-        default=None,
-        description="International designator, such as 1998-001A, for messages to flight dynamics.",
-        examples=["1998-001A"],
+        "International designator, such as 1998-001A, for messages to flight dynamics.", "1998-001A"
     )
     orbit: OrbitSection | None = Field(
-        default=None,
-        description="Position and velocity at t = 0, for messages to flight dynamics.",
-        examples=[{"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]}],
+        "Position and velocity at t = 0, for messages to flight dynamics.",
+        {"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]},
     )
     thrusters: list[ThrusterSection] = Field(
+        "Body-fixed thrusters.",
+        [{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}],
         default=[],
-        description="Body-fixed thrusters.",
-        examples=[[{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}]],
     )
     channels: Annotated[dict[str, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
-        default=None,
-        description="Names of thrusters that fire together; without it each thruster is a channel of its own.",
-        examples=[{"+M1": ["T1", "T2"]}],
+        "Names of thrusters that fire together; without it each thruster is a channel of its own.",
+        {"+M1": ["T1", "T2"]},
     )
-    steerable: SteerableSection | None = Field(
-        default=None, description="A torquer for any transverse axis.", examples=[{"torque": "20 N m"}]
-    )
+    steerable: SteerableSection | None = Field("A torquer for any transverse axis.", {"torque": "20 N m"})
     valve: ValveSection | None = Field(
-        default=None,
-        description="How the thrust of every thruster that does not say it itself follows a command.",
-        examples=[{"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"}],
+        "How the thrust of every thruster that does not say it itself follows a command.",
+        {"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"},
     )
     cold: ColdSection | None = Field(
-        default=None,
-        description="Cold nozzles, which make the first pulses of each channel weaker.",
-        examples=[{"first": "90 %", "pulses": 4}],
+        "Cold nozzles, which make the first pulses of each channel weaker.", {"first": "90 %", "pulses": 4}
     )
     tank: TankSection | None = Field(
-        default=None,
-        description="The tank in blowdown, whose pressure the thrust goes with.",
-        examples=[{"propellant": "30 kg", "pressure": "22 bar", "final_pressure": "8 bar"}],
+        "The tank in blowdown, whose pressure the thrust goes with.",
+        {"propellant": "30 kg", "pressure": "22 bar", "final_pressure": "8 bar"},
     )
     disturbances: list[DisturbanceSection] = Field(
-        default=[],
-        description="Disturbance torques.",
-        examples=[[{"name": "leak", "torque": ["20 mN m", 0, 0]}]],
+        "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
     )
     dissipation: DissipationSection | None = Field(
-        default=None,
-        description="Energy dissipation; without it the body is rigid.",
-        examples=[{"time_constant": "600 s"}],
+        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s"}
     )
-    requirement: RequirementSection | None = Field(
-        default=None, description="What a plan must reach.", examples=[{"nutation": "0.5 deg"}]
-    )
-    limits: LimitsSection | None = Field(
-        default=None, description="Limits that every schedule respects.", examples=[{"horizon": "120 s"}]
-    )
+    requirement: RequirementSection | None = Field("What a plan must reach.", {"nutation": "0.5 deg"})
+    limits: LimitsSection | None = Field("Limits that every schedule respects.", {"horizon": "120 s"})
     goal: GoalSection | None = Field(
-        default=None,
-        description="Where the spin axis and the spin are to end.",
-        examples=[{"tilt": "10 deg", "azimuth": "45 deg"}],
+        "Where the spin axis and the spin are to end.", {"tilt": "10 deg", "azimuth": "45 deg"}
     )
     sun: Annotated[InTheSky, OrWord("epoch")] | None = Field(
-        default=None,
-        description="Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
-        examples=["epoch", ["120 deg", "10 deg"]],
+        "Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
+        "epoch",
+        ["120 deg", "10 deg"],
     )
     keep: list[KeepSection] = Field(
+        "Cones that the spin axis keeps on its way to a target.",
+        [{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}],
         default=[],
-        description="Cones that the spin axis keeps on its way to a target.",
-        examples=[[{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}]],
     )
-    sun_sensor: SunSensorSection | None = Field(
-        default=None, description="The sensor whose pulse fires command blocks.", examples=[{"azimuth": "35 deg"}]
-    )
+    sun_sensor: SunSensorSection | None = Field("The sensor whose pulse fires command blocks.", {"azimuth": "35 deg"})
     commands: CommandsSection | None = Field(
-        default=None,
-        description="Command blocks: pulses fired by the Sun pulse.",
-        examples=[
-            {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}}
-        ],
+        "Command blocks: pulses fired by the Sun pulse.",
+        {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}},
     )
     loop: LoopSection | None = Field(
-        default=None,
-        description="A closed loop that damps by what a sensor shows.",
-        examples=[{"sensor": {"kind": "gyro", "rate": "100 Hz"}, "start": "0.5 deg", "stop": "0.05 deg"}],
+        "A closed loop that damps by what a sensor shows.",
+        {"sensor": {"kind": "gyro", "rate": "100 Hz"}, "start": "0.5 deg", "stop": "0.05 deg"},
     )
     dispersions: DispersionsSection | None = Field(
-        default=None,
-        description="How far the real spacecraft may be off what the file says.",
-        examples=[{"A": {"normal": "2 %"}}],
+        "How far the real spacecraft may be off what the file says.", {"A": {"normal": "2 %"}}
     )

@@ -1,7 +1,7 @@
 """Sections of a file, declared as classes: what may be at their keys, read and checked, and as JSON Schema.
 
-A key is an annotated attribute, ``mass: Mass | None = Field(default=None, description="…")``. Types are those of what
-YAML and JSON hold, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\\ s.
+A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of what YAML and
+JSON hold, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\\ s.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Key:
     examples: list[Any]
 
 
-def Field(*, description: str, examples: list[Any], default: Any = REQUIRED) -> Any:
-    """A key of a `Section`; its type is the annotation."""
-    return Key(None, default, description, examples)
+def Field(description: str, *examples: Any, default: Any = REQUIRED) -> Any:
+    """A key of a `Section`; its type is the annotation, and one that may be None is so by default."""
+    return Key(None, default, description, list(examples))
 
 
 class Rule:
@@ -112,7 +112,12 @@ class Section:
     def fields(cls) -> dict[str, Key]:
         """Its keys, by name."""
         types = get_type_hints(cls, include_extras=True)
-        return {name: replace(key, type=types[name]) for name, key in vars(cls).items() if isinstance(key, Key)}
+        found = {}
+        for name, key in vars(cls).items():
+            if isinstance(key, Key):
+                optional = key.default is REQUIRED and NoneType in get_args(types[name])
+                found[name] = replace(key, type=types[name], default=None if optional else key.default)
+        return found
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:

@@ -15,13 +15,13 @@ Time = Annotated[float, Quantity("time", minimum=0)]
 
 
 def key(default: Any = None) -> Any:
-    return Field(default=default, description="What it is.", examples=[])
+    return Field("What it is.", default=default)
 
 
 class Inner(Section):
     """Below."""
 
-    t: Time = Field(description="Time of it, s.", examples=["1 s"])
+    t: Time = Field("Time of it, s.", "1 s")
 
 
 class Outer(Section):
