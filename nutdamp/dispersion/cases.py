@@ -176,7 +176,7 @@ class Model:
         if axis is None:
             axis = np.asarray(body.inertia.moments) * body.omega0
         else:
-            axis = attitude.rotate(body.initial.quaternion * np.array([1.0, -1.0, -1.0, -1.0]), np.asarray(axis))
+            axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(axis))
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:

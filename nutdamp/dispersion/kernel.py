@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from nutdamp.dispersion.cases import DispersedCases, Model
 from nutdamp.dispersion.elementwise import TINY, Cases, Triple, plus, rotated, times
 from nutdamp.dispersion.watched import watch_of
-from nutdamp.physics import energy_sink
+from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid import Forcing
 from nutdamp.physics.rigid_cases import Bodies, Stretch, cos_sin
@@ -205,15 +205,7 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
     w = 1.0 / np.sqrt(1.0 + half * half)
     scale = half * w / size
     x, y, z = scale * x, scale * y, scale * z
-    if turn is None:
-        return w, x, y, z
-    p, a, b, c = turn
-    return (
-        p * w - a * x - b * y - c * z,
-        p * x + a * w + b * z - c * y,
-        p * y - a * z + b * w + c * x,
-        p * z + a * y - b * x + c * w,
-    )
+    return (w, x, y, z) if turn is None else attitude.product(turn, (w, x, y, z))
 
 
 def _slipped(

@@ -7,7 +7,6 @@ sketch only counts.
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,28 +30,6 @@ _SHIFT = 52 - SHARPNESS
 _LOWEST = (1023 - OCTAVES) << SHARPNESS
 
 
-class Distribution(Protocol):
-    """An output over all cases so far."""
-
-    @property
-    def minimum(self) -> float:
-        """Smallest value."""
-        ...
-
-    @property
-    def maximum(self) -> float:
-        """Largest value."""
-        ...
-
-    def quantiles(self, probabilities: Array) -> Array:
-        """Values not exceeded with these probabilities (n,) from 0 to 1, as `numpy.quantile` defines them."""
-        ...
-
-    def histogram(self, edges: Array) -> Array:
-        """Cases between each two of ``edges``."""
-        ...
-
-
 class Exact:
     """All values, in the order of the cases."""
 
@@ -70,7 +47,10 @@ class Exact:
         return float(self.values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Exact quantiles, to the last bit those of `numpy.quantile`; each divides what lies above the last one."""
+        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`.
+
+        Each divides what lies above the last one.
+        """
         places = np.asarray(probabilities) * (len(self.values) - 1)
         found = np.empty(len(places))
         rest, first = self.values.copy(), 0  # what lies above the last quantile, and its rank
@@ -125,6 +105,10 @@ class Sketch:
     def histogram(self, edges: Array) -> Array:
         """Cases between each two of ``edges``."""
         return np.histogram(_middles(), edges, weights=self.counts.astype(float))[0]
+
+
+Distribution = Exact | Sketch
+"""An output over all cases so far."""
 
 
 def _middles() -> Array:

@@ -200,7 +200,7 @@ class Results:
         """The distribution of an output; None where it is not known (propellant)."""
         row = OUTPUTS.index(output)
         if self.sketches is not None:
-            found: Distribution = self.sketches[row]
+            found = self.sketches[row]
             return None if math.isinf(found.minimum) or math.isnan(found.minimum) else found
         assert self.values is not None
         values = self.values[row, : self.done]

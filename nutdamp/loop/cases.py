@@ -215,12 +215,11 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
     def off(key: str) -> float:
         return float(np.mean([draw.get(f"{key} {one.name}", 0.0) for one in channel.thrusters]))
 
-    from nutdamp.physics.valve import Measured, Trapezoid  # few spacecraft have any
+    from nutdamp.physics.valve import Measured  # few spacecraft have any
 
     if isinstance(valve, Measured):
         factor = 1.0 + off("impulse_bit")
         return Measured(tuple((command, factor * given, centroid) for command, given, centroid in valve.rows))
-    assert isinstance(valve, Trapezoid)
     return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in TIMES})
 
 

@@ -7,6 +7,8 @@ v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p. 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +23,18 @@ _BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 def multiply(left: Array, right: Array) -> Array:
     """Product of two quaternions, (..., 4) each: the turn ``right``, then the turn ``left``."""
-    w1, x1, y1, z1 = np.moveaxis(np.asarray(left), -1, 0)
-    w2, x2, y2, z2 = np.moveaxis(np.asarray(right), -1, 0)
-    return np.stack(
-        [
-            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-        ],
-        axis=-1,
+    return np.stack(product(np.moveaxis(np.asarray(left), -1, 0), np.moveaxis(np.asarray(right), -1, 0)), axis=-1)
+
+
+def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
+    """The same of quaternions by components, each a number or an array."""
+    p, a, b, c = left
+    w, x, y, z = right
+    return (
+        p * w - a * x - b * y - c * z,
+        p * x + a * w + b * z - c * y,
+        p * y - a * z + b * w + c * x,
+        p * z + a * y - b * x + c * w,
     )
 
 
@@ -128,19 +132,12 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
 
 def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float) -> Array:
     """`arc` at one moment ``time`` s after its start, (4,): in plain numbers a tenth of the work of arrays."""
-    w, x, y, z = quaternion.tolist()
     h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
     size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
     half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * (A - C) / A * spin * time
     # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) = (cos, sin Rh) q.
     sine = math.sin(half_about_momentum) / size if size > 0.0 else 0.0
-    p0, p1, p2, p3 = math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3
-    w, x, y, z = (
-        w * p0 - x * p1 - y * p2 - z * p3,
-        w * p1 + x * p0 + y * p3 - z * p2,
-        w * p2 - x * p3 + y * p0 + z * p1,
-        w * p3 + x * p2 - y * p1 + z * p0,
-    )
+    w, x, y, z = product(quaternion.tolist(), (math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3))
     cosine, sine = math.cos(half_about_axis), math.sin(half_about_axis)
     return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])
 

@@ -8,12 +8,13 @@ Angles come from components by arctan2: arccos loses everything below 1e-8 rad.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, overload
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Rate = TypeVar("Rate", float, Array)
 
 
 class Cones(NamedTuple):
@@ -39,41 +40,32 @@ def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> Cones:
     return Cones(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
 
 
-@overload
-def nutation_angle(A: float, C: float, omega: float, spin: float) -> float: ...
-@overload
-def nutation_angle(A: float, C: float, omega: Array, spin: Array) -> Array: ...
-def nutation_angle(A: float, C: float, omega: float | Array, spin: float | Array) -> float | Array:
+def nutation_angle(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
     """Nutation angle θ = λ + μ in rad between spin axis and angular momentum, Magnus 1970 (19).
 
     tan θ = A|ω| / (C|ω3|), from 0 (pure spin) to π/2 (no spin).
     """
-    return np.arctan2(A * omega, C * np.abs(spin))
+    found: Rate = np.arctan2(A * omega, C * np.abs(spin))
+    return found
 
 
-@overload
-def body_cone(omega: float, spin: float) -> float: ...
-@overload
-def body_cone(omega: Array, spin: Array) -> Array: ...
-def body_cone(omega: float | Array, spin: float | Array) -> float | Array:
+def body_cone(omega: Rate, spin: Rate) -> Rate:
     """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|.
 
     The form of (18), for symmetric bodies; flights take their cones from `momentary`.
     """
-    return np.arctan2(omega, np.abs(spin))
+    found: Rate = np.arctan2(omega, np.abs(spin))
+    return found
 
 
-@overload
-def space_cone(A: float, C: float, omega: float, spin: float) -> float: ...
-@overload
-def space_cone(A: float, C: float, omega: Array, spin: Array) -> Array: ...
-def space_cone(A: float, C: float, omega: float | Array, spin: float | Array) -> float | Array:
+def space_cone(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
     """Half-angle λ of the space cone ("Spurkegel") in rad, signed: negative for oblate bodies; the form of (20).
 
     Magnus 1970 (20), whose print has a minus in the denominator and ω1² for |ω|²: with tan(λ + μ) = A|ω|/(C|ω3|) and
     tan μ = |ω|/|ω3| the difference of angles gives tan λ = (A - C)|ω||ω3| / (C ω3² + A|ω|²).
     """
-    return np.arctan2((A - C) * omega * np.abs(spin), C * np.square(spin) + A * np.square(omega))
+    found: Rate = np.arctan2((A - C) * omega * np.abs(spin), C * np.square(spin) + A * np.square(omega))
+    return found
 
 
 def transverse_rate(A: float, C: float, nutation: float, spin: float) -> float:

@@ -159,18 +159,19 @@ def _strength(acceleration: Array, jerk: Array | None, forcing: Forcing, least: 
     return strength if jerk is None else max(strength, float(np.linalg.norm(acceleration + jerk * duration)))
 
 
-def _too_long(start: float, end: float, angle: float) -> Infeasible:
+def _refused(start: float, end: float, why: str) -> Infeasible:
     return Infeasible(
-        f"the motion from {start:.4g} s to {end:.4g} s runs over {angle:.2g} rad, too many to be "
-        f"integrated; shorten the time, or look for a torque or rate that is too large"
+        f"the motion from {start:.4g} s to {end:.4g} s {why} to be integrated; shorten the time, or look for a torque "
+        "or rate that is too large"
     )
+
+
+def _too_long(start: float, end: float, angle: float) -> Infeasible:
+    return _refused(start, end, f"runs over {angle:.2g} rad, too many")
 
 
 def _too_many(start: float, end: float) -> Infeasible:
-    return Infeasible(
-        f"the motion from {start:.4g} s to {end:.4g} s takes too many steps to be integrated; shorten the time, or "
-        "look for a torque or rate that is too large"
-    )
+    return _refused(start, end, "takes too many steps")
 
 
 def _symmetric(

@@ -9,7 +9,6 @@ stays in the cache.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import driven, energy_sink
+from nutdamp.physics import attitude, driven, energy_sink
 from nutdamp.physics.rigid import LONGEST, NOTHING, Forcing
 from nutdamp.physics.rigid_series import Series
 
@@ -287,7 +286,7 @@ def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duratio
     size = np.sqrt(x * x + y * y + axial * axial)
     cosine, sine = cos_sin(0.5 * size * duration)
     sine /= np.where(size > 0.0, size, 1.0)
-    turned = _product(quaternion, (cosine, sine * x, sine * y, sine * axial))
+    turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
     angle = (1.0 - C / A) * rates[2] * duration
     cosine, sine = cos_sin(0.5 * angle)
     p, a, b, c = turned
@@ -310,22 +309,10 @@ def _slip(
     h1, h2 = rates[0] / moving, rates[1] / moving
     found = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
     behind = rate * (found.turned - duration)
-    quaternion[:] = _product(quaternion, energy_sink.slip(found, h1, h2, behind, cos_sin))
+    quaternion[:] = attitude.product(quaternion, energy_sink.slip(found, h1, h2, behind, cos_sin))
     cosine, sine = cos_sin(behind)
     x, y = rates[0] * found.transverse, rates[1] * found.transverse
     rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * found.axial
-
-
-def _product(left: Sequence[Array] | Array, right: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
-    """Product of quaternions given by components, see `attitude.multiply`."""
-    p, a, b, c = left
-    w, x, y, z = right
-    return (
-        p * w - a * x - b * y - c * z,
-        p * x + a * w + b * z - c * y,
-        p * y - a * z + b * w + c * x,
-        p * z + a * y - b * x + c * w,
-    )
 
 
 def _integrate(here: Stretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:

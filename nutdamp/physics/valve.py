@@ -12,7 +12,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,35 +91,6 @@ class Opened(NamedTuple):
         return total, np.where(total == 0.0, first, centroid), np.sqrt(12.0 * variance)
 
 
-class Valve(Protocol):
-    """What leads from commands to thrust. Times of commands are on-times as they are loaded."""
-
-    @property
-    def known(self) -> tuple[float, float]:
-        """Shortest and longest on-time (s) of which it is known what they give."""
-        ...
-
-    def __hash__(self) -> int:
-        """Valves with the same numbers are the same."""
-        ...
-
-    def thrust(self, on_time: float) -> Thrust:
-        """What a command of ``on_time`` s gives."""
-        ...
-
-    def on_time_for(self, effective: float) -> float:
-        """On-time (s) of the command that acts as long as full thrust for ``effective`` s; the nearest there is."""
-        ...
-
-    def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
-        """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of full thrust.
-
-        The lead is the time from the start of the command to that of the effective pulse, the lag that from the end of
-        the effective pulse until command and thrust are over.
-        """
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
     """A valve that opens and closes with delays, s; the thrust then rises and falls evenly.
@@ -138,7 +109,7 @@ class Trapezoid:
 
     @property
     def known(self) -> tuple[float, float]:
-        """Any."""
+        """Shortest and longest on-time (s) of which it is known what they give: any."""
         return 0.0, math.inf
 
     def thrust(self, on_time: float) -> Thrust:
@@ -178,7 +149,7 @@ class Trapezoid:
         return Opened((opens, opens + level * rise, opens + held, opens + held + level * fall), level)
 
     def on_time_for(self, effective: float) -> float:
-        """On-time (s) that acts like full thrust for ``effective`` s."""
+        """On-time (s) of the command that acts like full thrust for ``effective`` s."""
         return effective if self.effective else self._command(effective)
 
     def _command(self, effective: float) -> float:
@@ -195,7 +166,10 @@ class Trapezoid:
         return opened + self.open_delay - self.close_delay
 
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
-        """Bounds (s) of lead and lag.
+        """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of full thrust.
+
+        The lead is the time from the start of the command to that of the effective pulse, the lag that from the end of
+        the effective pulse until command and thrust are over.
 
         With full thrust the lead is open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle of
         level h has open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one maximum.
@@ -242,7 +216,7 @@ class Measured:
         return Thrust(effective, centroid, (Ramp(begin, begin + effective, 1.0, 1.0),))
 
     def on_time_for(self, effective: float) -> float:
-        """On-time (s) that acts like full thrust for ``effective`` s."""
+        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest there is."""
         return self._between(1, effective, 0)
 
     def opened(self, on_time: float, factor: Any) -> Opened:
@@ -266,7 +240,7 @@ class Measured:
         return low + share * (high - low) if share < 1.0 else high
 
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
-        """Bounds (s) of lead and lag: both run evenly between the rows."""
+        """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both run evenly between the rows."""
         places = [shortest, longest, *(row[1] for row in self.rows if shortest < row[1] < longest)]
         leads, lags = [], []
         for place in places:
@@ -275,6 +249,10 @@ class Measured:
             leads.append(found.ramps[0].begin)
             lags.append(max(on_time - found.ramps[0].end, 0.0))
         return max(leads), max(lags)
+
+
+Valve = Trapezoid | Measured
+"""What leads from commands to thrust. Times of commands are on-times as they are loaded."""
 
 
 @functools.cache

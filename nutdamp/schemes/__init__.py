@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, cast
@@ -84,13 +84,13 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     if scheme.on_true_body:
         return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
     if spacecraft.thrust_laws:
-        from nutdamp.schemes.tools import commanding
+        from nutdamp.schemes.tools import commanding, least_squares
 
         on_plain = commanding.options(spacecraft, chosen)
         return commanding.planned(
             spacecraft,
             lambda body: schedule(name, body, on_plain),
-            _Correction(scheme, on_plain),
+            least_squares.Correction(scheme, on_plain),
         )
     model = model_of(spacecraft, turning=chosen.equal)
 
@@ -103,12 +103,6 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         raise TooShort(short.why, short.cure or _longer_horizon(model.body, planned)) from None
     return _corrected(scheme, model, made, chosen)
 
-
-MOVED = 8
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
-
-BEFORE, AFTER = 12, 24
-"""Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
 
 LONGER = 4.0
 """Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
@@ -165,11 +159,11 @@ def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choi
 
     Raises KeyError for a name not in `NAMES`.
     """
-    from nutdamp.schemes.tools import commanding
+    from nutdamp.schemes.tools import commanding, least_squares
 
     scheme = SCHEMES[name]
     chosen = commanding.options(spacecraft, options_of(scheme, options))
-    return commanding.as_commands(spacecraft, made, _Correction(scheme, chosen))
+    return commanding.as_commands(spacecraft, made, least_squares.Correction(scheme, chosen))
 
 
 def _loaded(scheme: Scheme) -> ModuleType:
@@ -184,41 +178,8 @@ def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: S
         made = made.without_proof
     if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
         made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
-    return made if model.exact else _Correction(scheme, options)(model.spacecraft, made)
+    if model.exact:
+        return made
+    from nutdamp.schemes.tools import least_squares
 
-
-@dataclass(frozen=True, slots=True)
-class _Correction:
-    """Corrects schedules of a ``scheme`` on the motion of a true spacecraft."""
-
-    scheme: Scheme
-    options: SchemeOptions
-
-    @property
-    def momentum(self) -> bool:
-        """Whether H too is to end where it should."""
-        return self.scheme.points and not self.options.frees_axis
-
-    @property
-    def equal(self) -> bool:
-        """Whether the pulses are planned to be equal."""
-        return self.options.equal
-
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = 4) -> Schedule:
-        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        from nutdamp.schemes.tools import least_squares
-
-        if self.options.uncorrected or not made.pulses:
-            return made
-        # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-        whole, given = free == 4, self.options.equal and not self.options.resizable
-        last = free if not (whole and self.options.equal) else AFTER if given else MOVED
-        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
-        if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
-            damping = [index for index, pulse in enumerate(made) if not least_squares.alike(made, pulse)]
-            chosen = (*damping[:BEFORE], *chosen)
-        spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
-        if spin and whole:  # and the pulse that gives most to the spin
-            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
-        sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
-        return least_squares.correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
+    return least_squares.Correction(scheme, options)(model.spacecraft, made)

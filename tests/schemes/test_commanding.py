@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +24,9 @@ from nutdamp.physics.valve import Measured, Trapezoid, Valve
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule, channel_pulse, on_command
 from nutdamp.schemes.options import FourPulseOptions, RhumbLineOptions
+from nutdamp.schemes.registry import RHUMB_LINE
 from nutdamp.schemes.tools import commanding
+from nutdamp.schemes.tools.least_squares import TAIL, Correction
 from nutdamp.spacecraft import Channel, Limits, Spacecraft
 from nutdamp.verification import verify
 
@@ -279,14 +281,13 @@ def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str
     assert not any("equal in impulse" in one for one in planning.plan(body, "rhumb-line").pulses.notes)
 
 
-class Silencing(NamedTuple):
+@dataclass(frozen=True)
+class Silencing(Correction):
     """A correction of a train that leaves the pulse of this number without thrust."""
 
     silenced: int
-    momentum: bool = True
-    equal: bool = True
 
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:  # noqa: ARG002
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:  # noqa: ARG002
         pulses = list(made.pulses)
         pulses[self.silenced] = replace(pulses[self.silenced], impulse=np.zeros(3), on_time=0.0)
         return replace(made, pulses=tuple(pulses))
@@ -298,7 +299,7 @@ def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> Non
     body = replace(short_pulses(), cold=Cold(0.8, 4.0))
     one = body.channels[0]
     planned = Schedule(tuple(channel_pulse(one, 2.0 * n, on_time) for n, on_time in enumerate([0.4, 0.3] + 4 * [0.03])))
-    found = commanding.as_commands(body, planned, Silencing(silenced))
+    found = commanding.as_commands(body, planned, Silencing(RHUMB_LINE, RhumbLineOptions(), silenced))
     assert len(found) == 5
     (note,) = (one for one in found.notes if one.startswith("equal in impulse"))
     train = [pulse.loaded[1] for pulse in found.pulses[2:]]

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from nutdamp.lightening import lightened, shed
 from nutdamp.limits import commandable, effective_on_time, effective_on_times, keeps_limits, shortest_on_time
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.options import SchemeOptions
-from nutdamp.schemes.tools.least_squares import misses
+from nutdamp.schemes.tools.least_squares import TAIL, Correction, misses
 from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft
 from nutdamp.supply import Supply, supplied
 
@@ -38,9 +37,6 @@ NEARLY, EXACT = 1.1, 1e-10
 
 PLANS = 6
 """Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
-
-TAIL = 4
-"""Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
 
 def plain(
@@ -98,25 +94,7 @@ def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
     return replace(chosen, on_time=found.pop()) if found else chosen  # type: ignore[call-arg]
 
 
-class Correct(Protocol):
-    """Corrects a schedule on the flown motion of a body; ``momentum``: H too is to end where it should."""
-
-    @property
-    def momentum(self) -> bool:
-        """Whether more than the nutation counts."""
-        ...
-
-    @property
-    def equal(self) -> bool:
-        """Whether the pulses are planned to be equal."""
-        ...
-
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int) -> Schedule:
-        """The schedule with no more than the last ``free`` pulses moved."""
-        ...
-
-
-def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correct) -> Schedule:
+def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction) -> Schedule:
     """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
@@ -159,13 +137,15 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
     return min(tried, key=lambda one: one[:2])[2] if tried else as_commands(spacecraft, made, correct, body.inertia)
 
 
-def _left(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> float:
+def _left(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> float:
     """What a schedule leaves of what counts, rad."""
     missed = misses(spacecraft, made)
     return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
 
-def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inertia: Inertia | None = None) -> Schedule:
+def as_commands(
+    spacecraft: Spacecraft, made: Schedule, correct: Correction, inertia: Inertia | None = None
+) -> Schedule:
     """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
 
     ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
@@ -192,7 +172,7 @@ def as_commands(spacecraft: Spacecraft, made: Schedule, correct: Correct, inerti
 
 
 def _weakened(
-    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], found: Schedule, correct: Correct
+    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], found: Schedule, correct: Correction
 ) -> Iterator[str]:
     """What falling pressure and cold nozzles make of a plan, in words; ``pairs`` of its pulses and their commands."""
     if correct.equal and pairs:
@@ -222,7 +202,7 @@ def _firing(made: Schedule) -> Schedule:
 
 
 def _translated(
-    spacecraft: Spacecraft, made: Schedule, inertia: Inertia | None, correct: Correct, *, unbounded: bool = False
+    spacecraft: Spacecraft, made: Schedule, inertia: Inertia | None, correct: Correction, *, unbounded: bool = False
 ) -> tuple[Pulse, ...]:
     """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
 
@@ -255,7 +235,7 @@ def _translated(
 
 
 def _outside(
-    spacecraft: Spacecraft, made: Schedule, inertia: Inertia, correct: Correct
+    spacecraft: Spacecraft, made: Schedule, inertia: Inertia, correct: Correction
 ) -> tuple[list[float], list[float], float]:
     """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
 
@@ -279,7 +259,7 @@ def _outside(
     return weak, strong, longer
 
 
-def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correct) -> Schedule:
+def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
     """The schedule on the ticks of its commands.
 
     It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves

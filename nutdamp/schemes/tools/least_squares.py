@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from nutdamp.dynamics import make_dynamics
 from nutdamp.limits import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
 from nutdamp.physics import attitude
 from nutdamp.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes.options import SchemeOptions
+from nutdamp.schemes.registry import Scheme
 from nutdamp.schemes.tools.symmetric_model import steady_omega
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 from nutdamp.supply import supplied
@@ -38,6 +40,15 @@ INTEGRATED = 50_000
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
 
+
+TAIL = 4
+"""Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
+
+MOVED = 8
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
+
+BEFORE, AFTER = 12, 24
+"""Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
 
 CLEARLY = 0.5
 """A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
@@ -152,6 +163,41 @@ def correct(
     corrected = Schedule(rounded, made.notes, made.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """Corrects schedules of a ``scheme`` on the motion of a true spacecraft."""
+
+    scheme: Scheme
+    options: SchemeOptions
+
+    @property
+    def momentum(self) -> bool:
+        """Whether H too is to end where it should."""
+        return self.scheme.points and not self.options.frees_axis
+
+    @property
+    def equal(self) -> bool:
+        """Whether the pulses are planned to be equal."""
+        return self.options.equal
+
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:
+        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        if self.options.uncorrected or not made.pulses:
+            return made
+        # The last pulses, which know what the others did on the model, undo what the true motion made of them.
+        whole, given = free == TAIL, self.options.equal and not self.options.resizable
+        last = free if not (whole and self.options.equal) else AFTER if given else MOVED
+        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
+        if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
+            damping = [index for index, pulse in enumerate(made) if not alike(made, pulse)]
+            chosen = (*damping[:BEFORE], *chosen)
+        spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
+        if spin and whole:  # and the pulse that gives most to the spin
+            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+        sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
+        return correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
 
 
 def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:

@@ -188,7 +188,7 @@ class _Search:
             unit = middle / np.linalg.norm(middle, axis=1)[:, None]
             outer = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * unit], axis=1)
             there = attitude.multiply(outer, quaternions)
-            back = attitude.rotate(there * np.array([1.0, -1.0, -1.0, -1.0]), jump)
+            back = attitude.rotate(attitude.conjugate(there), jump)
             body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
         return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
 
