@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,20 +48,23 @@ def cross(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
 
 def added(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
     """Sum of vectors."""
-    x, y, z = map(plus, first, second)
-    return x, y, z
+    return triple(map(plus, first, second))
 
 
 def scaled(vector: Sequence[Cases], factor: Cases) -> Triple:
     """A vector times a factor."""
-    x, y, z = (times(part, factor) for part in vector)
+    return triple(times(part, factor) for part in vector)
+
+
+def triple(parts: Iterable[Cases]) -> Triple:
+    """Three components, one for all cases or an array each."""
+    x, y, z = parts
     return x, y, z
 
 
 def parts_of(vector: Vector) -> Triple:
     """The components of one vector (3,)."""
-    x, y, z = vector.tolist()
-    return x, y, z
+    return triple(vector.tolist())
 
 
 def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
@@ -83,8 +86,7 @@ def tilted(first: Cases, second: Cases) -> tuple[Cases, Cases]:
 def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
     """``vector`` turned by the rotation vector (``tilt``, 0)."""
     if all(map(nothing, tilt)):
-        x, y, z = vector
-        return x, y, z
+        return triple(vector)
     first, second = tilt
     cosine, ratio = tilted(first, second)
     # Rodrigues: v cos φ + (u × v) sin φ + u (u·v)(1 - cos φ), with u = tilt/φ and (1 - cos φ)/φ² = ratio²/(1 + cos φ)
@@ -101,4 +103,4 @@ def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
         for entry, part in zip(row, vector, strict=True):
             total = plus(total, part if entry == 1.0 else times(entry, part))
         rows.append(total)
-    return rows[0], rows[1], rows[2]
+    return triple(rows)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nutdamp.dispersion import sun_fired
 from nutdamp.dispersion.cases import DispersedCases, Model
-from nutdamp.dispersion.elementwise import Cases, Triple, rotated
+from nutdamp.dispersion.elementwise import Cases, Triple, rotated, triple
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dispersion.watched import number_of, watch_of
 from nutdamp.dynamics import Dynamics, make_dynamics
@@ -57,12 +57,12 @@ class RealWidths:
         last = moments if shed is None else moments - shed.sum(axis=0)
         if watch is not None:
             watch.turn(rigid_cases.Stretch(self._bodies(last), over, settled, turned))
-        momentum = _triple(last * settled)
+        momentum = triple(last * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)
         return Ends(
             momentum=momentum,
-            before=_triple(moments * rates),
+            before=triple(moments * rates),
             after=after,
             pointed=rotated(after, cases.tilt),
             spin=settled[2],
@@ -79,7 +79,7 @@ class RealWidths:
             return cases
         fired = self._fired(cases)
         pulses = zip(cases.impulses, fired.seen, strict=True)
-        impulses = tuple(_triple(np.array([part * seen for part in impulse])) for impulse, seen in pulses)
+        impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
         return replace(cases, starts=tuple(fired.starts), impulses=impulses)
 
     def _bodies(self, moments: Array) -> rigid_cases.Bodies:
@@ -180,8 +180,3 @@ def _whole(parts: tuple[object, ...], count: int) -> Array:
     for row, part in zip(rows, parts, strict=True):
         row[:] = part  # type: ignore[call-overload]
     return rows
-
-
-def _triple(rows: Array) -> Triple:
-    first, second, third = rows
-    return first, second, third

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import DispersedCases, Model
-from nutdamp.dispersion.elementwise import TINY, Cases, Triple, plus, rotated, times
+from nutdamp.dispersion.elementwise import TINY, Cases, Triple, plus, rotated, times, triple
 from nutdamp.dispersion.watched import watch_of
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.axis_watch import AxisWatch
@@ -333,26 +333,20 @@ def _reordered(cases: DispersedCases, rows: NDArray[np.intp]) -> DispersedCases:
     starts, widths = np.take_along_axis(starts, order, 0), np.take_along_axis(widths, order, 0)
     impulses = np.take_along_axis(impulses, order[:, None, :], 0)
     first, second, third = (taken(moment) for moment in cases.moments)
-    one, two, three = (taken(rate) for rate in cases.omega0)
     spent = None
     if cases.spent is not None:
         spent = tuple(np.take_along_axis(np.array([taken(one) for one in cases.spent]).reshape(starts.shape), order, 0))
     return replace(
         cases,
         moments=(first, first if cases.moments[0] is cases.moments[1] else second, third),
-        omega0=(one, two, three),
+        omega0=triple(taken(rate) for rate in cases.omega0),
         starts=tuple(starts),
         widths=tuple(widths),
         impulses=tuple((impulse[0], impulse[1], impulse[2]) for impulse in impulses),
         tilt=(taken(cases.tilt[0]), taken(cases.tilt[1])),
         spent=spent,
-        per_kg=None if cases.per_kg is None else _triple([taken(part) for part in cases.per_kg]),
+        per_kg=None if cases.per_kg is None else triple(taken(part) for part in cases.per_kg),
     )
-
-
-def _triple(parts: list[Any]) -> Triple:
-    first, second, third = parts
-    return first, second, third
 
 
 def _replaced(ends: Ends, rows: NDArray[np.intp], others: Ends) -> Ends:

@@ -155,8 +155,41 @@ class Study:
             return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
+class Counted:
+    """The ``done`` cases of a ``study``, of which ``met`` comply."""
+
+    study: Any
+    done: int
+    met: int
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of cases that comply; None where nothing is required, and there are no cones."""
+        return self.met / self.done if self.done and compliance.judged(self.study.model.spacecraft) else None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Exact interval about `met_fraction`."""
+        return self.interval_about(self.met)
+
+    def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
+        """Exact interval about the share of so many of the cases, or of so many ``of`` them."""
+        return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
+
+    @property
+    def probability(self) -> float:
+        """Share of cases that must comply."""
+        return required_share(self.study.model.spacecraft.requirement)
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether as many cases comply as must; None where nothing is required."""
+        fraction = self.met_fraction
+        return None if fraction is None else fraction >= self.probability
+
+
 @dataclass(eq=False)
-class Results:
+class Results(Counted):
     """What has been found of a study so far: the cases from 0 to ``done``.
 
     ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
@@ -205,27 +238,6 @@ class Results:
         assert self.values is not None
         values = self.values[row, : self.done]
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
-
-    @property
-    def met_fraction(self) -> float | None:
-        """Fraction of cases that comply; None where nothing is required, and there are no cones."""
-        return self.met / self.done if self.done and compliance.judged(self.study.model.spacecraft) else None
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Exact interval about `met_fraction`."""
-        return binomial_interval(self.met, self.done, CONFIDENCE)
-
-    @property
-    def probability(self) -> float:
-        """Share of cases that must comply."""
-        return required_share(self.study.model.spacecraft.requirement)
-
-    @property
-    def meets_requirement(self) -> bool | None:
-        """Whether as many cases comply as must; None where nothing is required."""
-        fraction = self.met_fraction
-        return None if fraction is None else fraction >= self.probability
 
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:

@@ -16,7 +16,7 @@ from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid_cases import Bodies, Stretch
 from nutdamp.physics.sun_clock import Push, SunClock
-from nutdamp.schedule import Pulse
+from nutdamp.schemes.tools.sun_pulses import pushes
 
 Array = NDArray[np.float64]
 
@@ -70,28 +70,19 @@ def fly(
             seen[index, rows] = body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
             impulse = np.where(seen[index, rows], np.array([part(one) for one in cases.impulses[index]]), 0.0)
             if cases.thrust[index]:
-                pushes = _pushes(cases.thrust[index], seen[index, rows], part)
+                torques = _pushes(cases.thrust[index], seen[index, rows], part)
             else:
-                pushes = _as_planned(pulses[index], impulse)
+                torques = pushes(pulses[index], impulse / (pulses[index].on_time or 1.0))
             sheds = None
             if cases.per_kg is not None and cases.spent is not None:
                 sheds = np.array([part(one * cases.spent[index]) * seen[index, rows] for one in cases.per_kg])
-            fired = clock.fire(found, block.delay + part(shifts[index]), block.width, pushes, sheds)
+            fired = clock.fire(found, block.delay + part(shifts[index]), block.width, torques, sheds)
             starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:
                     watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
     return Fired(rates, quaternion, starts, seen, over)
-
-
-def _as_planned(pulse: Pulse, impulse: Array) -> list[Push]:
-    """The torques (3, n) N m of a pulse of this ``impulse`` (3, n) N m s that has the shape of the planned one."""
-    torque = impulse / (pulse.on_time or 1.0)
-    if pulse.command is None:
-        return [Push(0.0, pulse.on_time, torque, torque)]
-    back, ramps = pulse.command.start, pulse.command.ramps
-    return [Push(one.begin - back, one.end - back, torque * one.first, torque * one.last) for one in ramps]
 
 
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:

@@ -275,7 +275,6 @@ class Model:
             inertia=Inertia(body.moments, body.axes),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
-            disturbances=self.spacecraft.disturbances,
         )
 
 

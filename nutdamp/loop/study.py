@@ -8,22 +8,19 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import compliance
 from nutdamp.compliance import Left
-from nutdamp.demands import required_share
-from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
-from nutdamp.dispersion.elementwise import rotated
+from nutdamp.dispersion.elementwise import rotated, triple
 from nutdamp.dispersion.kernel import carried
 from nutdamp.dispersion.outputs import angle
 from nutdamp.dispersion.statistics import Exact, Worst
-from nutdamp.dispersion.study import CONFIDENCE, KEPT_WORST
+from nutdamp.dispersion.study import KEPT_WORST, Counted
 from nutdamp.dispersion.watched import cones_used
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.cases import LoopModel
@@ -166,14 +163,15 @@ class LoopStudy:
     def measured(self, flown: Flown) -> tuple[Array, Array]:
         """Outputs (8, n) of loops, and how bad each is (n,): infinitely where it does not end quiet, or was stopped."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
-        moments, before = (np.array(one).T for one in zip(*(_start(case.truth) for case in cases), strict=True))
-        momentum = tuple(carried(tuple(flown.quaternion), _triple(moments * flown.rates)))
+        moments = np.array([case.truth.inertia.moments for case in cases]).T
+        before = np.array([case.truth.omega0 for case in cases]).T
+        momentum = tuple(carried(tuple(flown.quaternion), triple(moments * flown.rates)))
         tilts = np.array([case.tilt for case in cases]).T
         out = np.empty((len(OUTPUTS), len(cases)))
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
-        out[3] = angle(_triple(moments * before), _triple(np.array(momentum)))
-        out[4] = angle(_triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
+        out[3] = angle(triple(moments * before), triple(np.array(momentum)))
+        out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
         used = [[math.nan if one.pulse.propellant is None else one.pulse.propellant for one in p.fired] for p in pilots]
         out[6] = [math.fsum(one) for one in used]
@@ -183,15 +181,6 @@ class LoopStudy:
         severity = np.asarray(compliance.severity(body, Left(out[2], aim, flown.rates[2]), shares))
         lost = np.array([pilot.lost for pilot in pilots])
         return out, np.where(lost, math.inf, severity)
-
-
-def _start(truth: Spacecraft) -> tuple[tuple[float, ...], Array]:
-    return truth.inertia.moments, truth.omega0
-
-
-def _triple(rows: Any) -> tuple[Any, Any, Any]:
-    first, second, third = rows
-    return first, second, third
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
@@ -210,12 +199,12 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
 
 
 @dataclass(eq=False)
-class LoopResults:
+class LoopResults(Counted):
     """What has been found of a study so far: the cases from 0 to ``done``.
 
-    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were stopped;
-    ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and the largest
-    from the spin axis to the direction of each cone.
+    Those that comply settle too. ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end,
+    or were stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and
+    the largest from the spin axis to the direction of each cone.
     """
 
     study: LoopStudy
@@ -269,31 +258,6 @@ class LoopResults:
     def within(self) -> int:
         """Cases that fall quiet with no more nutation than the dead band of the file."""
         return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
-
-    def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
-        """Exact interval about the share of so many of the cases, or of so many ``of`` them."""
-        return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """That about `met_fraction`."""
-        return self.interval_about(self.met)
-
-    @property
-    def met_fraction(self) -> float | None:
-        """Share of cases that settle and comply; None where nothing is required, and there are no cones."""
-        return self.met / self.done if self.done and compliance.judged(self.study.spacecraft) else None
-
-    @property
-    def probability(self) -> float:
-        """Share of cases that must comply."""
-        return required_share(self.study.spacecraft.requirement)
-
-    @property
-    def meets_requirement(self) -> bool | None:
-        """Whether as many cases comply as must; None where nothing is required."""
-        fraction = self.met_fraction
-        return None if fraction is None else fraction >= self.probability
 
     def take(self, values: Array, severity: Array, angles: Array, stops: list[Stop]) -> None:
         """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""

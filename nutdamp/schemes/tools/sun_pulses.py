@@ -109,13 +109,12 @@ def sun_clock(spacecraft: Spacecraft) -> SunClock:
     return SunClock(state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
 
 
-def pushes(pulse: Pulse) -> list[Push]:
-    """The torques of a pulse whose command begins at 0 s."""
-    torque = np.zeros(3) if pulse.torque is None else pulse.torque
+def pushes(pulse: Pulse, torque: Vector) -> list[Push]:
+    """The torques of a pulse, from when its command begins, that has the ``torque`` (3, n) N m of cases."""
     if pulse.command is None:
-        return [Push(0.0, pulse.on_time, torque[:, None], torque[:, None])]
-    ramps = pulse.command.ramps
-    return [Push(one.begin, one.end, torque[:, None] * one.first, torque[:, None] * one.last) for one in ramps]
+        return [Push(0.0, pulse.on_time, torque, torque)]
+    back, ramps = pulse.command.start, pulse.command.ramps
+    return [Push(one.begin - back, one.end - back, torque * one.first, torque * one.last) for one in ramps]
 
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
@@ -147,7 +146,8 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
             given = supply.fire(on_command(channel, 0.0, block.width), channel)
             sheds = None if per_kg is None else (per_kg * (given.propellant or 0.0))[:, None]
-            start = float(clock.fire(found, delay, block.width, pushes(given), sheds)[0])
+            torque = np.zeros(3) if given.torque is None else given.torque
+            start = float(clock.fire(found, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
             pulses.append(given.moved(start))
     supply.expect_to_last()
     return Schedule(tuple(pulses), blocks=tuple(blocks))
