@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -22,3 +25,18 @@ def cleaned(vectors: ArrayLike) -> NDArray[np.float64]:
 def cleaned_change(change: float, whole: float) -> float:
     """A difference of two numbers of the size of ``whole``; 0 where it is rounding beside them."""
     return float(cleaned([change, whole])[0])
+
+
+def finite(data: dict[str, Any]) -> dict[str, Any]:
+    """The data with numbers that are not finite as None."""
+    return {key: _finite(entry) for key, entry in data.items()}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return finite(value)
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import MissingPandas
+from nutdamp.rounding import finite
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
@@ -95,7 +96,7 @@ class Data:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``plan --json`` gives, or says of it."""
-        return data(self)
+        return finite(data(self))
 
 
 class Tabled(Shown):

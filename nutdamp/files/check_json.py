@@ -8,7 +8,7 @@ from typing import Any
 
 from nutdamp import __version__, survey
 from nutdamp.aspect import at_start
-from nutdamp.errors import CannotRead, Fault, FaultyFile, printable
+from nutdamp.errors import CannotRead, Fault, FaultyFile
 from nutdamp.files.plan_json import aspects_json, spacecraft_json
 from nutdamp.spacecraft import Channel, Spacecraft, Tank
 
@@ -20,17 +20,11 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
 
 def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
     """A file that could not be read or says something that cannot be; ``doubts`` are warnings."""
-    if isinstance(wrong, CannotRead):
-        whole = printable(wrong.path)
-        faults: list[dict[str, Any]] = [
-            {"place": whole, "line": None, "column": None, "where": "", "problem": wrong.reason}
-        ]
-    else:
-        faults = _faults_json(wrong.faults)
+    faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
     return {
         "file": name,
         "valid": False,
-        "faults": faults,
+        "faults": _faults_json(faults),
         "warnings": _faults_json(doubts),
         "spacecraft": None,
         "channels": [],

@@ -9,7 +9,7 @@ import numpy as np
 
 from nutdamp import __version__
 from nutdamp.dispersion.outputs import OUTPUTS
-from nutdamp.dispersion.statistics import Array
+from nutdamp.dispersion.statistics import Array, Distribution
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
 from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
@@ -43,7 +43,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "target": target_json(study.model.spacecraft),
         "exact_percentiles": results.exact,
         "percentiles": {
-            column: _percentiles(results, name) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
+            column: _percentiles(results, name, column) for name, column in zip(OUTPUTS, OUTPUT_COLUMNS, strict=True)
         },
         "requirement": requirement_of(results),
         **cones_json(results),
@@ -58,19 +58,25 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
     }
 
 
-def _percentiles(results: Results, output: str) -> dict[str, float | None]:
-    names = [*(f"{percent:g}" for percent in PERCENTS), "max"]
+def _percentiles(results: Results, output: str, column: str) -> dict[str, float | None]:
     found = results.distribution(output)
-    if found is None:
-        return dict.fromkeys(["nominal", "min", *names])
-    nominal = results.study.outputs_of({})[OUTPUTS.index(output)]
-    values = [*found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
-    every = {"nominal": float(nominal), "min": found.minimum, **dict(zip(names, values, strict=True))}
-    return {name: _shown(output, value) for name, value in every.items()}
+    nominal = None if found is None else float(results.study.outputs_of({})[OUTPUTS.index(output)])
+    return percentiles_json(column, nominal, found)
 
 
-def _shown(output: str, value: float) -> float:
-    return math.degrees(value) if output in OUTPUTS[:3] else value
+def percentiles_json(column: str, nominal: float | None, found: Distribution | None) -> dict[str, float | None]:
+    """The ``nominal`` value of an output, and how it is distributed; nulls for what is not known."""
+    names = ("nominal", "min", *(f"{percent:g}" for percent in PERCENTS), "max")
+    spread: list[float | None] = [None] * (len(names) - 1)
+    if found is not None:
+        spread = [found.minimum, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
+    values = zip(names, (nominal, *spread), strict=True)
+    return {name: None if value is None else shown(column, value) for name, value in values}
+
+
+def shown(column: str, value: float) -> float:
+    """A value in the unit of its ``column``."""
+    return math.degrees(value) if column.endswith("_deg") else value
 
 
 def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
@@ -144,8 +150,8 @@ def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any
         "case": case + 1,
         "inputs": {entry.name: entry.nominal + draws[entry.name] for entry in study.model.inputs.drawn},
         **{
-            column: _shown(name, float(value))
-            for name, column, value in zip(OUTPUTS, OUTPUT_COLUMNS, study.outputs_of(draws), strict=True)
+            column: shown(column, float(value))
+            for column, value in zip(OUTPUT_COLUMNS, study.outputs_of(draws), strict=True)
         },
         **_angles_of(study, draws),
     }

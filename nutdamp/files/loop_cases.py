@@ -10,7 +10,14 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.dispersion.statistics import Array
 from nutdamp.dispersion.study import CONFIDENCE
-from nutdamp.files.dispersion_json import PERCENTS, angles_json, cones_json, correlation_json, requirement_of
+from nutdamp.files.dispersion_json import (
+    angles_json,
+    cones_json,
+    correlation_json,
+    percentiles_json,
+    requirement_of,
+    shown,
+)
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import spacecraft_json
 from nutdamp.files.samples_csv import column, cone_columns
@@ -45,7 +52,10 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "seed": study.seed,
         "redrawn": results.redrawn,
         "alone_because": study.alone or None,
-        "percentiles": {name: _percentiles(results, output) for name, output in zip(COLUMNS, OUTPUTS, strict=True)},
+        "percentiles": {
+            name: percentiles_json(name, nominal, results.distribution(output))
+            for name, output, nominal in zip(COLUMNS, OUTPUTS, study.nominal.tolist(), strict=True)
+        },
         "settled": _share(results, results.settled, results.done),
         "never_started": results.idle,
         "dead_band": {
@@ -90,20 +100,7 @@ def _inputs(study: LoopStudy, case: int) -> dict[str, Any]:
 
 def outputs_json(values: Array) -> dict[str, float]:
     """The outputs (8,) of a case by their columns; what is not known is not a number."""
-    return {name: _shown(name, value) for name, value in zip(COLUMNS, values.tolist(), strict=True)}
-
-
-def _shown(name: str, value: float) -> float:
-    return math.degrees(value) if name.endswith("_deg") else value
-
-
-def _percentiles(results: LoopResults, output: str) -> dict[str, float | None]:
-    names, found = [*(f"{percent:g}" for percent in PERCENTS), "max"], results.distribution(output)
-    nominal, column_ = float(results.study.nominal[OUTPUTS.index(output)]), COLUMNS[OUTPUTS.index(output)]
-    if found is None:
-        return {"nominal": _shown(column_, nominal), **dict.fromkeys(["min", *names])}
-    values = [nominal, found.minimum, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
-    return {name: _shown(column_, value) for name, value in zip(["nominal", "min", *names], values, strict=True)}
+    return {name: shown(name, value) for name, value in zip(COLUMNS, values.tolist(), strict=True)}
 
 
 def _share(results: LoopResults, count: int, of: int) -> dict[str, float | None]:
@@ -136,7 +133,7 @@ class LoopCasesWriter:
                 for entry, value in zip(entries, truths, strict=True)
             ]
             outputs = outputs_json(values[:, row]).values()
-            shown = ["" if math.isnan(value) else number(value) for value in outputs]
+            cells = ["" if math.isnan(value) else number(value) for value in outputs]
             ending = [str(int(values[-1, row])), stop.name.lower(), *map(number, np.degrees(angles[..., row]).flat)]
-            rows.append([str(first + row + 1), *inputs, *shown[:-1], *ending])
+            rows.append([str(first + row + 1), *inputs, *cells[:-1], *ending])
         self._stream.write(csv_text(rows[0], rows[1:]).encode())

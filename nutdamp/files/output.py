@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from nutdamp.errors import CannotWrite
+from nutdamp.rounding import finite
 
 if sys.platform != "win32":
     import fcntl
@@ -172,18 +173,3 @@ def json_text(data: dict[str, Any]) -> str:
     text = json.dumps(finite(data), indent=2, ensure_ascii=False, allow_nan=False)
     # Those below a blank are escaped already.
     return re.sub("[\x7f-\x9f\u2028\u2029]", lambda found: f"\\u{ord(found[0]):04x}", text) + "\n"
-
-
-def finite(data: dict[str, Any]) -> dict[str, Any]:
-    """The data with numbers that are not finite as None."""
-    return {key: _finite(entry) for key, entry in data.items()}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return finite(value)
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

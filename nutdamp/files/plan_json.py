@@ -17,6 +17,9 @@ from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
+RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
+"""Angles of a `Residual`."""
+
 
 def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
     """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
@@ -159,13 +162,7 @@ def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | Non
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
-    return {
-        "nutation_deg": None if residual is None else math.degrees(residual.nutation),
-        "body_cone_deg": None if residual is None else math.degrees(residual.body_cone),
-        "space_cone_deg": None if residual is None else math.degrees(residual.space_cone),
-        "momentum_shift_deg": None if residual is None else math.degrees(residual.momentum_shift),
-        "axis_error_deg": None if residual is None else math.degrees(residual.axis_error),
-    }
+    return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
 
 
 def pulses_json(flown: Flight) -> list[dict[str, Any]]:

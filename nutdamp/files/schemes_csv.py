@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.files.output import csv_text, number, truth
-from nutdamp.files.plan_json import plan_json
+from nutdamp.files.plan_json import plan_json, residual_json
 from nutdamp.planning import Plan
 
 WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
 """Columns of text."""
-
-RESIDUAL = ("nutation_deg", "body_cone_deg", "space_cone_deg", "momentum_shift_deg", "axis_error_deg")
 
 
 def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.void]:
@@ -35,8 +33,8 @@ def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.
 
 
 def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
-    data, nothing = plan_json(plan), dict.fromkeys(RESIDUAL)
-    final, left, speed = data["final"], data["flown"] if plan.feasible else nothing, plan.delta_v
+    data, speed = plan_json(plan), plan.delta_v
+    final, left = data["final"], data["flown"] if plan.feasible else residual_json(None)
     around, off = ("tilt_deg", "azimuth_deg") if plan.spacecraft.attitude is None else _CELESTIAL
     angles = {
         f"{what}_{name}": None if final is None else final[what][name]
@@ -51,7 +49,7 @@ def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
         "met_fraction": share,
         "pulses": len(plan.pulses),
         **{key: data[key] for key in ("end_s", "total_impulse_Nms", "least_impulse_Nms", "propellant_kg")},
-        **{key: left[key] for key in RESIDUAL},
+        **left,
         **angles,
         "spin_rad_s": None if final is None else final["spin_rad_s"],
         "spin_change_rad_s": data["spin_change_rad_s"],

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,10 @@ from nutdamp.files.models import (
     LimitsSection,
     RequirementSection,
     SpacecraftFile,
-    SteerableSection,
     ThrusterSection,
 )
 from nutdamp.files.rules import disturbance_kind, symmetric
+from nutdamp.files.sections import Section
 from nutdamp.files.settings import Setting
 from nutdamp.files.sky_models import CommandsSection, KeepSection, OrbitSection, SunSensorSection
 from nutdamp.files.thruster_rules import CANCELLED, force_vector
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 __all__ = ["load_spacecraft", "read_spacecraft"]
 
 Vector = NDArray[np.float64]
-
+Part = TypeVar("Part")
 
 Warn = Callable[[Fault], None]
 """Is given each number that is hardly what was meant."""
@@ -82,7 +82,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
-    steerable = _steerable(contents.steerable)
+    steerable = _part(Steerable, contents.steerable)
     torquer = steerable if thrusters else steerable or Steerable()
     spacecraft = Spacecraft(
         name=contents.name,
@@ -101,7 +101,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
         orbit=_orbit(contents.orbit),
-        cold=None if contents.cold is None else Cold(contents.cold.first, contents.cold.pulses),
+        cold=_part(Cold, contents.cold),
         tank=_tank(contents.tank),
     )
     sunward = _sun(contents)
@@ -114,6 +114,15 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         commands=_commands(contents.commands),
         loop=_loop(contents.loop, inertia.axes),
     )
+
+
+def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
+    """What a section describes, where it is given: keys have the names of fields, but for ``others``."""
+    if section is None:
+        return None
+    named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
+    given = {field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)}
+    return kind(**{**given, **others})
 
 
 def _inertia(section: InertiaSection) -> Inertia:
@@ -180,9 +189,7 @@ def _tank(section: TankSection | None) -> Tank | None:
     per_kg = None
     if shed is not None and any(rows := shed if isinstance(shed, list) else [shed.A, shed.A, shed.C]):
         per_kg = rows[0], rows[1], rows[2]
-    return Tank(
-        section.propellant, section.pressure, section.final_pressure, section.exponent, isp, inertia_per_kg=per_kg
-    )
+    return _part(Tank, section, isp=isp, inertia_per_kg=per_kg)
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
@@ -221,8 +228,7 @@ def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Di
 def _attitude(section: AttitudeSection | None) -> Attitude | None:
     if section is None:
         return None
-    quaternion = np.array(section.quaternion) / math.hypot(*section.quaternion)
-    return Attitude(quaternion, section.epoch, section.frame)
+    return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
 
 
 def _orbit(section: OrbitSection | None) -> Orbit | None:
@@ -231,15 +237,11 @@ def _orbit(section: OrbitSection | None) -> Orbit | None:
     return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
 
 
-def _steerable(section: SteerableSection | None) -> Steerable | None:
-    return None if section is None else Steerable(section.torque, section.isp, section.lever_arm)
-
-
 def _requirement(section: RequirementSection | None) -> Requirement | None:
     """None also for a requirement that names nothing."""
     if section is None or (section.nutation is None and section.momentum_shift is None):
         return None
-    return Requirement(section.nutation, section.momentum_shift, section.probability)
+    return _part(Requirement, section)
 
 
 def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
@@ -277,7 +279,7 @@ def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | N
     if not np.array_equal(axes, np.eye(3)):
         first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         azimuth = math.atan2(second, first)
-    return SunSensor(azimuth, section.elevation, section.half_width, section.jitter)
+    return _part(SunSensor, section, azimuth=azimuth)
 
 
 def _commands(section: CommandsSection | None) -> Commands | None:
@@ -298,39 +300,12 @@ def _loop(section: LoopSection | None, axes: Vector) -> Loop | None:
         return None
     given = section.sensor
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
-    sensor = Sensor(
-        kind=given.kind,
-        rate=given.rate,
-        quantisation=given.quantisation,
-        noise=given.noise,
-        bias=given.bias,
-        scale=given.scale,
-        delay=given.delay,
-        low_pass=given.low_pass,
-        position=axes.T @ np.array(given.position or (0.0, 0.0, 0.0)),
-        axis=axes.T @ (along / math.hypot(*along)),
-    )
-    return Loop(
-        sensor=sensor,
-        law=section.law,
-        start=section.start,
-        stop=section.stop,
-        settle=section.settle,
-        min_interval=section.min_interval,
-        predict=section.predict,
-        on_time=section.on_time,
-        reversed=() if section.faults is None else tuple(section.faults.reversed),
-    )
+    position = axes.T @ np.array(given.position or (0.0, 0.0, 0.0))
+    sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)))
+    turned = () if section.faults is None else tuple(section.faults.reversed)
+    return _part(Loop, section, sensor=sensor, reversed=turned)
 
 
 def _limits(section: LimitsSection | None) -> Limits:
-    if section is None:
-        return Limits()
-    return Limits(
-        horizon=section.horizon,
-        earliest=section.earliest,
-        gap=section.gap,
-        tick=section.tick,
-        max_pulses=section.max_pulses,
-        blackout=tuple((begin, end) for begin, end in section.blackout),
-    )
+    windows = () if section is None else tuple((begin, end) for begin, end in section.blackout)
+    return _part(Limits, section, blackout=windows) or Limits()

@@ -14,6 +14,7 @@ from nutdamp.estimation import outlook, results
 from nutdamp.estimation.doubts import doubts
 from nutdamp.library.craft import Source, expected, read
 from nutdamp.planning import Plan
+from nutdamp.rounding import finite
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
@@ -71,7 +72,6 @@ class Fitted:
     def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
         """What ``fit --json`` gives; with an `outlook`, what ``fit --next --json`` gives."""
         from nutdamp.files.fit_json import fit_json
-        from nutdamp.files.output import finite
 
         return finite(fit_json(self.core, results.carried(self.core, at), ahead, self.warnings))
 

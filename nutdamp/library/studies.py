@@ -15,6 +15,7 @@ from nutdamp.library.craft import expected
 from nutdamp.library.views import feasible
 from nutdamp.loop import budget as budgets
 from nutdamp.planning import Plan
+from nutdamp.rounding import finite
 from nutdamp.schemes.options import LEAST, OptimalOptions
 from nutdamp.spacecraft import Spacecraft
 
@@ -36,7 +37,6 @@ class Trade:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``trade --json`` gives."""
-        from nutdamp.files.output import finite
         from nutdamp.files.trade_files import trade_json
 
         return finite(trade_json(self.spacecraft, self.fronts))
@@ -62,7 +62,6 @@ class Dispersion:
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
         """What ``disperse --json`` gives, with as many ``worst`` cases."""
         from nutdamp.files.dispersion_json import dispersion_json
-        from nutdamp.files.output import finite
 
         return finite(dispersion_json(self.core, scheme=self.scheme, worst=worst))
 
@@ -86,7 +85,6 @@ class LoopDispersion:
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
         """What ``disperse --loop --json`` gives, with as many ``worst`` cases."""
         from nutdamp.files.loop_cases import loop_cases_json
-        from nutdamp.files.output import finite
 
         return finite(loop_cases_json(self.core, worst=worst))
 
@@ -105,7 +103,6 @@ class Verified:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``verify --json`` gives."""
-        from nutdamp.files.output import finite
         from nutdamp.files.verification_json import verification_json
 
         return finite(verification_json(self.plan.flight, self.plan.scheme, self.core))
@@ -120,7 +117,6 @@ class Budget:
     def to_dict(self) -> dict[str, Any]:
         """What ``budget --json`` gives."""
         from nutdamp.files.budget_files import budget_json
-        from nutdamp.files.output import finite
 
         return finite(budget_json(self.core))
 

@@ -30,25 +30,21 @@ views.reason.register(Comparison, verdicts.reason)
 
 @views.data.register
 def _(spacecraft: Spacecraft) -> dict[str, Any]:
-    from nutdamp.files.output import finite
     from nutdamp.files.plan_json import spacecraft_json
 
-    return finite(spacecraft_json(spacecraft))
+    return spacecraft_json(spacecraft)
 
 
 @views.data.register
 def _(plan: Plan) -> dict[str, Any]:
-    from nutdamp.files.output import finite
     from nutdamp.files.plan_json import plan_json
 
-    return finite(plan_json(plan))
+    return plan_json(plan)
 
 
 @views.data.register
 def _(compared: Comparison) -> dict[str, Any]:
-    from nutdamp.files.output import finite
-
-    return finite(comparison_data(compared, decide(compared)))
+    return comparison_data(compared, decide(compared))
 
 
 def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
