@@ -14,9 +14,7 @@ Schedules that cost more need no bound.
 
 *Spin.* A final spin costs impulse too: with M3 in place of one component, and |m| in place of the other.
 
-*First order.* The same for the program of small angles, with all its equations. A price y that is too high somewhere is
-lowered until it is not, for channels that act within a moment; from those that have to be on for long, what a slot of
-them gains is taken off: ∫ max(0, y·m e^{iφ} - c) dt. Between the times looked at, gains are known by their curvature.
+*First order.* The same for the program of small angles, with all its equations: see `primer`.
 
 *Turn.* Where ω3 stays, H·e3 = Cω3, so H never comes nearer to the origin than r = C|ω3|. From |H0| = r/cos θ0 the
 shortest way round that sphere to the direction of the target is the tangent, r tan θ0, and an arc of the sphere.
@@ -29,11 +27,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nutdamp.limits import free_windows, usable
-from nutdamp.schedule import TOUCHING
 from nutdamp.schemes.optimal.linear_program import Program
+from nutdamp.schemes.optimal.primer import ROUNDING, SmallAngles, lowered, slackened
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
 TURN = 2.0 * math.pi
@@ -43,22 +40,6 @@ LOOKS = 33
 
 NARROWINGS = 9
 """Times that the search is narrowed to a sixteenth: to 1e-11 rad."""
-
-QUARTERINGS = 9
-"""Times that what lies between two times is looked at in quarters: to a 1e-5 of a slot."""
-
-PARTS = 4
-"""Parts of a slot in which the gain of a channel that is on for long is summed."""
-
-LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
-"""Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
-too high in the middle of a slot of w rad, which adds up over very many alignments; each factor gives a bound."""
-
-ENOUGH = 1e-10
-"""Relative height of a price that is not worth a closer look."""
-
-ROUNDING = 1e-12
-"""Share by which gains are lowered and prices raised, so that no bound is too high by the rounding of sums."""
 
 
 class Allowed(NamedTuple):
@@ -105,7 +86,7 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     low, wide = _arcs(
         [
             (min(phases) - wider, max(phases) + wider)
-            for begins, ends in _slackened(free_windows(spacecraft))
+            for begins, ends in slackened(free_windows(spacecraft))
             for phases in [(inertia.a * spacecraft.spin * begins, inertia.a * spacecraft.spin * ends)]
             for wider in [abs(inertia.a) * faster * max(ends - limits.earliest, 0.0)]
         ]
@@ -151,11 +132,6 @@ def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allow
     way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
     dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
     return spacecraft.inertia.C * abs(spacecraft.spin) * way / dearest * (1.0 - ROUNDING)
-
-
-def _slackened(windows: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The windows with what rounding may overstep."""
-    return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
 
 
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:
@@ -205,110 +181,8 @@ def first_order(program: Program, prices: Vector) -> Proof:
 
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """
-    nothing = Proof(0.0, np.zeros_like(prices))
-    if not prices.any():
-        return nothing
-    gains = _Gains(program, prices)
-    lowered = max(gains.highest(program.strong), 0.0 if program.strong.all() else 1.0)
-    if lowered <= 0.0:
-        return nothing
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
-    factors = lowered * np.array([1.0] if program.strong.all() else LOWERINGS)
-    found = []
-    for factor in map(float, factors):
-        gained = gains.lasting(~program.strong, factor)
-        found.append(Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained))
-    return max([nothing, *found], key=lambda one: one.bound)
-
-
-class _Gains:
-    """What a second of each channel is worth by some prices, over its cost, at all times at which it may be on."""
-
-    def __init__(self, program: Program, prices: Vector) -> None:
-        self.program, self.prices = program, prices
-        self.torques = np.array([channel.torque for channel in program.channels])
-        spans = _slackened(free_windows(program.spacecraft, program.end))
-        edges = [
-            np.linspace(begins, ends, max(math.ceil((ends - begins) / program.width), 1) + 1) for begins, ends in spans
-        ]
-        self.begins = np.concatenate([part[:-1] for part in edges])
-        self.lengths = np.concatenate([np.diff(part) for part in edges])
-        # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
-        rates = program.influence.turning
-        bend = sum(
-            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
-            for rate in sorted(set(rates.tolist()))
-        )
-        self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
-
-    def at(self, times: Vector) -> Vector:
-        """Worth over cost at ``times`` (n,) s, (n, channels)."""
-        worth = np.tensordot(self.program.influence.rows(times), self.prices, axes=(1, 0)) @ self.torques.T
-        return np.asarray(worth / self.program.costs)
-
-    def mean(self, centres: Vector, lengths: Vector) -> Vector:
-        """Mean of worth over cost in stretches about ``centres`` (n,) s, ``lengths`` (n,) s long, (n, channels)."""
-        lost = self.program.influence.widths(lengths)
-        worth = np.einsum("ne,nek->nk", lost * self.prices, self.program.influence.rows(centres)) @ self.torques.T
-        return np.asarray(worth / self.program.costs)
-
-    def highest(self, which: NDArray[np.bool_]) -> float:
-        """The highest worth over cost of ``which`` channels at any time; a little more where that is not exact."""
-        which_ones = np.flatnonzero(which)
-        if not len(which_ones):
-            return 0.0
-        before, after = self.at(self.begins)[:, which], self.at(self.begins + self.lengths)[:, which]
-        tops = _top(before, after, self.bends[which_ones], self.lengths[:, None])
-        best = float(max(before.max(), after.max()))
-        slot, index = np.nonzero(tops > best + ENOUGH * abs(best))
-        begins, lengths, channel = self.begins[slot], self.lengths[slot], which_ones[index]
-        highest = tops[slot, index]
-        for _ in range(QUARTERINGS):
-            if not len(begins):
-                return best + ENOUGH * abs(best)
-            lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
-            begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
-            every = np.arange(len(begins))
-            before, after = self.at(begins)[every, channel], self.at(begins + lengths)[every, channel]
-            highest = _top(before, after, self.bends[channel], lengths)
-            best = max(best, float(before.max()), float(after.max()))
-            there = highest > best + ENOUGH * abs(best)
-            begins, lengths, channel, highest = begins[there], lengths[there], channel[there], highest[there]
-        return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
-
-    def lasting(self, which: NDArray[np.bool_], lowered: float) -> float:
-        """What ``which`` channels gain by being on whenever it pays, with prices ``lowered`` by that factor."""
-        which_ones = np.flatnonzero(which)
-        if not len(which_ones):
-            return 0.0
-        costs, bends = self.program.costs[which_ones], self.bends[which_ones] / lowered
-        ends = [self.at(times)[:, which_ones] / lowered - 1.0 for times in (self.begins, self.begins + self.lengths)]
-        pays = np.flatnonzero((_top(ends[0], ends[1], bends, self.lengths[:, None]) > 0.0).any(axis=1))
-        begins, lengths = self.begins[pays], self.lengths[pays] / PARTS
-        total, before = 0.0, self.at(begins)[:, which_ones] / lowered - 1.0
-        for part in range(PARTS):
-            after = self.at(begins + (part + 1) * lengths)[:, which_ones] / lowered - 1.0
-            mean = self.mean(begins + (part + 0.5) * lengths, lengths)[:, which_ones] / lowered - 1.0
-            arch = bends * lengths[:, None] ** 2
-            gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
-            crossing = _top(before, after, bends, lengths[:, None]) > 0.0
-            gained = np.where(crossing & (gained == 0.0), _positive_mean(before, after) + arch / 12.0, gained)
-            total += float((gained * lengths[:, None] @ costs).sum())
-            before = after
-        return total
-
-
-def _top(before: Vector, after: Vector, bend: Vector, length: Vector) -> Vector:
-    """The most that a function of second derivative up to ``bend`` can be between its values at two ends."""
-    arch = 0.5 * bend * length**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        within = 0.5 * (before + after) + 0.25 * arch + 0.25 * (after - before) ** 2 / arch
-    return np.asarray(np.where(np.abs(after - before) < arch, within, np.maximum(before, after)))
-
-
-def _positive_mean(before: Vector, after: Vector) -> Vector:
-    """Mean of the positive part of a straight line from one value to another."""
-    most, least = np.maximum(before, after), np.minimum(before, after)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = 0.5 * most**2 / (most - least)
-    return np.asarray(np.where(most <= 0.0, 0.0, np.where(least >= 0.0, 0.5 * (most + least), crossing)))
+    found = lowered(SmallAngles(program, prices), program.strong, goal) if prices.any() else None
+    if found is None:
+        return Proof(0.0, np.zeros_like(prices))
+    return Proof(found.bound, prices / found.factor, found.gained)
