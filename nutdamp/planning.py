@@ -31,7 +31,8 @@ class Plan(views.Data, views.Tabled):
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
     that is ``worse`` than without pulses. `nutdamp.remarks` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
-    ``cut``: its search ended at its budget of `work`.
+    ``cut``: its search ended at its budget of `work`. ``margin``: sigmas of the dispersions with which `surest` made
+    it, None for plans for nominal values.
     """
 
     spacecraft: Spacecraft
@@ -45,6 +46,7 @@ class Plan(views.Data, views.Tabled):
     worse: float | None = None
     from_file: bool = False
     cut: bool = False
+    margin: float | None = None
 
     @property
     def feasible(self) -> bool:

@@ -26,7 +26,8 @@ from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
 from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.schemes import Options
-from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
+from nutdamp.schemes.optimal.chance import ChanceProgram, Sure
+from nutdamp.schemes.optimal.chance_model import Limit, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
 from nutdamp.schemes.optimal.problem import Problem
 from nutdamp.schemes.optimal.refine import refine
@@ -129,6 +130,7 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Inpu
         spin=C * dspin @ mixed,
         delay=delay,
         less=(dC / C + dspin / spin) @ mixed,
+        names=tuple(one.name for one in drawn),
     )
     return found, tuple(drawn)
 
@@ -151,6 +153,12 @@ def plans(
         yield from ((name, plan) for one in margins for name, plan, _ in search.tried(one * search.sigmas))
     else:
         yield from search.plans()
+
+
+def program_of(plan: Plan) -> tuple[Problem, ChanceProgram]:
+    """The program by which `plans` made a plan, over all slots, and the problem that has its unit of cost."""
+    search = _Search(plan.spacecraft, planning.known(plan.spacecraft, plan.options))
+    return search.problem, search.chance
 
 
 class _Search:
@@ -184,12 +192,14 @@ class _Search:
         longest = max((one.on_time for one in first.burns), default=0.1)
         ons = np.array([min(max(longest, one.min_on_time, 1e-3), one.max_on_time) for one in self.program.channels])
         flat = replace(flat, channels=self.program.channels, dispersions=body.dispersions)
-        self.uncertain, _ = uncertain(flat, ons)
-        drift = float(np.linalg.norm(self.uncertain.rates, axis=1).max())
+        dispersed, _ = uncertain(flat, ons)
+        drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
         last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
         self.program.forbid(None, last, math.inf)
-        self.goal = np.zeros(5)
-        self.goal[Equations(True, True).chosen] = small_angles(flat, Equations(True, True)).goal
+        every = Equations(True, True)
+        goal = np.zeros(5)
+        goal[every.chosen] = small_angles(flat, every).goal
+        self.chance = ChanceProgram(self.program, dispersed, self.limits, goal)
         self.probability = required_share(spacecraft.requirement)
 
     @property
@@ -210,7 +220,7 @@ class _Search:
 
     def _first(self) -> list[float]:
         """The margins to begin with: about that of the probability, or up to the largest that can be kept."""
-        chance = ChanceProgram(self.program, self.uncertain, self.limits, self.goal)
+        chance = self.chance
         low, high = 0.0, max(MARGINS) * self.sigmas
         if chance.solve(high).excess <= KEPT:
             return [factor * self.sigmas for factor in MARGINS]
@@ -238,7 +248,8 @@ class _Search:
         plan = planning.judged(self.spacecraft, SCHEME, made, self.options)
         if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
             results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
-            yield f"against dispersions, {margin:.3g} σ", plan, results.met_fraction or 0.0
+            share = results.met_fraction or 0.0
+            yield f"against dispersions, {margin:.3g} σ", replace(plan, margin=margin), share
 
     def _few(self, found: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""
@@ -266,7 +277,7 @@ class _Search:
     def made(self, margin: float) -> Schedule | None:
         """The schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
         allowed = self.program.forbidden.copy()
-        chance = ChanceProgram(self.program, self.uncertain, self.limits, self.goal)
+        chance = self.chance
         found: Sure | None = None
         try:
             self._few(chance.solve(margin))

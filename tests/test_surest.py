@@ -26,7 +26,6 @@ from nutdamp.planning import plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.tolerance_tables import stated_text
 from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes.optimal.chance import ChanceProgram
 from nutdamp.schemes.optimal.columns import Columns
 from nutdamp.spacecraft import Limits, Requirement, Spacecraft
 from nutdamp.tightening import scaled
@@ -56,12 +55,10 @@ def a_body(A: float = 120.0, C: float = 80.0, spin: float = 3.0, **changes: obje
     return replace(body, dispersions=replace(tolerances, **changes))  # type: ignore[arg-type]
 
 
-def at(body: Spacecraft, pulses: list[tuple[int, float, float]]) -> tuple[surest._Search, Columns, np.ndarray]:
-    """The program of a body, with given pulses (channel, centre, on-time) as its columns, and their amounts."""
-    search = surest._Search(body, body)
+def at(body: Spacecraft, pulses: list[tuple[int, float, float]]) -> tuple[surest._Search, Columns]:
+    """The program of a body, with given pulses (channel, centre, on-time) as its columns."""
     channels, times, widths = (np.array(one) for one in zip(*pulses, strict=True))
-    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
-    return search, Columns(channels, times, widths, np.full(len(times), -1)), widths / chance.unit[channels]
+    return surest._Search(body, body), Columns(channels, times, widths, np.full(len(times), -1))
 
 
 @pytest.mark.parametrize("shape", [(120.0, 80.0, 3.0), (100.0, 150.0, 2.0), (120.0, 80.0, -3.0)])
@@ -74,24 +71,24 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     names = [one.name for one in body.channels]
     pulses = [(names.index(one.channel), one.t, one.on_time) for one in plan(body, "optimal").pulses]
     assert len(pulses) >= 2
-    search, columns, amounts = at(body, pulses)
-    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
+    search, columns = at(body, pulses)
+    cones = search.chance.model
     made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
     model = Model(body, made)
     names = [one.name for one in model.inputs.drawn]
     kernel = study_of(body, made, flown=False).first_order
     spins = body.inertia.C * abs(body.spin)
     for kind, rows, size in ((0, slice(0, 2), spins), (1, slice(2, 4), float(np.linalg.norm(body.momentum)))):
-        shared, _, own = chance._spread(kind, columns, amounts)
+        shared, _, own = cones.spread(kind, columns, columns.width)
         expected = kernel.jacobian * kernel.sigmas
         expected = expected if kernel.mixing is None else expected @ kernel.mixing
         drawn = surest.uncertain(replace(search.model.body, channels=body.channels), np.array([0.02, 0.02]))[1]
         once = [one.name for one in drawn if " pulse " not in one.name]
         for index, name in enumerate(once):
-            effect = shared[[one.name for one in drawn].index(name)] * chance.scale / size
+            effect = shared[[one.name for one in drawn].index(name)] / size
             truth = expected[rows, names.index(name)]
             assert abs(effect) == pytest.approx(np.linalg.norm(truth), rel=0.03, abs=3e-7), (name, kind, index)
-        together = math.sqrt((np.abs(own) ** 2).sum()) * chance.scale / size
+        together = math.sqrt((np.abs(own) ** 2).sum()) / size
         each = [names.index(name) for name in names if " pulse " in name]
         assert together == pytest.approx(np.linalg.norm(expected[rows, each]), rel=0.03)
     flown = by_differences(model, RealWidths(model)).effects("nutation")  # central differences of real widths
@@ -101,7 +98,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
 def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
     body = replace(a_body(), requirement=Requirement(math.radians(0.05), None, 0.95))
     search = surest._Search(body, body)
-    chance = ChanceProgram(search.program, search.uncertain, search.limits, search.goal)
+    chance = search.chance
     costs = []
     for margin in (0.0, 1.0, 2.0):
         found = chance.solve(margin)
@@ -113,14 +110,13 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
                 for one in zip(*((names.index(b.channel.name), b.t, b.on_time, -1) for b in found.burns), strict=True)
             )
         )
-        amounts = columns.width / chance.unit[columns.channel]
-        shared, _, own = chance._spread(0, columns, amounts)
-        left = chance._left(columns, amounts)[0]
+        shared, _, own = chance.model.spread(0, columns, columns.width)
+        left = chance.model.left(columns, columns.width)[0]
         turns = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
         along = (np.conj(turns)[:, None] * shared).real
         alone = (np.conj(turns)[:, None, None] * own).real
         used = (np.conj(turns) * left).real + margin * np.sqrt((along**2).sum(1) + (alone**2).sum((1, 2)))
-        assert used.max() * chance.scale == pytest.approx(search.limits[0].most, rel=0.02)
+        assert used.max() == pytest.approx(search.limits[0].most, rel=0.02)
         costs.append(sum(b.impulse for b in found.burns))
     assert costs == sorted(costs)
     assert costs[0] < 0.8 * body.least_impulse  # a quarter of the nutation may stay

@@ -67,3 +67,18 @@ def burns(channels: Sequence[Channel], columns: Columns, on_times: Vector, apart
             total = float(on_times[group].sum())
             found.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
     return tuple(sorted(found, key=lambda burn: burn.t))
+
+
+def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
+    """Moments (n,) s at which what is worth ``worth`` (n, 5) at even ``times`` (n, 5) s is worth most, and how much.
+
+    By the parabola through the best of the five and those beside it; at an end of them, that end.
+    """
+    best = np.argmax(worth, axis=1)
+    every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+    low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+    bend = low - 2.0 * top + high
+    aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+    aside = np.where(best == inner, aside, best - inner)
+    most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
+    return times[every, inner] + aside * (times[:, 1] - times[:, 0]), most

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nutdamp import work
 from nutdamp.limits import Windows
 from nutdamp.schemes.optimal import lp_solver
-from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns
+from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns, peaks
 from nutdamp.schemes.optimal.reach import supplies
 from nutdamp.schemes.optimal.residual_equations import Influence
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
@@ -341,14 +341,8 @@ class Program:
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
         cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
         worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
-        best = np.argmax(worth, axis=1)
-        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
-        low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
-        bend = low - 2.0 * top + high
-        aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
-        aside = np.where(best == inner, aside, best - inner)  # the end of the slot itself
-        t = times[every, inner] + aside * 0.25 * self.width
-        good = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best]) > PEAK
+        t, most = peaks(times, worth)
+        good = most > PEAK
         return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:
