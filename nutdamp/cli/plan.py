@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
+    from nutdamp.certificate import Certificate
     from nutdamp.comparison import Comparison
     from nutdamp.decision import Decision
     from nutdamp.errors import CannotWrite
@@ -61,7 +62,7 @@ SCHEMES, PRIMER = "schemes", "primer"
 @click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
-@click.option("--certificate", type=FILE, help="Write the proof of the least cost of optimal.")
+@click.option("--certificate", type=FILE, help="Write the proof of the least cost (JSON).")
 @plot_options((*FIGURES, SCHEMES, PRIMER))
 @quiet_option
 def command(
@@ -105,18 +106,20 @@ def command(
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
         say(f"{path} was not written: no plan is feasible")
-    proofs, unproved = _outputs_of_proof(compared, chosen, certificate, curve, job.remark)
+    proof, unproved = _certified(compared, dispersed, chosen, [certificate, curve])
+    if proof is not None and proof.plan is not chosen:
+        job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
     outputs: list[Output] = [
         (json, partial(_data, compared, decided, dispersed)),
         (table, partial(_schemes, compared, decided)),
         (all_plans, partial(_schemes_picture, compared, decided)),
-        *proofs,
+        *_outputs_of_proof(proof, certificate, curve),
         *_outputs_of(chosen, csv, one_plan, figure),
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
     ]
     if job.silent:
         job.warn(verdicts.warnings(compared))
-    job.deliver(outputs, partial(_screen, compared, dispersed), unsaved=unproved)
+    job.deliver(outputs, partial(_screen, compared, dispersed, proof), unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
@@ -188,22 +191,37 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
         raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
 
 
-def _outputs_of_proof(
-    compared: Comparison, chosen: Plan | None, path: str | None, plot: str | None, remark: Callable[[str], None]
-) -> tuple[list[Output], list[CannotWrite]]:
-    """The files of the certificate of the plan of optimal; where it has none, why none of them is written."""
-    if path is None and plot is None:
-        return [], []
+def _certified(
+    compared: Comparison, dispersed: RobustComparison | None, chosen: Plan | None, paths: Sequence[str | None]
+) -> tuple[Certificate | None, list[CannotWrite]]:
+    """The certificate of the plan of optimal, or of the robust plan; where it has none, why ``paths`` are not written.
+
+    None where no path is named.
+    """
+    files = [path for path in paths if path is not None]
+    if not files:
+        return None, []
     from nutdamp.certificate import SCHEME, certificate
     from nutdamp.errors import CannotWrite
 
     planned = next(one for one in compared if one.scheme == SCHEME)
     try:
-        found = certificate(planned)
+        if dispersed is None or chosen is None or chosen is planned:
+            return certificate(planned), []
+        if chosen.margin is None and dispersed.chosen is not None:
+            raise BadRequest(
+                f"the robust plan is {chosen.scheme}, {dispersed.chosen.variant}, which no program against dispersions "
+                f"made; without --robust the certificate is of {SCHEME}"
+            )
+        return certificate(chosen), []
     except BadRequest as reason:
-        return [], [CannotWrite(one, f"there is no certificate: {reason}") for one in (path, plot) if one is not None]
-    if chosen is not planned:
-        remark(f"the certificate is of {SCHEME} for nominal values, which is not the recommended plan")
+        return None, [CannotWrite(one, f"there is no certificate: {reason}") for one in files]
+
+
+def _outputs_of_proof(found: Certificate | None, path: str | None, plot: str | None) -> list[Output]:
+    """The files of a certificate, if there is one."""
+    if found is None:
+        return []
     from nutdamp.files.certificate_json import certificate_json
 
     def picture() -> Figure:
@@ -211,7 +229,7 @@ def _outputs_of_proof(
 
         return figures.certificate_figure(found)
 
-    return [(path, partial(certificate_json, found)), (plot, picture)], []
+    return [(path, partial(certificate_json, found)), (plot, picture)]
 
 
 def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:
@@ -244,11 +262,11 @@ def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
     return figures.schemes_figure(compared, decided)
 
 
-def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:
+def _screen(compared: Comparison, dispersed: RobustComparison | None, proof: Certificate | None) -> RenderableType:
     if dispersed is not None:
         from nutdamp.presentation.robust_tables import robust_screen
 
-        return robust_screen(dispersed)
+        return robust_screen(dispersed, proof)
     from nutdamp.presentation.plan_tables import comparison_screen
 
     return comparison_screen(compared)

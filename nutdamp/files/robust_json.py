@@ -92,6 +92,7 @@ def _candidate(one: Candidate) -> dict[str, Any]:
     return {
         "scheme": plan.scheme,
         "variant": one.variant,
+        "margin_sigmas": plan.margin,
         "pulses": len(pulses),
         "end_s": pulses.end,
         "total_impulse_Nms": pulses.total_impulse,

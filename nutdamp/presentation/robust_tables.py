@@ -6,12 +6,13 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import compliance
+from nutdamp.certificate import Certificate, SureCertificate
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.decisions import KEPT, figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
-from nutdamp.presentation.text import MISSING, in_degrees
+from nutdamp.presentation.text import MISSING, cost, in_degrees
 from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison, front
 from nutdamp.words import listed
@@ -20,8 +21,8 @@ MOST_ROWS = 12
 """Candidates that the table names."""
 
 
-def robust_screen(found: RobustComparison) -> RenderableType:
-    """Everything that ``plan --robust`` shows."""
+def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> RenderableType:
+    """Everything that ``plan --robust`` shows, and what a certificate proves."""
     body, decided, reason = found.comparison.spacecraft, found.decision, verdicts.robust_reason(found)
     infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
@@ -35,7 +36,7 @@ def robust_screen(found: RobustComparison) -> RenderableType:
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
         Text(verdicts.robust_cost(found)),
-        *(Text(one) for one in filter(None, [verdicts.tightened(found)])),
+        *(Text(one) for one in filter(None, [verdicts.tightened(found), proved(proof)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(
@@ -75,6 +76,19 @@ def front_screen(found: RobustComparison) -> RenderableType:
         style="dim",
     )
     return Group(Text(body.name, style="bold"), Text(), heading, table, note)
+
+
+def proved(found: Certificate | None) -> str:
+    """What the certificate of a robust plan proves, and what not; nothing to say of another."""
+    if not isinstance(found, SureCertificate):
+        return ""
+    unit, gap = found.problem.unit, max(found.cost / found.bound - 1.0, 0.0)
+    return (
+        "Certificate: no firing that keeps the requirement to first order with the margin of this plan, "
+        f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; one that costs {100.0 * gap:.2g} % more is "
+        f"known, and the plan, refined on the true motion, takes {cost(found.plan.pulses.cost_in(unit), unit)}. It does "
+        f"not prove that {verdicts.exact_percent(found.probability)} of cases comply."
+    )
 
 
 def _why(plan: Plan) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.certificate import Certificate
+from nutdamp.certificate import Certificate, SureCertificate
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
@@ -33,18 +33,19 @@ def certificate_figure(found: Certificate) -> Figure:
     Where the plan ends early in the horizon, the time until then is drawn again below.
     """
     end, last = found.plan.pulses.end, float(found.moments()[-1][-1])
-    closer = 0.0 < end < CLOSER * last
+    closer, sure = 0.0 < end < CLOSER * last, isinstance(found, SureCertificate)
     figure = style.sheet(7.4, 6.4 if closer else 4.2)
     panels = figure.subplots(2 if closer else 1, 1, squeeze=False)[:, 0]
     for axes in panels:
         _draw(axes, found, 1.0 if axes is panels[-1] and closer else last / found.spacecraft.body_period)
     if closer:
-        panels[0].set_title("until the horizon")
+        panels[0].set_title("as long as first order is good" if sure else "until the horizon")
         panels[1].set(title="until the last pulse of the plan", xlim=(-0.03 * end, 1.06 * end))
     panels[-1].set_xlabel("time, s")
     figure.supylabel("q: worth of a second over what it costs", fontsize=style.TICK_SIZE)
     some = f" ({MOST} of {len(found.program.channels)} channels)" if len(found.program.channels) > MOST else ""
-    least = f"first-order least (small angles): {cost(found.proof.bound, found.problem.unit)}"
+    margin = f"margin {found.margin:.4g} σ" if isinstance(found, SureCertificate) else "small angles"
+    least = f"first-order least ({margin}): {cost(found.bound, found.problem.unit)}"
     heading(figure, found.spacecraft, f"primer curve{some}\n{least}")
     legend(figure, [panels[-1]])
     return figure
