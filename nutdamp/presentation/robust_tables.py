@@ -83,11 +83,12 @@ def proved(found: Certificate | None) -> str:
     if not isinstance(found, SureCertificate):
         return ""
     unit, gap = found.problem.unit, max(found.cost / found.bound - 1.0, 0.0)
+    spent = cost(found.plan.pulses.cost_in(unit), unit)
     return (
         "Certificate: no firing that keeps the requirement to first order with the margin of this plan, "
         f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; one that costs {100.0 * gap:.2g} % more is "
-        f"known, and the plan, refined on the true motion, takes {cost(found.plan.pulses.cost_in(unit), unit)}. It does "
-        f"not prove that {verdicts.exact_percent(found.probability)} of cases comply."
+        f"known, and the plan, refined on the true motion, takes {spent}. It does not prove that "
+        f"{verdicts.exact_percent(found.probability)} of cases comply."
     )
 
 
