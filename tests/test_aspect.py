@@ -69,6 +69,7 @@ def test_in_free_motion_the_axis_stays_within_its_cone_about_H(shape: tuple[floa
         assert math.degrees(found.largest) == pytest.approx(min(beta + 7.0, 360.0 - beta - 7.0), abs=2e-4)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)])
 def test_with_pulses_they_are_those_of_the_reference_integrator(moments: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(5)
@@ -144,6 +145,7 @@ def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     assert 1.0 < routed.total_impulse / free.total_impulse < 1.3
 
 
+@pytest.mark.slow
 def test_the_axis_may_be_held_within_a_cone() -> None:
     centre = between(TURNING, 0.5)
     plan = planning.plan(cones(TURNING, Keep("Earth", centre, most=math.radians(8.0))), "rhumb-line")

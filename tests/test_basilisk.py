@@ -184,7 +184,7 @@ def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, fl
     assert difference(body, overlapping(), 5.0, fly(body, overlapping(), 5.0)) <= FOUND
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(1)
 @pytest.mark.basilisk
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def certified(name: str) -> NominalCertificate:
     return found
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", bodies())
 def test_the_file_alone_proves_the_bound(name: str) -> None:
     found = certified(name)
@@ -122,7 +122,7 @@ TAMPERED: dict[str, Callable[[dict[str, Any]], None]] = {
 }
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["windows", "strong in windows"])
 @pytest.mark.parametrize("what", TAMPERED)
 def test_a_tampered_file_proves_nothing(name: str, what: str) -> None:

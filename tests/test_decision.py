@@ -87,6 +87,7 @@ def test_without_cases_it_says_that_none_were_flown() -> None:
     assert decisions.verdict(Decision(sure)) == "met with nominal values"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("target", "said"),
     [(None, "nutation is damped"), (10.0, "target is reached")],

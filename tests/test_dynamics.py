@@ -37,6 +37,7 @@ def train(count: int, moved: int | None = None) -> Schedule:
     return Schedule(tuple(pulse(t, on, on * TORQUE) for t, on in pulses))
 
 
+@pytest.mark.slow
 @given(
     st.one_of(symmetric_spinners(), triaxial_spinners()),
     st.sampled_from([0.0, 200.0]),

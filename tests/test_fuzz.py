@@ -234,6 +234,7 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
 
 
+@pytest.mark.slow
 def test_ordinary_and_degenerate_spacecraft_get_results_or_reasons(tmp_path: Path, planner: Planner) -> None:
     seeds = [seed for seed in QUICK if seed % 25]
     assert [one for seed in seeds for one in faults(seed, tmp_path, planner)] == []

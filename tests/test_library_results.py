@@ -219,6 +219,7 @@ class _Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.mark.slow
 def test_notebooks_show_small_tables() -> None:
     craft = nutdamp.read(TILTED.replace("Tilted", "'<b>&\"'"))
     compared = nutdamp.compare(craft)

@@ -21,6 +21,7 @@ def tidy(text: str) -> list[str]:
     return [line.rstrip() for line in text.strip().splitlines()]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda text: str(text).splitlines()[0])
 def test_a_session_prints_what_the_readme_shows(run: Run, session: str) -> None:
     for part in re.split(r"^\$ ", session, flags=re.MULTILINE)[1:]:

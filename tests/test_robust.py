@@ -77,6 +77,7 @@ def test_a_thruster_that_cannot_be_trusted_is_left_out() -> None:
     assert found.cost.nutation < 0.0
 
 
+@pytest.mark.slow
 def test_what_is_best_for_the_estimate_stays_where_nothing_is_better() -> None:
     found = planned(dispersed(EXACT))
     assert found.chosen is found.usual
@@ -85,6 +86,7 @@ def test_what_is_best_for_the_estimate_stays_where_nothing_is_better() -> None:
     assert found.chosen.plan is found.comparison.recommended
 
 
+@pytest.mark.slow
 def test_the_figures_of_a_candidate_are_those_of_flights_one_by_one() -> None:
     """The nutation that 90 % of 200 cases do not exceed, flown singly through real widths."""
     body = dispersed(Dispersions(A=normal(0.02), thrust_per_pulse=normal(0.05)), Requirement(None, None, 0.9))
@@ -97,6 +99,7 @@ def test_the_figures_of_a_candidate_are_those_of_flights_one_by_one() -> None:
     assert float(np.quantile(flown, 0.9)) == pytest.approx(candidate.nutation, rel=0.25)
 
 
+@pytest.mark.slow
 def test_variants_keep_the_limits_and_come_once() -> None:
     body = dispersed(EXACT)
     plans = [one.plan for one in planned(body).candidates]
@@ -174,6 +177,7 @@ def test_each_share_is_that_of_the_real_widths() -> None:
     assert (forced.candidates[0].met, found.candidates[0].met) == (0.0, 1.0)
 
 
+@pytest.mark.slow
 def test_the_spin_is_part_of_the_requirement_in_every_case() -> None:
     """Cases whose spin misses the goal by more than 0.1 % do not comply: ω3 is known to 0.1 % here, one sigma."""
     body = dispersed(Dispersions(omega0=(None, None, normal(0.001))))
@@ -229,6 +233,7 @@ def test_candidates_count_as_equal_within_the_sampling_error_and_no_further(
     assert found.equals == (2 if best == "cheap" else 1)
 
 
+@pytest.mark.slow
 def test_a_real_tensor_is_flown() -> None:
     body = dispersed(Dispersions(A=normal(0.01)), moments=(122.0, 118.0, 80.0))
     found = planned(body, ("four-pulse",))

@@ -163,6 +163,7 @@ def test_nothing_where_nothing_is_required() -> None:
     assert list(surest.plans(replace(body, dispersions=None))) == []
 
 
+@pytest.mark.slow
 def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes() -> None:
     """Of the example two-pulse needs A and C three times as well known; shrunk so far, as many cases comply as must.
 
@@ -283,6 +284,7 @@ def gained(seed: int) -> float:
     return min(chosen, found.probability) - min(best, found.probability)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [0, 11])
 def test_never_worse_than_the_best_of_schemes_and_variants(seed: int) -> None:

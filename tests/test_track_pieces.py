@@ -131,6 +131,7 @@ def test_memory_does_not_grow_with_the_rows() -> None:
     assert peaks[1] < 100e6
 
 
+@pytest.mark.slow
 def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
     done = run("simulate", "--scheme", "two-pulse", "--samples", "45000", "--csv", "track.csv", "--quiet")
     assert done.returncode == 0, done.stderr

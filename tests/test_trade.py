@@ -39,6 +39,7 @@ def found(body: Spacecraft) -> tuple[fronts.Front, ...]:
     return fronts.fronts(body, OptimalOptions(), count=4, shifts=(fronts.EVERYWHERE, 0.0, HALF_DEGREE))
 
 
+@pytest.mark.slow
 def test_fronts_go_from_strict_to_free(found: tuple[fronts.Front, ...]) -> None:
     assert [front.shift for front in found] == [0.0, HALF_DEGREE, math.inf]
 
@@ -62,6 +63,7 @@ def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[fro
             assert point.bounds.rigorous <= point.cost * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: Spacecraft) -> None:
     """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all others."""
     fuelled = replace(
@@ -171,6 +173,7 @@ def test_no_schedule_within_the_horizon_is_said_with_its_reason() -> None:
     assert "horizon" in front.why
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_path: Path) -> None:
     files = ["--csv", "t.csv", "--json", "t.json", "--plot", "t.svg", "--schedules", "front"]
     done = run("trade", "--points", "2", "--allow", "0", *files)

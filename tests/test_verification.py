@@ -65,6 +65,7 @@ def test_a_flight_of_another_body_does_not_agree() -> None:
     assert np.linalg.norm(body - other) > AGREE
 
 
+@pytest.mark.slow
 def test_basilisk_has_its_say_in_the_verdict(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -130,6 +131,7 @@ def test_dissipation_takes_energy_and_leaves_the_momentum() -> None:
     assert found.energy_drift > 1e-4
 
 
+@pytest.mark.slow
 def test_the_budget_names_each_imperfection_of_the_body() -> None:
     body = replace(tilted(), limits=Limits(tick=0.001))
     plan = planning.plan(body, "two-pulse")
@@ -147,6 +149,7 @@ def test_the_budget_names_each_imperfection_of_the_body() -> None:
     assert rows["all: as flown"].nutation == plan.flown.nutation
 
 
+@pytest.mark.slow
 def test_what_a_budget_row_says_is_what_that_imperfection_does() -> None:
     """On a plan that is exact for ideal impulses, each row alone is the flight with that imperfection alone."""
     ideal = read_spacecraft("name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", "x")
@@ -164,6 +167,7 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does() -> None:
     assert calm["disturbances"].nutation == alone.nutation > 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("changes", "scheme"),
@@ -186,6 +190,7 @@ def test_the_budget_of_a_plan_does_not_read_backwards(changes: dict[str, Any], s
     assert "disturbances" not in nutations
 
 
+@pytest.mark.slow
 def test_with_a_target_the_budget_is_of_the_distance_from_it(run: Run) -> None:
     screen = run("verify", "--scheme", "half-cone", "--target", "10deg,45deg", "--quiet").stdout
     budget = screen[screen.index("Error budget") :]
@@ -205,6 +210,7 @@ def test_dissipation_keeps_the_momentum_and_drains_energy() -> None:
     assert slopes[1] / slopes[0] == pytest.approx(math.exp(30 / 600), rel=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (123.0, 117.0, 80.0)])
 @pytest.mark.parametrize("spin", some([3.0, -3.0], always=1))

@@ -90,7 +90,7 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
     assert none["target"] is None
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("command", ["plan", "simulate", "verify"])
 def test_every_json_says_where_it_ends(run: Run, command: str) -> None:
     name = str(case("tensor-microsat.yaml"))

@@ -87,6 +87,7 @@ def test_a_comparison_shares_one_budget(monkeypatch: pytest.MonkeyPatch) -> None
     assert spent.done < 330.0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["rhumb-line", "half-cone"])
 def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
     scheme: str, monkeypatch: pytest.MonkeyPatch

@@ -14,6 +14,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 STAGE = str(CONFIGS / "upper-stage.yaml")
 
 
+@pytest.mark.slow
 def test_a_budget_is_shown_and_written(run: Run, tmp_path: Path) -> None:
     pairs = ("--thresholds", "0.5deg,0.1deg", "--thresholds", "1 deg, 0.1 deg")
     done = run("budget", STAGE, *pairs, "--csv", "b.csv", "--json", "b.json", "--plot", "b.svg", columns=140)
@@ -41,7 +42,7 @@ def test_the_same_seed_gives_the_same_budget(run: Run) -> None:
     assert one != other
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("changed", "said"),
     [

@@ -52,6 +52,7 @@ def test_the_json_is_that_of_the_contract(run: Run, body: Path) -> None:
     assert len(data["worst"]) == 5
 
 
+@pytest.mark.slow
 def test_the_csv_has_every_case_and_gives_the_same_percentiles(run: Run, body: Path, tmp_path: Path) -> None:
     done = run(
         "disperse", "body.yaml", "--scheme", "two-pulse", "--samples", "20000", "--csv", "s.csv", "--json", "s.json"
@@ -155,6 +156,7 @@ def test_a_recommended_plan_that_does_not_damp_is_flown_with_a_warning(run: Run,
     assert "warning" not in run("disperse", "body.yaml", "--samples", "9", "--quiet").stderr
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
@@ -296,6 +298,7 @@ def test_one_case_and_all_cases_show_the_same_nominal_one(run: Run) -> None:
     assert json.loads(run("disperse", "--case", "7", "--json", "-").stdout)["flown"] is True
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("model", [(), ("--impulses", "--force")])
 def test_it_says_where_the_nominal_case_ends_and_where_it_should(

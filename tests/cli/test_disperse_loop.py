@@ -18,6 +18,7 @@ def stage(run: Run, tmp_path: Path) -> Path:
     return tmp_path / "stage.yaml"
 
 
+@pytest.mark.slow
 def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) -> None:
     command = ("disperse", "stage.yaml", "--loop", "--until", "8s", "--samples", "120", "--worst", "2")
     done = run(*command, "--csv", "c.csv", "--json", "c.json", "--plot", "c.svg")

@@ -44,6 +44,7 @@ def interrupted(body: Path, number: signal.Signals, *arguments: str, wait: str) 
     return process.returncode, out, err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, slow(signal.SIGTERM)])
 def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: signal.Signals) -> None:
     """The first cases are written, whole; and they are those of a run that requested no more."""
@@ -78,6 +79,7 @@ def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: sig
         assert resumed[key] == whole[key]
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_resumed_and_extended(run: Run, body: Path) -> None:
     arguments = (
         "disperse",

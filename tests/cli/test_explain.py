@@ -200,6 +200,7 @@ def test_the_figures_of_magnus_are_all_there() -> None:
     assert set(re.findall(r"Abb\. (\d)", titles)) == {"2", "4", "5", "6", "7", "8"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["abb6.png", "abb4.gif"])
 def test_the_commands_of_the_figures_draw(run: Run, tmp_path: Path, name: str) -> None:
     """One of each kind; what the others draw is flown below."""

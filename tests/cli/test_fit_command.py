@@ -153,6 +153,7 @@ def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Pa
     assert all(0.0034 < one["sigma_thrust"] < 0.006 for one in probes)
 
 
+@pytest.mark.slow
 def test_the_nutation_shown_is_that_of_as_many_cases_as_the_file_requires(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 6)
     limits = ("--set", "requirement.nutation=0.1 deg", "--set", "requirement.probability=90%")
@@ -188,6 +189,7 @@ def test_the_prospect_of_the_record_as_it_is_agrees_with_its_fit(tmp_path: Path)
     assert found.outlook(90.0).now.ratio == pytest.approx(sigma, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_library_gives_the_same_file(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 8)
     assert run("fit", "flight.csv", "-q", "-o", "now.yaml", "--at", "80s", "--json", "f.json").returncode == 0
@@ -202,6 +204,7 @@ def test_the_library_gives_the_same_file(run: Run, tmp_path: Path) -> None:
         nutdamp.fit(tmp_path / "flight.csv", nutdamp.example().replace(mass=200.0)).text()
 
 
+@pytest.mark.slow
 def test_a_fitted_file_is_fitted_again_with_what_was_known(run: Run, tmp_path: Path) -> None:
     """The second fit adds to the first: A keeps the sigma that two tolerances and the ratio leave it."""
     flight(tmp_path, 9)
@@ -215,6 +218,7 @@ def test_a_fitted_file_is_fitted_again_with_what_was_known(run: Run, tmp_path: P
     assert other["C/A"].sigma == pytest.approx(one["C/A"].sigma / math.sqrt(2.0), rel=0.05)
 
 
+@pytest.mark.slow
 def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_path: Path) -> None:
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n8,0.3,+M1\n16,0.3,-M2\n", encoding="utf-8")
     flown_so = ("--set", "thrusters.+M1.force=9.5N", "--set", "inertia.C=80.3 kg m^2")
@@ -242,6 +246,7 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     assert pairs[frozenset(("thrust +M1", "A"))] > 0.99
 
 
+@pytest.mark.slow
 def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(run: Run, tmp_path: Path) -> None:
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n8,0.3,+M1\n16,0.3,-M2\n", encoding="utf-8")
     late = "valve={open_delay: 40 ms, close_delay: 40 ms}"
@@ -265,6 +270,7 @@ def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(run: Run,
     assert max(abs(rows[f"delay {name}"]["value"]) for name in ("+M1", "-M2")) < 0.01  # ms
 
 
+@pytest.mark.slow
 def test_remarks_are_in_the_json_and_biases_without_a_key_are_named(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 11)
     lines = (tmp_path / "flight.csv").read_text().splitlines()

@@ -43,6 +43,7 @@ def test_the_traceback_is_shown_on_demand(folder: Path) -> None:
     assert "ZeroDivisionError: float division by zero" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_page_is_written(folder: Path) -> None:
     done = CliRunner().invoke(group, ["report", "-o", "report.md"])
     assert done.exit_code == 1
@@ -56,6 +57,7 @@ def test_a_scheme_that_fails_alone_recommends_nothing(folder: Path) -> None:
     assert "No recommendation" in done.stdout
 
 
+@pytest.mark.slow
 def test_robust_plans_go_on_without_it(folder: Path) -> None:
     done = CliRunner().invoke(group, ["plan", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse"])
     assert done.exit_code == 1

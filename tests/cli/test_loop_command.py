@@ -108,6 +108,7 @@ def test_a_requirement_that_is_missed_is_said(run: Run, file: str) -> None:
     assert "NOT met" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_never_quiet_misses_the_requirement_alone_as_in_a_study(run: Run, file: str) -> None:
     never = ("--set", "loop.stop=1e-8 deg", "--until", "60s")
     done = run("loop", file, *never, "--json", "-", "-q")
@@ -171,6 +172,7 @@ def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> Non
     assert "noise, bias and steps of the sensor" in shown
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("sensor", ["{kind: gyro}", "{kind: accelerometer, rate: 20 Hz, position: [1, 0, 0]}"])
 def test_pictures(run: Run, file: str, tmp_path: Path, sensor: str) -> None:

@@ -31,6 +31,7 @@ def numbers(text: str) -> list[str]:
     return re.findall(r"-?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?", text)
 
 
+@pytest.mark.slow
 @pytest.mark.few(2)
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
 def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: tuple[str, ...]) -> None:
@@ -86,6 +87,7 @@ def test_a_table_that_does_not_fit_stands_as_blocks_on_wide_screens_too() -> Non
     assert "2.5" in text
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"])
 def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:

@@ -46,6 +46,7 @@ def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> Non
     assert recommended != two
 
 
+@pytest.mark.slow
 def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> None:
     """Also where several are named, of which no other picture could be drawn, and where none is feasible."""
     named = ("--scheme", "one-pulse", "--scheme", "two-pulse")

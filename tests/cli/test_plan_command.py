@@ -238,6 +238,7 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
     assert first == pytest.approx(second, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
     """Propellant, time and residual of each against C|ω3|β, in one table that fits the screen."""
     done = run("plan", "--quiet", "--target", "10deg,45deg", "--json", "plans.json", "--scheme", "rhumb-line")
@@ -363,6 +364,7 @@ def test_json_holds_each_part_of_the_requirement(run: Run) -> None:
     assert easy.stdout.splitlines()[1].startswith("No pulse needed: the nutation of 0.3 deg at t = 0 already meets")
 
 
+@pytest.mark.slow
 def test_a_target_along_h_is_compared_with_no_rounding(run: Run) -> None:
     done = run("plan", "--target", "0deg,0deg", columns=80)
     (row,) = [line for line in done.stdout.splitlines() if "× C|ω3|β" in line]

@@ -17,6 +17,7 @@ from nutdamp.presentation.page import pdf
 IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
 
 
+@pytest.mark.slow
 def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) -> None:
     done = run("report", "--scheme", "two-pulse")
     assert done.returncode == 0, done.stderr
@@ -41,6 +42,7 @@ def test_trade_may_come_without_a_number(run: Run, tmp_path: Path) -> None:
     assert run("report", "--trade", "0").returncode == 2
 
 
+@pytest.mark.slow
 @pytest.mark.plans_anew
 def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
@@ -189,7 +191,7 @@ def test_what_the_browser_prints_is_the_file(monkeypatch: pytest.MonkeyPatch, tm
     assert pdf.printed("<p>ω", "report.pdf") == "<p>ω".encode()
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("words", "cases"),
     [
@@ -217,6 +219,7 @@ def test_a_number_that_counts_no_cases_is_refused(run: Run, number: str) -> None
     assert "not a number of cases" in done.stderr
 
 
+@pytest.mark.slow
 def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
     assert run("report", "--scheme", "half-cone", "--target", "10deg,45deg", "-o", "page.md").returncode == 0
     page = (tmp_path / "page.md").read_text("utf-8")

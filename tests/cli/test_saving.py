@@ -58,6 +58,7 @@ def test_each_file_that_cannot_be_saved_is_named(run: Run) -> None:
     assert done.stderr == 2 * "nutdamp: cannot write /dev/full: No space left on device\n"
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("command", ["verify --json", "disperse --samples 100 --json", "disperse --case 1 --json"])
 def test_a_full_disk_leaves_the_screen(run: Run, command: str) -> None:

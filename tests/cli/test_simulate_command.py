@@ -146,6 +146,7 @@ def test_the_end_can_be_chosen(run: Run) -> None:
     assert data["flown"]["nutation_deg"] > 1.0  # the second pulse is still to come
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_pictures_are_drawn_in_three_formats(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:

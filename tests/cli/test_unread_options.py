@@ -94,6 +94,7 @@ def test_a_direction_of_the_sun_that_nothing_reads_is_refused(run: Run, tmp_path
         assert "--sun is for rhumb-line, which is not planned here" in done.stderr
 
 
+@pytest.mark.slow
 def test_of_schemes_that_do_not_read_the_sun_it_is_reported(run: Run) -> None:
     command = ("plan", "--target", "10deg,45deg", "--sun", "70deg,0deg", "--scheme", "rhumb-line")
     assert run(*command).stderr == "no spacecraft file named, and no spacecraft.yaml here: " + (

@@ -69,6 +69,7 @@ def test_each_keeps_its_distribution_and_the_correlation_of_values_is_known(kind
     assert (matrix @ matrix.T)[0, 1] == pytest.approx(np.corrcoef(values)[0, 1], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("kinds", [("uniform", "uniform"), ("normal", "uniform"), ("uniform", "triangular")])
 def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, str]) -> None:

@@ -207,6 +207,7 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> 
     assert "least from Sun, deg" in alone
 
 
+@pytest.mark.slow
 def test_the_csv_has_the_angles_of_each_case_also_of_those_resumed(run: Run, keeper: Path, tmp_path: Path) -> None:
     arguments = (
         "disperse",

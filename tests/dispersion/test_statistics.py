@@ -79,6 +79,7 @@ def test_the_interval_at_the_ends(successes: int, trials: int, low: float, high:
     assert binomial_interval(successes, trials) == pytest.approx((low, high), rel=1e-12)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("successes", "trials"), [(5, 10), (1, 100), (997, 1000), (299, 300)])
 def test_the_interval_leaves_half_the_doubt_on_each_side(successes: int, trials: int) -> None:
     """Its ends are where so many or more, or so few or fewer, have a probability of 2.5 %: by exact summation."""

@@ -196,6 +196,7 @@ def test_arrays_that_no_study_writes_are_refused(tmp_path: Path, change: dict[st
         load_results(str(path), a_study(), 200)
 
 
+@pytest.mark.slow
 def test_an_archive_that_unfolds_is_refused_before_it_does(tmp_path: Path) -> None:
     """512 MiB of zeros in a file of half a megabyte: no more memory than the file is taken."""
     path = tmp_path / "study.npz"

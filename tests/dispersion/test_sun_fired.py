@@ -64,6 +64,7 @@ def three_moments(spin: float) -> Model:
     return Model(body, fired(body, model.schedule.blocks))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "model",
     [
@@ -111,6 +112,7 @@ def test_cases_fire_what_their_valves_give() -> None:
         assert found[OUTPUTS.index("spin_change"), case] == pytest.approx(settled.spin - true.spin, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_and_as_the_reference_has_it() -> None:
     """Euler's equations by DOP853, Sun pulses as their roots."""
     model = model_of()
@@ -176,6 +178,7 @@ def test_sensitivities_are_those_of_pulses_fired_by_the_sun() -> None:
         assert first.jacobian[8, index] == pytest.approx(expected, rel=1e-4, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_single_case_ends_alike_by_both_models(run: Run, tmp_path: Path) -> None:
     """By the impulse sum too it fires from its own Sun pulses."""
     (tmp_path / "f.yaml").write_text(FILE + DISPERSED)

@@ -117,7 +117,7 @@ def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_no
     assert outputs[4] == pytest.approx(given.propellant, rel=1e-9, abs=1e-15)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
     draws, valve, other, cold = CHANGES[change]

@@ -30,6 +30,7 @@ def record(times: Array, C: float, *, gyros: tuple[str, ...] = GYROS, spin: floa
 WIDE = {"A": {"normal": "30 %"}, "C": {"normal": "30 %"}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gyros", [GYROS, ("omega_2", "omega_3")])
 def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(gyros: tuple[str, ...]) -> None:
     """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate does by 2π/10 s."""
@@ -38,17 +39,20 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(gyros: tup
         fit(body, record(np.linspace(0.0, 600.0, 61), 93.0, gyros=gyros))
 
 
+@pytest.mark.slow
 def test_nutation_rates_none_of_which_the_file_allows_are_refused() -> None:
     with pytest.raises(Infeasible, match="none of their C/A is as near to the file"):
         fit(nutdamp.example(), record(np.linspace(0.0, 600.0, 61), 93.0))
 
 
+@pytest.mark.slow
 def test_sampling_at_uneven_times_tells_them_apart() -> None:
     times = np.linspace(0.0, 600.0, 61) + np.random.default_rng(1).uniform(-1.0, 1.0, 61)
     found = fit(nutdamp.example().with_(dispersions=WIDE), record(times - times[0], 93.0))
     assert found.named["C/A"] == pytest.approx(0.775, abs=4.0 * found.sigmas[found.index("C/A") or 0])
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_leaves_one_rate_is_said_to_decide() -> None:
     found = fit(nutdamp.example(), record(np.linspace(0.0, 600.0, 61), 80.4))
     assert found.named["C/A"] == pytest.approx(0.67, abs=2e-4)
@@ -69,6 +73,7 @@ def pushed(thrust: float) -> Record:
     return Record(times, dict(zip(GYROS, noisy.T, strict=True)))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("thrust", [8.0, 1.0])
 def test_a_pulse_that_no_schedule_names_is_found_and_nothing_is_estimated(thrust: float) -> None:
     with pytest.raises(Infeasible, match=r"with a step at about (19\.|20\.|21\.).* --schedule"):
@@ -92,6 +97,7 @@ def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_count
     assert any("spins the other way than the file has it" in one for one in doubts(found))
 
 
+@pytest.mark.slow
 def test_of_three_moments_the_largest_nutation_is_named_so() -> None:
     body = nutdamp.load(
         {"name": "three", "inertia": {"tensor": [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}, "omega0": [0.1, 0.1, SPIN]}

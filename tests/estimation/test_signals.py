@@ -84,6 +84,7 @@ def expect_close(found: Fit, truth: Mapping[str, float]) -> None:
     assert not far
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("spin", "C"), [(3.0, 84.0), (-2.0, 84.0)])
 def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float, C: float) -> None:
     body = nutdamp.load(FILE, set={"state.spin": spin, "inertia.C": C})
@@ -100,6 +101,7 @@ def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin
     assert reference.angle(axis, truth) < 5e-5
 
 
+@pytest.mark.slow
 def test_the_phase_of_the_axis_alone_is_that_of_the_file() -> None:
     body, times = nutdamp.load(FILE), np.linspace(0.05, 60.0, 300)
     seen = axes(flown(times, body), 1.0, np.random.default_rng(1))
@@ -129,6 +131,7 @@ def test_an_accelerometer_feels_dissipation() -> None:
     assert off < 1e-5 * np.abs(felt).max()
 
 
+@pytest.mark.slow
 def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> None:
     body, draw = nutdamp.load(FILE), np.random.default_rng(2)
     times = np.linspace(0.05, 60.0, 500)
@@ -172,6 +175,7 @@ def sun_pulses(body: Spacecraft, azimuth: float, until: float) -> Array:
     return np.interp(np.arange(math.ceil(turns[0]), turns[-1]), turns, times)
 
 
+@pytest.mark.slow
 def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     body, draw = nutdamp.load(FILE), np.random.default_rng(4)
     times = np.linspace(0.05, 100.0, 500)
@@ -212,6 +216,7 @@ def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
     assert after.values[2:5] == pytest.approx(flown(np.array([40.0]), body, events)[0].rates, abs=6.0 * NOISE)
 
 
+@pytest.mark.slow
 def test_unequal_transverse_moments_are_seen_and_their_axes() -> None:
     body, draw = nutdamp.load(FILE), np.random.default_rng(6)
     times = np.linspace(0.0, 60.0, 400)
@@ -226,6 +231,7 @@ def test_unequal_transverse_moments_are_seen_and_their_axes() -> None:
     expect_close(found, {"C/A": 84.2 / 120.0})
 
 
+@pytest.mark.slow
 def test_equal_moments_are_not_taken_for_different_ones() -> None:
     body = nutdamp.load(FILE)
     times = np.linspace(0.0, 60.0, 300)
@@ -235,6 +241,7 @@ def test_equal_moments_are_not_taken_for_different_ones() -> None:
         assert not fit(body, Record(times, dict(zip(GYROS, shown.T, strict=True)))).model.unequal
 
 
+@pytest.mark.slow
 def test_fast_growth_over_many_periods_is_followed() -> None:
     body = nutdamp.load(FILE, set={"state.nutation": "2 deg"})
     times = np.linspace(0.0, 150.0, 700)
@@ -251,6 +258,7 @@ def record(body: Spacecraft, times: Array, **changed: float) -> Record:
     return Record(times, dict(zip(GYROS, shown.T, strict=True)))
 
 
+@pytest.mark.slow
 def test_records_that_tell_nothing_say_what_would_help() -> None:
     still = nutdamp.load(FILE, set={"state.nutation": "0.001 deg"})
     with pytest.raises(Infeasible, match=r"no nutation is seen.*larger nutation"):

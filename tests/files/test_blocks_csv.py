@@ -189,6 +189,7 @@ def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
     assert both.returncode == 2
 
 
+@pytest.mark.slow
 def test_widths_of_a_list_are_counted_by_their_number(run: Run, tmp_path: Path) -> None:
     """What the file of blocks says in counts alone, the blocks are: entry 2 of 100, 300 and 500 ms is 300 ms."""
     text = FILE.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: [500 ms, 100 ms, 300 ms]")

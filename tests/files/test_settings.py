@@ -68,6 +68,7 @@ def test_the_example_has_many_values_to_set() -> None:
     assert len(LEAVES) > 40
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("value", some(["rubbish", 1e9, {"x": 1}, "-1 min", True, None, [1, 2], ""], always=3))
 def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
@@ -187,6 +188,7 @@ KEYS = st.sampled_from([dotted(path) for path, _ in LEAVES] + ["thrusters", "lim
 VALUES = st.one_of(st.text(max_size=12), st.text("[]{}:,&*!'\"#-1e9 .xmNd\n\t|>%@", max_size=24))
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.lists(st.tuples(KEYS, VALUES), min_size=1, max_size=3))
 def test_whatever_is_set_is_a_spacecraft_or_faults_on_one_line_each(chosen: list[tuple[str, str]]) -> None:

@@ -91,6 +91,7 @@ def test_every_pulse_is_in_its_spin_with_its_phase() -> None:
     assert float(rows[-1]["start_s"]) < starts[-1]
 
 
+@pytest.mark.slow
 def test_with_a_sensor_spins_are_counted_by_sun_pulses() -> None:
     """At each the Sun is at the azimuth of the sensor, and blocks are numbered and delayed alike."""
     body = read_spacecraft(SUNLIT, "sunlit.yaml")

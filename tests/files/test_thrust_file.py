@@ -190,6 +190,7 @@ def test_a_tank_needs_to_know_what_is_used() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_plan_in_blowdown_leaves_nothing_and_says_the_pressure() -> None:
     body = read(VALVE, "mass: 40 kg\n", TANK.replace("30 kg", "5 g"))
     made = planning.plan(body, "optimal")
@@ -231,6 +232,7 @@ def test_velocity_grows_as_the_mass_falls() -> None:
     assert rocket > 1.1 * 100.0 * 40.0 / 10.0
 
 
+@pytest.mark.slow
 def test_csv_has_commands_and_effective_times_and_is_read_back(tmp_path: Path) -> None:
     body = read(VALVE, "cold: {first: 90 %, pulses: 4}\n")
     made = planning.plan(body, "optimal")

@@ -106,7 +106,7 @@ def agrees(body: Spacecraft, made: Loop, cycles: int, seeds: int, least: int) ->
     assert cycle.impulse == pytest.approx(impulse, rel=0.02)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", QUICK)
 def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
     agrees(*QUICK[name], 40, 1, 20)

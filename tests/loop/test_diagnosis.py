@@ -70,6 +70,7 @@ def test_a_bias_as_large_as_half_of_start_hides_no_channel(sensor: Sensor) -> No
     assert fly(CRAFT, reverse, 400.0).stop is Stop.SENSOR
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("law", [FOUR_PULSE, ONE_PULSE, BANG])
 @pytest.mark.parametrize("share", [1.0, 3.0])
 @pytest.mark.parametrize("stop", [0.0, 0.1])

@@ -39,7 +39,7 @@ def test_sign_table_of_magnus_and_its_mirror_image(C: float, spin: float) -> Non
         assert (then * actuator.kick.conjugate()).real < 0.0  # whatever the table: against ω
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (120.0, 95.0, 80.0), (70.0, 90.0, 130.0)]
 )

@@ -144,6 +144,7 @@ def test_tolerances_of_zero_fly_the_file_itself_but_for_the_noise() -> None:
     assert np.allclose(results.values, found.nominal[:, None], rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_shares_worst_cases_and_verdict_are_of_the_cases() -> None:
     results = run(LoopResults(study(craft()), 300))
     nutation = results.of("nutation")
@@ -285,7 +286,7 @@ def test_what_a_loop_draws_is_correlated_as_the_file_says() -> None:
     assert changed == ["C", "sensor scale 1", "sensor scale 2"]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("law", [{}, BANGS], ids=["proportional", "bang"])
 @pytest.mark.parametrize("name", NOISY)
 def test_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, object]) -> None:
@@ -321,7 +322,7 @@ def check_six(name: str, count: int) -> None:
     assert set(results.stops) == {Stop.END}
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", SIX)
 def test_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
     check_six(name, 300)
@@ -333,6 +334,7 @@ def test_ten_thousand_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str
     check_six(name, 10_000)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("dissipation", [None, 200.0])
 def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> None:

@@ -306,6 +306,7 @@ def test_the_schedule_flown_again_is_the_flight_of_the_loop() -> None:
     assert np.array_equal(rows[0].t, rows[1].t)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("predict", [True, False])
 def test_valves_and_cold_nozzles_are_fired_through(predict: bool) -> None:
     """The law knows the valves; with prediction what they do to time and impulse is reckoned with."""

@@ -49,6 +49,7 @@ def expected(
     return found.y[:3].T, quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("turning", [False, True], ids=["fixed", "turning"])
 @pytest.mark.parametrize(("moments", "torque", "rates"), CASES.values(), ids=CASES)
 def test_one_body_under_fixed_and_turning_torques(

@@ -183,6 +183,7 @@ def forced(case: Case, number: int) -> tuple[Array, Array]:
     return y[:3], y[3:].reshape(3, 3)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("moments", [SYMMETRIC, TENSOR])
 @pytest.mark.parametrize(
     ("constant", "forcing"),

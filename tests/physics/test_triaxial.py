@@ -115,7 +115,7 @@ def test_hundred_periods_to_every_digit() -> None:
     assert turned(triaxial.free_attitude(moments, rates0, START, 0.2 * times), attitudes) < 4e-13
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("nudge", [1e-2, -1e-4, 1e-8, -1e-12, 2.0**-52, -(2.0**-52)])
 def test_near_the_separatrix(nudge: float) -> None:
     """3·1·ω3² = 1.5·0.5·ω1² on it."""
@@ -267,7 +267,7 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
         assert rate == pytest.approx((first - axial) / first * spin, rel=1e-15 + 5 * apart)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-12, 2.0**-52])
 def test_nearly_a_sphere_and_nearly_equal_to_the_spin_axis(apart: float) -> None:
     times = np.array([5.0, 20.0])

@@ -64,6 +64,7 @@ def test_the_limits_are_those_of_the_readme() -> None:
     assert [item.text for item in section.all("li")] == [text.replace("`", "") for text in guide.limits()]
 
 
+@pytest.mark.slow
 def test_the_spacecraft_stands_there_whole() -> None:
     found = facts(ace(), "At t = 0")
     assert found["mass"] == "611.7 kg"
@@ -161,6 +162,7 @@ def test_the_input_is_known_by_its_digest(run: Run, tmp_path: Path) -> None:
     assert f"| SHA-256 of the input file | {digest} |" in (tmp_path / "page.md").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_the_date_is_that_of_the_build_where_none_is_given(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,6 +258,7 @@ def test_impulses_are_compared_with_what_the_symbols_explain() -> None:
     assert facts(ace(), "Symbols")["A|ω0|"].endswith("no floor here, with I1 ≠ I2")
 
 
+@pytest.mark.slow
 def test_the_target_stands_beside_where_it_ends() -> None:
     shown = cards(turned("300 s"))
     for name in ("spin axis ends at", "H ends at"):
@@ -265,6 +268,7 @@ def test_the_target_stands_beside_where_it_ends() -> None:
         assert note.endswith(" deg off")
 
 
+@pytest.mark.slow
 def test_without_a_plan_the_tiles_say_what_was_required() -> None:
     shown = cards(turned("9 s"))
     assert shown["requirement"][0] == "NOT met: no scheme is feasible"

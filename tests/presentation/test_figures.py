@@ -103,7 +103,7 @@ def numbers(axes: Axes) -> list[int]:
 # --- what is drawn ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", ["wide pulses", "oblate, reversed", "ideal impulses", "three moments"])
 def test_path_and_pulses_together_are_the_track_in_degrees(case: str) -> None:
     made, track = flown(case)
@@ -130,6 +130,7 @@ def test_the_axis_track_ends_where_h_and_the_spin_axis_end() -> None:
     assert np.hypot(*line(space, "H")[-1]) == pytest.approx(shift, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_target_is_marked_where_h_ends() -> None:
     space = panel(drawn("motion", "pointed"), "Axis track")
     (target,) = line(space, "target")
@@ -137,6 +138,7 @@ def test_the_target_is_marked_where_h_ends() -> None:
     assert line(space, "H")[-1] == pytest.approx(target, abs=1e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "case"),
     [slow(*one) if number % 8 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
@@ -154,6 +156,7 @@ def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str)
             assert re.search(r", deg", axes.get_ylabel()) or axes.get_title().startswith("Firings")
 
 
+@pytest.mark.slow
 def test_the_pole_curve_shows_where_the_channels_push() -> None:
     """+M2 up, -M1 left, by the file's names; only those that fire."""
     axes = panel(drawn("motion", "34 pulses"), "Pole curve")
@@ -232,6 +235,7 @@ def test_a_constant_spin_is_drawn_as_a_straight_line() -> None:
     assert high - low > 0.01 * np.degrees(3.0)
 
 
+@pytest.mark.slow
 def test_of_a_very_long_time_the_axis_says_how_much_is_drawn() -> None:
     body, _ = CASES["no pulses"]
     made, track = fly(body, Schedule(), 1e6)
@@ -248,6 +252,7 @@ def test_of_a_very_long_time_the_axis_says_how_much_is_drawn() -> None:
 # --- the spherical view ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", [slow(case) if number % 4 else case for number, case in enumerate(CASES)])
 def test_what_is_magnified_says_so(case: str) -> None:
     made, track = flown(case)
@@ -284,6 +289,7 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
 # --- nothing overlaps, nothing is cut --------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")  # of the name in another script
 @pytest.mark.parametrize(("name", "case"), [slow(*one) if number % 4 else one for number, one in enumerate(LAID_OUT)])
 def test_no_text_is_cut_or_covers_another(name: str, case: str) -> None:

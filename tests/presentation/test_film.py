@@ -60,6 +60,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace() -> None:
         assert np.count_nonzero(np.abs(frames[one] - frames[other]).max(axis=2) > 50) > 40
 
 
+@pytest.mark.slow
 def test_each_frame_is_written_before_the_next_is_drawn() -> None:
     """So that a film of any length takes the memory of a frame; and the frames are the scene to the pixel."""
     made, end = flown(spinner(channels=cross(20.0)))

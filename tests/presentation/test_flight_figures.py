@@ -79,6 +79,7 @@ def drawn(name: str, case: str) -> Figure:
 # --- time axes -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("case", CASES)
 def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
@@ -113,6 +114,7 @@ def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
 # --- titles ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("by_impulses", "model"), [(False, "real pulse widths"), (True, "impulse sum (17)")])
 def test_titles_name_scheme_model_and_result(by_impulses: bool, model: str) -> None:
@@ -124,6 +126,7 @@ def test_titles_name_scheme_model_and_result(by_impulses: bool, model: str) -> N
         assert re.search(r"nutation 5 deg → < 1e-9 deg, shift of H \S+", heading)
 
 
+@pytest.mark.slow
 def test_titles_of_a_turn_say_how_far_to_which_target_and_the_pictures_mark_it() -> None:
     """It is 110 degrees: nutation alone would be a word about the least of it."""
     for name in NAMES:
@@ -140,6 +143,7 @@ def test_titles_of_a_turn_say_how_far_to_which_target_and_the_pictures_mark_it()
             assert axes.get_ylim()[0] < y < axes.get_ylim()[1]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", ["celestial", "three moments"])
 def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
     right = "east" if case == "celestial" else "x of N"
@@ -147,6 +151,7 @@ def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
     assert sum(f"H towards you, {right} to the right" in title for title in titles) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_no_number_is_minus_zero(case: str) -> None:
     for name in ("overview", "history"):
@@ -395,6 +400,7 @@ def test_odd_flights_are_drawn_whole(case: str) -> None:
         check_layout(drawn(name, case))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("required", "beside"), [(0.02, False), (0.12, True)])
 def test_a_required_nutation_above_the_angles_is_written_there(required: float, beside: bool) -> None:
     body = spinner(channels=cross(20.0), requirement=Requirement(required))  # 5° of nutation, 0.087 rad
@@ -410,6 +416,7 @@ def test_a_required_nutation_above_the_angles_is_written_there(required: float, 
     assert "required θ" in {text.get_text() for text in figure.legends[0].get_texts()}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("azimuth", [0.0, 5.0, 355.0, 8.0])
 def test_no_label_lies_under_the_star_of_the_target(azimuth: float) -> None:
     body = aimed(spinner(channels=cross(20.0)), 6.0, azimuth)  # 5° of nutation: it is beside the spin axis at t = 0

@@ -51,6 +51,7 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
         assert points * (bottom - number.y1) > 3.0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("most", "beside"), [(1e-3, True), (80.0, False)])
 def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bool) -> None:
     body = craft(Requirement(momentum_shift=math.radians(most)))

@@ -85,6 +85,7 @@ def test_blocks_phases_signature_and_criteria() -> None:
         assert float(row["spin: abort below rpm"]) < 12.0 < float(row["spin: abort above rpm"])
 
 
+@pytest.mark.slow
 def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() -> None:
     found = sheet(FILE, "rhumb-line", 3.0)
     fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")
@@ -97,6 +98,7 @@ def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() ->
     assert "Sun angle deg" not in rows(other, "What gyros")[0]
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(run: Run, tmp_path: Path) -> None:
     done = run("report", "-", "--target", "20deg,82deg", "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
     assert done.returncode in (0, 4), done.stderr
@@ -125,6 +127,7 @@ def test_the_signature_is_that_of_the_reference() -> None:
         assert seen == pytest.approx(reference.angle(momentum, body.sun), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_last_milestone_is_what_the_study_says_of_the_end() -> None:
     body = read_spacecraft(DISPERSED, "f.yaml", ())
     body = body.replace(goal=Goal(axis=body.direction_in_n(math.radians(5.0), 0.5)))

@@ -75,6 +75,7 @@ def scripts(tree: Node) -> list[Node]:
     return [node for node in tree.all("script") if "type" not in node.attributes]
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["example", "nasty"])
 def test_it_is_well_formed_and_needs_no_network(name: str, request: pytest.FixtureRequest) -> None:
@@ -127,6 +128,7 @@ def test_cells_that_stand_alone_on_narrow_screens_say_column_and_unit(example: s
     assert named, "no column has a unit"
 
 
+@pytest.mark.slow
 def test_what_a_file_says_stays_text(nasty: str) -> None:
     tree = parsed(nasty.removeprefix("<!DOCTYPE html>"))
     assert tree.all("h1")[0].text.startswith('<b>&"|*: damping 5 deg')
@@ -219,6 +221,7 @@ def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     }
 
 
+@pytest.mark.slow
 def test_valves_and_tank_are_among_what_the_spacecraft_is() -> None:
     more = (
         "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"

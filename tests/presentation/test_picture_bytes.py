@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
 from builders import cross, spinner
 
 from nutdamp import planning
@@ -46,6 +47,7 @@ def digest() -> str:
     return hashlib.sha256(file + figures.svg(figures.flight_figure("overview", made, track)).encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_another_process_makes_the_same_bytes() -> None:
     """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
     folders = [str(Path(__file__).parents[1]), str(Path(__file__).parent)]

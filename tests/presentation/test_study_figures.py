@@ -60,7 +60,7 @@ def drawn(name: str, which: str = "shift") -> Figure:
 # --- dispersed cases -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("which", ["shift", "target"])
 @pytest.mark.parametrize("name", NAMES)
 def test_studies_are_drawn_whole_and_say_what_is_met(name: str, which: str) -> None:
@@ -96,6 +96,7 @@ def test_a_histogram_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     assert shares[-1] == pytest.approx(0.01)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("which", ["shift", "target"])
 def test_cases_beyond_go_down_by_steps_to_the_last_case(which: str) -> None:
     """One of 3,000 lies beyond the last but one, as far as the maximum; the scale is that of the histogram beside."""
@@ -117,6 +118,7 @@ def test_cases_beyond_go_down_by_steps_to_the_last_case(which: str) -> None:
 STILL = replace(BODY, dispersions=Dispersions(timing=Tolerance("uniform", 1e-15)))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("bias", [0.0, 0.01])
 def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
@@ -252,6 +254,7 @@ def dots(axes: Axes) -> dict[str, tuple[float, str, bool]]:
     return found
 
 
+@pytest.mark.slow
 def test_dots_stand_at_the_numbers_of_the_comparison() -> None:
     figure = figures.schemes_figure(compared())
     check_layout(figure)

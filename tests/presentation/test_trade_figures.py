@@ -35,6 +35,7 @@ def traded() -> tuple[fronts.Front, ...]:
     return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, fronts.EVERYWHERE))
 
 
+@pytest.mark.slow
 def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     figure = figures.trade_figure(BODY, traded())
     check_layout(figure)
@@ -60,6 +61,7 @@ def test_the_recommended_plan_is_marked_among_the_trade() -> None:
     assert line(axes, f"recommended: {chosen.scheme}")[0] == pytest.approx([chosen.end, chosen.total_impulse])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("front", [0, 1])
 def test_no_number_lies_under_the_star_of_the_recommended_plan(front: int) -> None:
     for point in traded()[front].points:
@@ -89,6 +91,7 @@ def test_a_front_that_is_missing_is_named_above_the_others() -> None:
     assert not any("none" in text.get_text() for text, _ in texts(figures.trade_figure(BODY, (strict, free))))
 
 
+@pytest.mark.slow
 def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
     body = replace(BODY, requirement=Requirement(momentum_shift=math.radians(0.05)))
     found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))

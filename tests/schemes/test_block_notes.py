@@ -42,6 +42,7 @@ def cures(body: Spacecraft, **options: int) -> str:
     return said
 
 
+@pytest.mark.slow
 def test_blocks_that_miss_say_which_steps_are_too_coarse() -> None:
     """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°."""
     said = cures(TIGHT, max_blocks=1)

@@ -137,6 +137,7 @@ def test_a_valve_without_delays_changes_no_block() -> None:
     assert slow.flight.residual.nutation == pytest.approx(plain.flight.residual.nutation, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("valve", [SLOW, UNEVEN])
 def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_much(valve: Valve) -> None:

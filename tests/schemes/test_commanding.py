@@ -108,7 +108,7 @@ def made_by(scheme: str, body: Spacecraft) -> Schedule:
     return found.pulses
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("valve", [LATE, SLOW], ids=["late", "slow"])
 @pytest.mark.parametrize("scheme", CASES)
 def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, valve: Trapezoid) -> None:
@@ -122,7 +122,7 @@ def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, 
     assert left(fired, late) > 1000.0 * MICRODEGREE
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("valve", VALVES.values(), ids=VALVES)
 @pytest.mark.parametrize("scheme", CASES)
 def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valve) -> None:
@@ -141,6 +141,7 @@ def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valv
         assert np.arctan2(across, ends.momentum[2]) == pytest.approx(nominal, abs=allowed)
 
 
+@pytest.mark.slow
 def test_commands_are_those_of_the_valve_and_effective_ones_of_the_impulse() -> None:
     for valve in (SLOW, EFFECTIVE):
         made = made_by("optimal", through(valve, short_pulses()))
@@ -154,6 +155,7 @@ def test_commands_are_those_of_the_valve_and_effective_ones_of_the_impulse() -> 
             assert pulse.impulse == pytest.approx(pulse.torque * pulse.on_time)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", "optimal"])
 def test_ticks_are_those_of_the_command(scheme: str) -> None:
     body = through(SLOW, short_pulses())
@@ -182,6 +184,7 @@ def test_limits_hold_for_the_command_and_until_the_thrust_is_over() -> None:
             over = ends
 
 
+@pytest.mark.slow
 def test_a_requested_on_time_is_a_command() -> None:
     body = through(SLOW, short_pulses())
     found = planning.plan(body, "four-pulse", FourPulseOptions(on_time=0.03))
@@ -195,6 +198,7 @@ def test_a_requested_on_time_is_a_command() -> None:
     assert all(0.027 - 0.0005 <= on_time <= 0.033 + 1e-9 for on_time in on_times)  # what closes the train differs
 
 
+@pytest.mark.slow
 @pytest.mark.few(2)
 @pytest.mark.parametrize("valve", [None, SLOW], ids=["cold alone", "through valves"])
 @pytest.mark.parametrize("scheme", CASES)
@@ -227,6 +231,7 @@ def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     assert budget["without cold pulses"] > 1000.0 * MICRODEGREE
 
 
+@pytest.mark.slow
 def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_with() -> None:
     late = Trapezoid(open_delay=0.005, close_delay=0.105)
     assert effective_on_times(channel("C", 8.0, 0.0, 0.0))[0] == 0.0

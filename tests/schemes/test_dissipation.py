@@ -81,6 +81,7 @@ def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
     assert damped >= 7
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("steerable", [Steerable(), Steerable(400.0)], ids=["ideal", "torquer"])
 @pytest.mark.parametrize("scheme", ["two-pulse", "half-cone", "rhumb-line"])
 @pytest.mark.parametrize("C", [60.0, 160.0])

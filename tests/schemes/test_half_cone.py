@@ -29,6 +29,7 @@ def ends_on_the_target(plan: planning.Plan) -> None:
     assert off_target(plan.spacecraft, plan.pulses) < 1e-9
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0)])
 @pytest.mark.parametrize("cones", some([1, 3, 2, 5, 8], always=2))
@@ -65,6 +66,7 @@ def test_as_many_cones_as_are_worth_it(tilt: float, cones: int) -> None:
         assert costs[0] <= 0.99 * pointing.half_cones_impulse(240.0, math.radians(tilt), cones - 1)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("degrees", [1.0, 5.0, 20.0])
 @pytest.mark.parametrize(("tilt", "azimuth"), [(10.0, 45.0), (60.0, -120.0)])
 def test_a_nutation_is_taken_along(degrees: float, tilt: float, azimuth: float) -> None:
@@ -80,7 +82,7 @@ def test_a_nutation_is_taken_along(degrees: float, tilt: float, azimuth: float) 
         assert plan.pulses.total_impulse >= max(spacecraft.least_impulse, spacecraft.turning_impulse)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("cones", [1, 2, 5])
 @pytest.mark.parametrize("degrees", [0.0, 5.0])
 def test_channels_wait_for_their_phase(degrees: float, cones: int) -> None:
@@ -97,6 +99,7 @@ def test_real_widths(degrees: float) -> None:
     ends_on_the_target(row(aimed(spinner(degrees=degrees, steerable=Steerable(60.0)), 15.0, 45.0)))
 
 
+@pytest.mark.slow
 def test_a_nutation_beyond_one_pulse_is_damped_first() -> None:
     """8 N m turn H by 1.3° at most; 5° of nutation are 21 N m s."""
     spacecraft = aimed(spinner(degrees=5.0, channels=cross(8.0, max_on_time=2.0)), 10.0, 45.0)

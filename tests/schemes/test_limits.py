@@ -131,7 +131,7 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         assert len(plan.pulses) == 2
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @pytest.mark.parametrize("block", some(range(10), always=1))
 def test_whatever_the_limits(block: int, requested: tuple[str, Options]) -> None:
@@ -162,7 +162,7 @@ HARD = {
 }
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("requested", some(REQUESTED.values(), always=2), ids=REQUESTED)
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, requested: tuple[str, Options]) -> None:

@@ -49,6 +49,7 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         assert max(left.nutation, left.axis_error) <= (0.05 if body.limits.tick is None else 0.5) * requested
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("block", some(range(20)))
 def test_whatever_the_limits(block: int, scheme: str) -> None:
@@ -61,7 +62,7 @@ def test_whatever_the_limits(block: int, scheme: str) -> None:
             raise
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", some(SCHEMES, always=1))
 @pytest.mark.parametrize("hard", HARD.values(), ids=HARD)
 def test_awkward_limits(hard: Limits, scheme: str) -> None:
@@ -69,6 +70,7 @@ def test_awkward_limits(hard: Limits, scheme: str) -> None:
         check(aimed(spinner(limits=hard, **requested), 10.0, 45.0), scheme, Options())
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("spin", some([3.0, -3.0], always=1))
@@ -92,7 +94,7 @@ TRUE_BODIES = {
 }
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("true_body", TRUE_BODIES.values(), ids=TRUE_BODIES)
 def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
@@ -102,7 +104,7 @@ def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: 
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
 @pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
 def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:

@@ -48,7 +48,7 @@ def ends_on_the_target(plan: planning.Plan) -> None:
     assert off_target(plan.spacecraft, plan.pulses) < 1e-9
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 35.0)])
 @pytest.mark.parametrize("per_turn", [1, 2])
@@ -58,12 +58,14 @@ def test_ends_on_the_target(per_turn: int, A: float, C: float, spin: float) -> N
         ends_on_the_target(plan)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("degrees", [1.0, 20.0])
 def test_a_nutation_goes_along_or_first(degrees: float) -> None:
     for channels in (cross(60.0), (channel("+1", 60.0, 0.0, 0.0),)):
         ends_on_the_target(train(aimed(spinner(degrees=degrees, channels=channels), 25.0, -60.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("on_time", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("torque", [40.0, 10.0])
@@ -175,6 +177,7 @@ def test_unequal_moments_change_the_width_of_all_pulses_alike() -> None:
     ends_on_the_target(train(body))
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("degrees", "turn", "on_time"), [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)])
 def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
@@ -201,6 +204,7 @@ def test_ideal_pulses_come_down_to_the_floor() -> None:
     assert 1.0 <= plan.pulses.total_impulse / spacecraft.turning_impulse < 1.002
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("per_turn", [1, 2, 3])
 def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
     turn = 2 * math.pi / 3.0
@@ -262,7 +266,7 @@ def test_limits_are_kept() -> None:
 # --- fixed Sun phase -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", some(range(20), always=5))
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     """Small steps on the course as it is at each point end on the target after the way reported at first."""
@@ -282,6 +286,7 @@ def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     assert np.ptp(np.unwrap(courses)) < 2e-2
 
 
+@pytest.mark.slow
 def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
     spacecraft = aimed(spinner(degrees=0.0, channels=cross(60.0), limits=Limits(horizon=400.0)), 50.0, 0.0)
     sun = spacecraft.direction_in_n(math.radians(40.0), math.radians(60.0))

@@ -56,6 +56,7 @@ def test_on_times_of_a_nanosecond_are_fired_at_moments_of_their_own(scheme: str)
     assert all(two > one for one, two in itertools.pairwise(moments))
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
 def test_no_more_pulses_are_laid_than_anybody_commands(scheme: str) -> None:
@@ -96,6 +97,7 @@ def disturbed(rng: np.random.Generator) -> Spacecraft:
     )
 
 
+@pytest.mark.slow
 def test_the_next_alignment_is_found_or_given_up() -> None:
     found = 0
     for seed in range(300):

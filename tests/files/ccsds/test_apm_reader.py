@@ -361,6 +361,7 @@ def test_faults_of_xml_have_lines_too(folder: Path) -> None:
         assert any(f"a.apm:{place}:1: " in line and problem in line for line in faults(changed, folder))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("xml", [False, True], ids=["kvn", "xml"])
 @given(data=st.data())
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])

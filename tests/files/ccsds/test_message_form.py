@@ -81,7 +81,7 @@ def test_keywords_stand_in_the_order_of_the_tables(case: str) -> None:
     ]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(1)
 @CASES
 def test_both_notations_hold_the_same(case: str) -> None:
     plan = messages.planned(case)

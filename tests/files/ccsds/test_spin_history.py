@@ -36,6 +36,7 @@ def first_axis(alpha: float, delta: float, angle: float) -> Vector:
     return np.asarray(math.cos(turned) * node + math.sin(turned) * np.cross(third, node))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("case", BODIES)
 def test_records_are_the_motion_under_torque_and_without(case: str) -> None:
     plan = messages.planned(case)

@@ -80,6 +80,7 @@ def layout(rng: np.random.Generator, *, axial: float = 0.0, count: int | None = 
     return spinner(A, C, spin, degrees, float(rng.uniform(0, 6.28)), channels=tuple(made), limits=limits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", some(range(0, 200, 40)))
 def test_the_bound_is_the_optimum_of_a_dense_grid_and_never_above_it(first: int) -> None:
     """Times on the grid are some of all times, so its optimum lies above the bound; hardly, where the grid is fine."""
@@ -250,6 +251,7 @@ def test_the_way_of_h_is_the_shortest_round_its_sphere(degrees: float, turn: flo
         assert proved(body, shift=True) == pytest.approx(shortest, rel=1e-3)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("what", ["dissipation", "three moments", "disturbance"])
 def test_no_rigorous_bound_is_told_where_none_is_known_to_hold(what: str) -> None:
     body = spinner(channels=cross(8.0, max_on_time=2.0), limits=Limits(horizon=60.0))
@@ -268,6 +270,7 @@ def test_no_rigorous_bound_is_told_where_none_is_known_to_hold(what: str) -> Non
     assert any("first-order least" in text for text in remarks(made))
 
 
+@pytest.mark.slow
 def test_optimal_with_a_free_axis_is_not_below_its_bound() -> None:
     for seed in range(4):
         body = layout(np.random.default_rng(1000 + seed), axial=0.1 * (seed % 2))
@@ -314,6 +317,7 @@ def small_angle_optimum(spacecraft: Spacecraft, points: int, *, lasting: bool) -
     return math.inf if found.fun is None else float(found.fun) * spacecraft.least_impulse
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("lasting", [False, True])
 @pytest.mark.parametrize("first", some([0, 20]))

@@ -24,6 +24,7 @@ def as_found(_problem: Problem, best: Schedule, _first: Solution, _cheapest: Cal
     return best
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "latest"), [("lunar-prospector", 22.0), ("magnus-oblate", 5.0), ("single-thruster", 104.0)]
 )

@@ -39,6 +39,7 @@ def test_what_the_solver_gave_up_on_is_planned(name: str, least: str) -> None:
     assert max(made.flown.nutation, made.flown.momentum_shift) < MICRODEGREE
 
 
+@pytest.mark.slow
 def test_no_word_of_the_solver_is_shown() -> None:
     made = plan(load_spacecraft(case("optimal-highs-2.yaml")), "optimal")
     assert infeasibility(made) == "" or not any(word in infeasibility(made) for word in ("HiGHS", "status", "solver"))
@@ -83,6 +84,7 @@ def test_interior_points_do_what_the_simplex_cannot(monkeypatch: pytest.MonkeyPa
     assert other.pulses.total_impulse == pytest.approx(plain.pulses.total_impulse, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_solver_that_fails_late_keeps_what_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
     counted = Failing(monkeypatch, lambda *_: False)
     plan(body(), "optimal")

@@ -105,7 +105,7 @@ def dense(spacecraft: Spacecraft, costs: np.ndarray, points: int) -> float:
     return float(found.fun)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", some(range(12), always=5))
 def test_the_optimum_is_that_of_a_dense_grid(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -242,7 +242,7 @@ def flies(seed: int, dearest: float) -> None:
     assert made.pulses.propellant <= dearest * bounds.first_order
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", some(range(16), always=6))
 def test_random_layouts_are_planned(seed: int) -> None:
     flies(seed, 1.03)
@@ -262,7 +262,7 @@ KNOWN = {
 """Propellant, kg, of layouts as commit b69e7e0 plans them: by linear programs alone, which another solver solved."""
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", KNOWN)
 def test_layouts_cost_no_more_than_by_linear_programs_alone(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The schedule found, and the one that ends earlier and is taken in its place, within what counts as equal."""

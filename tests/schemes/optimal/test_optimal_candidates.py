@@ -52,6 +52,7 @@ def as_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "hastened", lambda _problem, best, *_: best)
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("as_found")
 @pytest.mark.parametrize("seed", [1, 9, 14, 38])
 def test_a_free_axis_never_costs_more_than_h_kept(seed: int) -> None:
@@ -70,6 +71,7 @@ def test_a_free_axis_never_costs_more_than_h_kept_in_many_layouts(seed: int) -> 
     test_a_free_axis_never_costs_more_than_h_kept(seed)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [1, 4, 36])
 def test_a_free_axis_that_ends_earlier_costs_as_much_within_what_counts_as_equal(seed: int) -> None:
     body = random_layout(seed)
@@ -77,6 +79,7 @@ def test_a_free_axis_that_ends_earlier_costs_as_much_within_what_counts_as_equal
     assert free.pulses.cost <= kept.pulses.cost * (1.0 + SAME_COST)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_found")
 @pytest.mark.parametrize("shift", some([0.05, 1.0]))
 def test_a_shift_allowed_never_costs_more_than_none(shift: float) -> None:
@@ -88,6 +91,7 @@ def test_a_shift_allowed_never_costs_more_than_none(shift: float) -> None:
         assert loose.pulses.cost <= kept.pulses.cost * (1.0 + 1e-6)
 
 
+@pytest.mark.slow
 def test_what_the_gap_forbids_is_not_told_as_rounding() -> None:
     """Two pulses that left 4.47° of 5° were called feasible, where four-pulse leaves 2.16°."""
     made = plan(load_spacecraft(case("optimal-tick.yaml")), "optimal")
@@ -101,6 +105,7 @@ def ticked(seed: int) -> Spacecraft:
     return replace(body, limits=replace(body.limits, tick=tick, gap=gap))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", some(range(8), always=3))
 def test_on_ticks_only_rounding_stays(seed: int) -> None:
     """Half a tick of every start and on-time, as independent errors, by the reference integrator."""
@@ -120,6 +125,7 @@ def test_on_ticks_only_rounding_stays(seed: int) -> None:
     assert violations(body, made.pulses) == []
 
 
+@pytest.mark.slow
 def test_with_three_moments_impulse_is_that_of_the_true_thrusters() -> None:
     """The model that is planned on has torques stretched by some per cent; its costs are not."""
     body = spinner(moments=(120.0, 110.0, 80.0), channels=cross(8.0, max_on_time=2.0), limits=Limits(horizon=60.0))

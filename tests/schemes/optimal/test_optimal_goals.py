@@ -32,6 +32,7 @@ def thrusters() -> tuple[Channel, ...]:
     return cross(8.0, min_on_time=0.02, max_on_time=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("A", "C", "spin"), [(120.0, 80.0, 3.0), (120.0, 80.0, -3.0), (90.0, 120.0, 2.0)])
 @pytest.mark.parametrize(
@@ -63,7 +64,7 @@ def spin_thrusters() -> tuple[Channel, ...]:
     return (*thrusters(), *pair)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize("factor", some([0.7, 1.0, 1.02, 1.4], always=2))
 def test_the_spin_ends_as_asked(spin: float, factor: float) -> None:
@@ -121,6 +122,7 @@ def test_h_may_end_off_its_target_and_that_saves(shift: float) -> None:
     assert loose.pulses.total_impulse <= kept.pulses.total_impulse * 1.001
 
 
+@pytest.mark.slow
 def test_least_time_ends_sooner_and_nothing_ends_much_sooner() -> None:
     body = spinner(channels=thrusters(), limits=Limits(horizon=60.0))
     soon, cheap = (plan(body, "optimal", Options(least=what)) for what in ("time", "propellant"))
@@ -141,6 +143,7 @@ def test_least_pulses_fires_as_seldom_as_the_equations_allow(free: bool) -> None
     assert made.flown.nutation < MICRODEGREE
 
 
+@pytest.mark.slow
 def test_ticks_together_leave_no_more_than_half_a_tick_of_one_pulse() -> None:
     """At their best moments all pulses change the nutation by the same steps, so that half a step may stay."""
     body = spinner(channels=thrusters(), limits=Limits(horizon=60.0, tick=0.01))

@@ -48,6 +48,7 @@ def test_the_layouts_are_not_too_hard_for_the_rival() -> None:
     assert sum(row["cost_kg"] is not None for row in GOLDEN) > 0.8 * len(GOLDEN) >= 240
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("row", GOLDEN[:QUICK], ids=lambda row: row["seed"])
 def test_as_cheap_as_the_rival(row: dict[str, float]) -> None:
     beats(int(row["seed"]), row["cost_kg"])

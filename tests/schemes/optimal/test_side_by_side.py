@@ -34,6 +34,7 @@ def pauses(made: Schedule) -> list[float]:
     return [after.start - before.end for pulses in each for before, after in itertools.pairwise(pulses)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "most"),
     [("", 1.03), slow("limits: {gap: 100 ms}\n", 1.09), slow("limits: {tick: 1 ms}\n", 1.03)],
@@ -56,6 +57,7 @@ def test_several_short_pulses_in_each_half_turn_damp(changed: str, most: float) 
     assert (made.pulses.propellant or math.inf) < most * bounds.first_order
 
 
+@pytest.mark.slow
 def test_it_is_recommended_over_what_leaves_half() -> None:
     body = read_spacecraft(NOTHING_DAMPS, "nothing-damps.yaml")
     assert plan(body, "four-pulse").severity > math.radians(4.0)

@@ -48,6 +48,7 @@ def task_of(spacecraft: Spacecraft, equations: Equations | None = None) -> Task:
     return Task(spacecraft, equations or Equations(), spacecraft.channels, costs)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", some(BEATEN, always=3))
 def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:

@@ -172,7 +172,7 @@ def test_ticks_leave_no_more_than_their_resolution() -> None:
 # --- body-fixed ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), BODIES[:2])
 @pytest.mark.parametrize(("degrees", "tilt", "azimuth"), [(0.0, 5.0, 70.0), (5.0, 10.0, 45.0), (20.0, 40.0, -120.0)])
