@@ -69,15 +69,26 @@ class Imperfection:
 
 
 @dataclass(frozen=True, slots=True)
-class Verification:
-    """Methods side by side, what must be conserved, and the budget.
+class Conservation:
+    """The largest relative change of |H| or of the energy on a coast; ``changed``: what may change it there, if any."""
 
-    ``momentum_drift`` and ``energy_drift`` are the largest relative changes of |H| and of the energy on a coast.
-    """
+    name: str
+    drift: float
+    changed: tuple[str, ...] = ()
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether it keeps to `AGREE`; None where something may change it."""
+        return None if self.changed else self.drift <= AGREE
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Methods side by side, what must be conserved, and the budget."""
 
     methods: tuple[Method, ...]
-    momentum_drift: float
-    energy_drift: float
+    momentum: Conservation
+    energy: Conservation
     budget: tuple[Imperfection, ...]
 
     @property
@@ -89,6 +100,11 @@ class Verification:
     def disagreeing(self) -> tuple[str, ...]:
         """Names of those whose motion differs from the flown one by more than `AGREE`, or is not a number."""
         return tuple(method.short for method in self._outside if not method.difference <= AGREE)
+
+    @property
+    def drifting(self) -> tuple[str, ...]:
+        """What changes on coasts although nothing may change it."""
+        return tuple(one.name for one in (self.momentum, self.energy) if one.kept is False)
 
     @property
     def agree(self) -> bool:
@@ -118,10 +134,7 @@ def verify(
         _by_dop853(judge, times, reference),
         _by_basilisk(judge, end),
     )
-    momentum_drift, energy_drift = _conserved(judge)
-    return Verification(
-        methods, momentum_drift, energy_drift, _budget(spacecraft, schedule, unrounded, expected=expected)
-    )
+    return Verification(methods, *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
 
 
 def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vector, Vector]) -> Method:
@@ -205,18 +218,20 @@ def _method(
     return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)
 
 
-def _conserved(flown: Flight) -> tuple[float, float]:
-    """Largest relative change of |H| and of the energy along one coast."""
+def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
+    """|H| and energy along each coast: torques from outside change both, dissipation within the body the energy."""
     firing = [pulse.thrust for pulse in flown.schedule]
     worst = [0.0, 0.0]
     for leg in flown.legs:
         if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
             continue
-        body, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
+        turning, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
         moments = flown.moments_at(np.array([leg.start])).ravel()
-        for index, value in enumerate((np.linalg.norm(body * moments, axis=1), body**2 @ moments)):
+        for index, value in enumerate((np.linalg.norm(turning * moments, axis=1), turning**2 @ moments)):
             worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
-    return worst[0], worst[1]
+    body = flown.spacecraft
+    outside, inside = ("disturbances",) * bool(body.disturbances), ("dissipation",) * (body.growth != 0.0)
+    return Conservation("|H|", worst[0], outside), Conservation("energy", worst[1], (*outside, *inside))
 
 
 def _budget(

@@ -56,7 +56,9 @@ def command(
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
     elif not found.checks:
         say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
-    leave(failed=bool(found.disagreeing), infeasible=not found.checks)
+    for one in found.drifting:
+        say(f"nutdamp: {one} is not constant on coasts, where nothing changes it; please report this")
+    leave(failed=bool(found.disagreeing or found.drifting), infeasible=not found.checks)
 
 
 def _verify_loop(job: Job, json: str | None) -> None:

@@ -34,8 +34,10 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
             }
             for method in found.methods
         ],
-        "momentum_drift": found.momentum_drift,
-        "energy_drift": found.energy_drift,
+        "momentum_drift": found.momentum.drift,
+        "momentum_kept": found.momentum.kept,
+        "energy_drift": found.energy.drift,
+        "energy_kept": found.energy.kept,
         "budget": [
             {
                 "imperfection": row.name,

@@ -34,6 +34,12 @@ def verdict(decision: Decision) -> str:
     return f"NOT met: {' and '.join(broken)}; {beside}{end}" if broken else end
 
 
+def statement(decision: Decision) -> Text:
+    """The verdict as a sentence."""
+    lead = "Requirement: " if decision.nominal is None and not decision.strays else "Requirement "
+    return Text.assemble(lead, coloured(verdict(decision), decision.met), ".")
+
+
 def _at_end(decision: Decision) -> str:
     """What is said of the end, whatever the spin axis keeps on the way."""
     cases, nominal = decision.cases, decision.nominal
@@ -136,7 +142,7 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
 
 def requirement(decision: Decision) -> Iterator[Text]:
     """The verdict as a line of a screen, and which schemes comply more often."""
-    yield Text.assemble("Requirement: ", coloured(verdict(decision), decision.met), ".")
+    yield statement(decision)
     if better(decision):
         yield Text.assemble(("Note: ", "bold"), better(decision))
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
+NOTHING = 1e-9
+"""In these units, what is less is rounding."""
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
 """Of a case whose tank runs empty."""
@@ -71,9 +73,11 @@ def _percentiles(results: Results) -> Table:
         if found is None:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
-        values = [float(plan), *found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
+        values = [*found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
         largest = scale * max(abs(found.minimum), abs(found.maximum))
-        table.add_row(Text(name, style="dim"), *(beside(scale * value, largest) for value in values))
+        # The nominal value has digits of its own: other places show it alone.
+        own = "0" if abs(scale * plan) < NOTHING else f"{scale * plan:.4g}"
+        table.add_row(Text(name, style="dim"), own, *(beside(scale * value, largest) for value in values))
     for column in table.columns[1:]:
         column.no_wrap = True
     return table
@@ -81,8 +85,8 @@ def _percentiles(results: Results) -> Table:
 
 def beside(value: float, largest: float) -> str:
     """A number with the decimals that show four digits of the ``largest`` beside it."""
-    if largest < 1e-9:
-        return "0"  # but for rounding
+    if largest < NOTHING:
+        return "0"
     if not 1e-5 <= largest < 1e6:
         return f"{value:.2e}"
     shown = f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"

@@ -164,7 +164,7 @@ class Sky(NamedTuple):
 def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
     """The names for a view of which ``centre`` is the middle."""
     if flight.spacecraft.attitude is None:
-        return Sky("towards x of N, deg", "towards y of N, deg", "H towards you, x of N to the right")
+        return Sky("towards inertial x, deg", "towards inertial y, deg", "H towards you, inertial x to the right")
     return Sky(f"east of {centre}, deg", f"north of {centre}, deg", "H towards you, east to the right")
 
 

@@ -41,7 +41,7 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
         why = (
             "limits.max_pulses is reached" if run.stop is Stop.FULL else "the loop is never down to its stop threshold"
         )
-        parts.append(Text.assemble(("Requirement: ", "bold"), (f"NOT met: {why}", "bold red"), "."))
+        parts.append(Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), "."))
     else:
         parts += list(requirement(decision))
     parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]

@@ -31,9 +31,24 @@ def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[Renderab
             parts.append(Text(_without_optimal(front)))
         if front.points:
             parts.append(_table(found, front, by_others=by_others))
+    if any(_below(point) for _, _, point in numbered(found)):
+        parts += [Text(), Text(BELOW, style="dim")]
     if any(fails(point) for _, _, point in numbered(found)):
         parts += [Text(), Text(f"{NOT} does not meet the requirement")]
     return parts
+
+
+BELOW = (
+    "The first-order least is that of small angles, and bounds no plan with large ones: where a cost is below it, the "
+    "flight through the real pulse widths needs less than first order says."
+)
+"""Of points that cost less than their first-order least."""
+
+
+def _below(point: Point) -> bool:
+    """Whether it costs less than its first-order least, as the table writes both."""
+    least = point.bounds.first_order
+    return least is not None and point.cost < least and cost(point.cost, point.unit) != cost(least, point.unit)
 
 
 def fails(point: Point) -> bool:

@@ -10,7 +10,7 @@ from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.verification import AGREE, WITHOUT, Verification
+from nutdamp.verification import AGREE, WITHOUT, Conservation, Verification
 
 
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
@@ -25,7 +25,7 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
         *missing,
         Text(),
         Text(verdict(found)),
-        Text(conservation(spacecraft, found)),
+        Text(conservation(found)),
         Text(),
         Text("Error budget: each imperfection alone, everything else ideal", style="bold"),
         Text(),
@@ -43,15 +43,20 @@ def verdict(found: Verification) -> str:
     return f"The flown motion and {' and '.join(names)} {how}."
 
 
-def conservation(spacecraft: Spacecraft, found: Verification) -> str:
-    """How far |H| and the energy change on coasts, in a sentence."""
-    if found.momentum_drift == 0.0 == found.energy_drift:
+def conservation(found: Verification) -> str:
+    """How far |H| and the energy change on coasts, and by what, in a sentence."""
+    both = found.momentum, found.energy
+    if all(one.drift == 0.0 for one in both):
         return "On coasts |H| and the energy are constant to the last digit."
-    momentum, energy = _difference(found.momentum_drift), _difference(found.energy_drift)
-    drifts = f"|H| by {momentum} of itself, the energy by {energy}, at most"
-    if spacecraft.disturbances or spacecraft.growth != 0.0:
-        return f"On coasts disturbances or dissipation change {drifts}."
-    return f"On coasts, where both should be constant, rounding changes {drifts}."
+    momentum, energy = map(_course, both)
+    return f"On coasts |H| {momentum}, the energy {energy}."
+
+
+def _course(one: Conservation) -> str:
+    how = "is NOT constant" if one.kept is False else "is constant but for rounding"
+    if one.changed:
+        how = f"is changed by {' and '.join(one.changed)}"
+    return f"{how} ({_difference(one.drift)} of itself at most)"
 
 
 def methods_table(found: Verification) -> Table:
@@ -95,5 +100,5 @@ def budget_note(found: Verification) -> str:
     subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     return (
         f"Plans are checked by flights with {subject}, on which most schemes correct them; a row 'without' shows what "
-        f"the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, more or less."
+        f"the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, which may be more or less."
     )

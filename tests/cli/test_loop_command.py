@@ -115,7 +115,7 @@ def test_a_loop_that_is_never_quiet_misses_the_requirement_alone_as_in_a_study(r
     found = json.loads(done.stdout)
     assert (done.returncode, found["meets_requirement"], found["quiet_s"]) == (4, False, [])
     assert found["flown"]["nutation_deg"] < 0.3
-    assert "Requirement: NOT met: the loop is never down to its stop threshold" in run("loop", file, *never).stdout
+    assert "Requirement NOT met: the loop is never down to its stop threshold" in run("loop", file, *never).stdout
     cases = ("--set", "dispersions={A: {normal: 0.01 %}}", "--samples", "20", "--json", "-", "-q")
     found = json.loads(run("disperse", file, "--loop", *never, *cases).stdout)
     assert found["requirement"]["met_fraction"] == 0.0

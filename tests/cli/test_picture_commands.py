@@ -69,7 +69,7 @@ def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: P
 @pytest.mark.slow
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
     common = ("disperse", "--scheme", "two-pulse", "--impulses", "--force", "--samples", "200", "-q")
-    said = {"cases": "cases beyond, %", "momentum": "H towards you, x of N to the right", "budget": "A, 0.6 kg m²"}
+    said = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.6 kg m²"}
     for figure, words in said.items():
         run(*common, "--plot", f"{figure}.svg", "--figure", figure)
         assert words in (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")

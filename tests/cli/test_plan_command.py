@@ -174,7 +174,7 @@ def test_a_missed_requirement_is_exit_4_with_results(run: Run, tmp_path: Path) -
     (tmp_path / "weak.yaml").write_text(WEAK)
     done = run("plan", "weak.yaml", "--csv", "pulses.csv")
     assert done.returncode == 4
-    assert "Requirement: NOT met with nominal values." in done.stdout
+    assert "Requirement NOT met with nominal values." in done.stdout
     assert (tmp_path / "pulses.csv").exists()
 
 

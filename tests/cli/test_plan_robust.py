@@ -66,7 +66,7 @@ def test_the_requirement_with_its_probability(run: Run, sat: Path, degrees: floa
     sat.write_text(BODY + UNTRUSTED + requirement, encoding="utf-8")
     done = run("plan", "sat.yaml", "--scheme", "four-pulse", "--robust")
     assert done.returncode == status, done.stdout
-    verdict = "Requirement: " + ("met: 100.0 % of cases" if status == 0 else r"NOT met: [\d.]+ % of cases")
+    verdict = "Requirement " + ("met: 100.0 % of cases" if status == 0 else r"NOT met: [\d.]+ % of cases")
     assert re.search(verdict + r" comply \(95 % required\)", " ".join(done.stdout.split()))
 
 
@@ -94,7 +94,7 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     words = " ".join(done.stdout.split())
     assert "Robust plan: optimal, against dispersions, " in words
     assert "at least 99.7 % of cases comply with it, of " in words
-    assert "Requirement: met: 99." in words
+    assert "Requirement met: 99." in words
     assert " instead of 63.5 % of cases comply" in words
     found = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     assert found["flown"]

@@ -186,7 +186,7 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
     said = tile.all("dd")[0].text
     assert re.fullmatch(r"NOT met: [\d.]+ % of cases comply \(99.7 % required\)", said)
     assert not [one for one in tree.all("div") if one.attributes.get("class") == "good"]
-    assert f"Requirement: {said}." in done.stderr
+    assert f"Requirement {said}." in done.stderr
     found, *_ = tree.all("table")
     assert [row.all("td")[-1].text for row in found.all("tr")[1:]][::2] == ["NOT met", "NOT met"]
     heads, *rows = table(tree, "What each scheme costs")

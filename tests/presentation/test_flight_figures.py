@@ -146,7 +146,7 @@ def test_titles_of_a_turn_say_how_far_to_which_target_and_the_pictures_mark_it()
 @pytest.mark.few(1)
 @pytest.mark.parametrize("case", ["celestial", "three moments"])
 def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
-    right = "east" if case == "celestial" else "x of N"
+    right = "east" if case == "celestial" else "inertial x"
     titles = [axes.get_title() for name in ("motion", "sphere") for axes in drawn(name, case).axes]
     assert sum(f"H towards you, {right} to the right" in title for title in titles) == 2
 

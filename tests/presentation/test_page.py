@@ -334,7 +334,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     assert results.met_fraction is not None
     share = f"{100 * results.met_fraction:.1f} % of cases comply (90 % required)"
     said = f"met: {share}" if good else f"NOT met: {share}"
-    assert made.verdict.startswith(f"Requirement: {said}. ")
+    assert made.verdict.startswith(f"Requirement {said}. ")
     assert {one.name: one.value for one in made.figures}["requirement"] == said  # the tile does not contradict the page
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     heads, rows = sheet(tree, "dispersion")

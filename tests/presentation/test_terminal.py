@@ -150,7 +150,14 @@ def test_every_line_fits_the_terminal_and_nothing_but_text_is_sent(case: str, wi
     shown = screen(case, width)
     assert all(len(line) <= width for line in shown.splitlines())
     assert "\x1b" not in shown
-    for unit in ("ω1, deg/s", "ω2, deg/s", "towards x of N, deg", "towards y of N, deg", "Pole curve", "Axis track"):
+    for unit in (
+        "ω1, deg/s",
+        "ω2, deg/s",
+        "towards inertial x, deg",
+        "towards inertial y, deg",
+        "Pole curve",
+        "Axis track",
+    ):
         assert unit in shown
     assert ("side" if "Pole curve" in shown and "Axis track" in shown.splitlines()[1] else "stacked") == (
         "side" if width >= 76 else "stacked"

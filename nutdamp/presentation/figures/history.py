@@ -111,7 +111,7 @@ def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
-    """Nutation angle θ on a log axis; what it ends with is written above where the axis does not reach so far."""
+    """Nutation angle θ on a log axis; what it is at the right edge is written above if the axis does not reach it."""
     angles = np.degrees(track.nutation)
     limit = required_nutation(flight)
     _required(axes, limit)
@@ -125,8 +125,7 @@ def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("")
     if angles[-1] <= low:
-        note = f"ends at {degrees(float(track.nutation[-1]))}"
-        axes.set_title(note, loc="right", **NOTE)
+        axes.set_title(f"at {track.t[-1]:.4g} s: {degrees(float(track.nutation[-1]))}", loc="right", **NOTE)
 
 
 def required_nutation(flight: Flight) -> float | None:
@@ -155,7 +154,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
         for row in rows.values():
             axes.broken_barh(
                 [(begins, ends - begins)], (row - 0.5 * BAR, BAR), facecolor="none", edgecolor=GREY, hatch="////",
-                linewidth=0.0, alpha=0.5, label=named,
+                linewidth=0.0, label=named,
             )  # fmt: skip
             named = ""
     bars = ((block, row) for name, row in rows.items() for block in geometry.blocks(flight, until, name))

@@ -124,15 +124,15 @@ def _columns(compared: Comparison) -> list[Quantity]:
         return lambda plan: None if plan.flown is None else math.degrees(getattr(plan.flown, part.value))
 
     return [
+        *(
+            Quantity(f"{part.label}, deg", left(part), _angle, required=most.get(part), log=True)
+            for part in (Part.NUTATION, aim)
+        ),
         Quantity(
             ("propellant, g" if light else "propellant, kg") if propellant else "impulse, N m s", cost, "{:.4g}".format,
             floor=min(proved, default=None),
         ),
         Quantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
-        *(
-            Quantity(f"{part.label}, deg", left(part), _angle, required=most.get(part), log=True)
-            for part in (Part.NUTATION, aim)
-        ),
     ]  # fmt: skip
 
 
@@ -160,9 +160,6 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
     for row, (plan, value) in enumerate(zip(plans, values, strict=True)):
         axes.axhline(-row, color=GREY, linewidth=0.5, alpha=0.5)
         if value is None:
-            if not plan.feasible:
-                sides = axes.get_yaxis_transform()
-                axes.annotate("no plan", (0.5, -row), xycoords=sides, ha="center", va="center", **style.ON_PAPER)
             continue
         few = column.most < math.inf and column.required is not None and value < column.required
         less, place = value < low, np.array([max(value, low), -row])
@@ -173,14 +170,14 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
         else:
             face = MOTION if plan is chosen else PAPER
             look: dict[str, Any] = {"color": MOTION, "markerfacecolor": face, "markersize": 6, "linestyle": ""}
-            axes.plot(*place, "<" if less else "o", clip_on=False, **look)
+            axes.plot(*place, "<" if less else "o", clip_on=False, zorder=3, **look)
             axes.plot([], [], "o", label="recommended" if plan is chosen else "other schemes", **look)
         labels.add(axes, column.text(value), place, INK, role="vital")
     if column.floor is not None:
         name = f"least to leave as little as {column.floor.scheme}"
-        axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name)
+        axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name, zorder=1.5)
     if column.required is not None:
-        axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required")
+        axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required", zorder=1.5)
     axes.set_xlabel(column.name)
     axes.grid(axis="x")
     _name_rows(axes, plans, chosen)
@@ -189,7 +186,10 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
 def _name_rows(axes: Axes, plans: Sequence[Plan], chosen: Plan | None) -> None:
     """Schemes beside their rows; those that fall short say so there."""
     short = [plan.feasible and _misses(plan) for plan in plans]
-    names = [plan.scheme + f"\n{_short(plan)}" * fails for plan, fails in zip(plans, short, strict=True)]
+    names = [
+        f"{plan.scheme}\n{_short(plan) if fails else 'no plan'}" if fails or not plan.feasible else plan.scheme
+        for plan, fails in zip(plans, short, strict=True)
+    ]
     axes.set_yticks(-np.arange(len(plans)), names)
     axes.set_ylim(-len(plans) + 0.45, 0.7)
     axes.tick_params(axis="y", length=0, pad=6)

@@ -94,13 +94,13 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 and the path of the spin axis, seen from outside."""
     looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_ground(axes, looked, track)
-    draw_path(axes, looked, flight, track)
+    pulses = draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, found)
     target = flight.spacecraft.goal.axis
     if target is not None:
         axes.plot(*looked.seen(target)[0].T, label="target", **style.TARGET)
     _name_tips(axes, found, lambda direction: looked.seen(direction)[0][0])
-    name_lines(axes, found, pulses=bool(len(flight.schedule)))
+    name_lines(axes, found, pulses=pulses)
     frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
     axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
@@ -119,13 +119,16 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
     axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
 
 
-def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
-    """The path of the spin axis, with the firings in it."""
+def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
+    """The path of the spin axis, with the firings in it; whether any of them moves it (an impulse does not)."""
+    pulses = False
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
         colour, width = (MOTION, thin) if stretch.pulse is None else (PULSE, 1.8 * thin)
         draw_line(axes, looked, track.axis[rows], colour, width)
+        pulses |= stretch.pulse is not None and bool(np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE))
+    return pulses
 
 
 def draw_cones(axes: Axes, looked: View, found: Cones) -> None:

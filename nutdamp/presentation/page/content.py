@@ -127,7 +127,7 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     whom = "Recommended" if decided.cases is None else "Recommended for nominal values"
-    said = f"Requirement: {decisions.verdict(decided)}. {whom}: {decided.plan.scheme} – {reason}."
+    said = f"{decisions.statement(decided)} {whom}: {decided.plan.scheme} – {reason}."
     return " ".join((said, *verdicts.warnings(compared, beside_verdict=True)))
 
 
@@ -199,7 +199,7 @@ def _schedule(chosen: Plan) -> Section:
         return Section("schedule", title, (Prose("No pulse is needed."), *ends))
     note = Prose(
         "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
-        "the body has turned about axis 3. The cones are those of the coast before the pulse, and after it."
+        "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse."
     )
     return Section("schedule", title, (pulse_sheet(chosen), note, *ends))
 
@@ -209,7 +209,7 @@ def _verification(chosen: Plan) -> Section:
     verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     blocks: list[Block] = [
-        Prose(f"{verdict(verified)} {conservation(chosen.spacecraft, verified)}"),
+        Prose(f"{verdict(verified)} {conservation(verified)}"),
         checks_sheet(chosen, verified),
         sheet_of("The schedule flown by independent means", methods_table(verified)),
         *([Remarks(missing)] if missing else []),

@@ -8,6 +8,7 @@ import pkgutil
 import re
 from functools import cache
 from html import escape
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 from nutdamp.presentation.page.document import Block, Page
@@ -39,7 +40,7 @@ def block_html(block: Block) -> str:
 @cache
 def _templates() -> Environment:
     made = templates(escape)
-    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css)
+    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
     return made
 
 
@@ -53,6 +54,19 @@ def _part(name: str) -> str:
 def _phrases(value: str) -> list[str]:
     """The parts of a number to read first, which breaks at commas and arrows; never between a number and its unit."""
     return re.split(r"(?<=[→,]) ", re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", value))
+
+
+WHOLE = re.compile(r"((?<!\S)--[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
+"""What no line may break in: an option of a command, a relation with its number and unit."""
+
+
+def _whole(text: str) -> Markup:
+    """Text in which options of commands and relations stay in one line."""
+    from markupsafe import Markup
+
+    parts = (escape(part) for part in WHOLE.split(text))
+    spans = (f'<span class="whole-word">{part}</span>' if odd else part for odd, part in zip(cycle((0, 1)), parts))
+    return Markup("".join(spans))
 
 
 def _css(text: str) -> str:

@@ -45,9 +45,10 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
     yield _firing(flown)
     yield Prose(
         "Spin phase: the angle by which the body has turned about axis 3 since t = 0. Sun phase: the angle by which it "
-        "has turned since the Sun passed the sensor. Both at the commanded start."
+        "has turned since the Sun passed the sensor. Both at the commanded start, modulo 360 deg."
         if _senses(body)
-        else "Spin phase: the angle by which the body has turned about axis 3 since t = 0, at the commanded start."
+        else "Spin phase: the angle by which the body has turned about axis 3 since t = 0, at the commanded "
+        "start, modulo 360 deg."
     )
     yield _signature(flown)
     yield Prose(
@@ -114,7 +115,7 @@ def _signature(flown: Flight) -> Sheet:
     ]
     if body.sun is not None:
         columns.append((Column("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
-    return _sheet("What gyros and Sun sensor should show", columns, stacked=True)
+    return _sheet(f"What gyros{' and Sun sensor' * (body.sun is not None)} should show", columns, stacked=True)
 
 
 def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
@@ -151,8 +152,8 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     yield Prose(
         f"Abort, and plan anew from the measured attitude, where after a pulse one of these is exceeded: {share} of "
         f"{CASES:,} cases stay within each, those without a fault of thruster, valve or sensor. They are drawn from "
-        f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone, as many however "
-        "many --disperse has."
+        f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone; their number is "
+        "not that of --disperse."
     )
     if len(counts) < len(flown.schedule):
         yield Prose(f"There are criteria after {CHECKED} pulses at most: the first, the last and some evenly between.")

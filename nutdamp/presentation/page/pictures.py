@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.fronts import Front
@@ -13,6 +14,7 @@ from nutdamp.presentation import figures
 from nutdamp.presentation.figures.overview import NARROW
 from nutdamp.presentation.page.document import Picture
 from nutdamp.presentation.page.panels import picture
+from nutdamp.presentation.tolerance_tables import budget_rows
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
@@ -81,6 +83,9 @@ def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
 
 def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
     """How the cases of a study are distributed, where H ends, which tolerance counts; raises MissingExtra."""
+    body = dispersed.study.model.spacecraft
+    bounded = any(bound.part is compliance.aim(body) for bound in compliance.required(body))
+    biased = any(row.bias for row in budget_rows(dispersed.study))
     drawn = (
         (
             "cases",
@@ -90,13 +95,14 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         ),
         (
             "momentum",
-            "Where H ends in each case, with the ellipse that holds as many cases as must comply, and the circle in "
-            "which it is required to end.",
-            "Scatter of the final angular momentum with ellipse and target circle",
+            "Where H ends in each case, with the ellipse that holds as many cases as must comply"
+            + (", and what is required of it." if bounded else "."),
+            "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
         ),
         (
             "budget",
-            "One sigma of each input, or its bias (hatched), alone: what it does to the nutation, and to where H ends.",
+            f"One sigma of each input{', or its bias (hatched),' * biased} alone: what it does to the nutation, and to "
+            "where H ends.",
             "Tornado of the tolerance budget",
         ),
     )

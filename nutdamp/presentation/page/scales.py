@@ -10,6 +10,7 @@ import numpy as np
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.braille import ticks
+from nutdamp.presentation.text import most
 from nutdamp.spacecraft import Vector
 from nutdamp.track import Track
 
@@ -49,7 +50,10 @@ class Panel(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A firing in the row of its channel, in units of the SVG."""
+    """A firing in the row of its channel, in units of the SVG.
+
+    ``outside``: a required nutation that lies beyond the scale.
+    """
 
     row: int
     start: float
@@ -57,12 +61,16 @@ class Bar(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG."""
+    """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
+
+    ``outside``: a required nutation that lies beyond the scale.
+    """
 
     times: Scale
     angles: Scale
     zero: float
     required: float | None
+    outside: str
     channels: tuple[str, ...]
     bars: tuple[Bar, ...]
 
@@ -131,6 +139,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         angles=Scale(f"{prefix}deg", scale),
         zero=rise(0.0),
         required=rise(level) if level is not None and low < level < high else None,
+        outside=most(math.radians(level)) if level is not None and not low < level < high else "",
         channels=channels,
         bars=tuple(bars),
     )
