@@ -21,9 +21,6 @@ from nutdamp.schemes.options import OptimalOptions, Options
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
-EVERYWHERE = math.inf
-"""Shift of H allowed that requires nothing."""
-
 
 class Point(NamedTuple):
     """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within.
@@ -66,7 +63,7 @@ def fronts(
     shifts: Sequence[float],
     progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[Front, ...]:
-    """One front for each of the ``shifts`` (rad, `EVERYWHERE` for any), of at most ``count`` searches each.
+    """One front for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
     Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds

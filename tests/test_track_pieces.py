@@ -104,7 +104,7 @@ def test_a_track_is_written_as_it_was_by_numbers() -> None:
         for rows in (slice(None, half), slice(half, None))
     ]
     stream = io.BytesIO()
-    write_track(stream, pieces, made.spacecraft.inertia)
+    write_track(pieces, made.spacecraft.inertia, stream)
     lines = stream.getvalue().decode().split("\r\n")
     assert lines[0] == ",".join(HEADER)
     assert lines[-1] == ""
@@ -123,7 +123,7 @@ def test_memory_does_not_grow_with_the_rows() -> None:
             track.extremes(made.pieces(samples, UNTIL))
             with io.BytesIO() as nowhere:
                 nowhere.write = len  # type: ignore[method-assign, assignment]
-                write_track(nowhere, made.pieces(samples, UNTIL), made.spacecraft.inertia)
+                write_track(made.pieces(samples, UNTIL), made.spacecraft.inertia, nowhere)
             peaks.append(tracemalloc.get_traced_memory()[1])
         finally:
             tracemalloc.stop()

@@ -36,7 +36,7 @@ def body() -> Spacecraft:
 
 @pytest.fixture(scope="module")
 def found(body: Spacecraft) -> tuple[fronts.Front, ...]:
-    return fronts.fronts(body, OptimalOptions(), count=4, shifts=(fronts.EVERYWHERE, 0.0, HALF_DEGREE))
+    return fronts.fronts(body, OptimalOptions(), count=4, shifts=(math.inf, 0.0, HALF_DEGREE))
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
 @pytest.mark.slow
 def test_a_schedule_that_keeps_h_counts_whichever_search_found_it() -> None:
     """The example: at 9.826 s the search that lets H go anywhere finds a schedule that keeps it where it was."""
-    strict, free = fronts.fronts(nutdamp.example(), OptimalOptions(), count=10, shifts=(0.0, fronts.EVERYWHERE))
+    strict, free = fronts.fronts(nutdamp.example(), OptimalOptions(), count=10, shifts=(0.0, math.inf))
     keeping = [one for one in free.points if one.plan.flight.residual.axis_error < math.radians(1e-6)]
     for point in keeping:
         sooner = [other.cost for other in strict.points if other.plan.end <= point.plan.end]
@@ -147,7 +147,7 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(monkeypatch: p
 
 def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run) -> None:
     body = nutdamp.load(CONFIGS / "steerable-stage.yaml")
-    strict, free = fronts.fronts(body, OptimalOptions(), count=2, shifts=(0.0, fronts.EVERYWHERE))
+    strict, free = fronts.fronts(body, OptimalOptions(), count=2, shifts=(0.0, math.inf))
     assert [point.plan.scheme for point in strict.points] == ["two-pulse"]
     assert [point.plan.scheme for point in free.points] == ["one-pulse", "two-pulse"]
     assert [point.plan.meets_requirement for point in free.points] == [False, True]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.loop.plan import LoopPlan
-    from nutdamp.loop.run import Run
     from nutdamp.spacecraft import Spacecraft
 
 
@@ -69,6 +67,7 @@ def command(
     from nutdamp.cli.progress import working
     from nutdamp.files.loop_json import loop_json
     from nutdamp.files.pulses_csv import pulses_csv
+    from nutdamp.files.track_csv import write_track
     from nutdamp.loop.plan import loop_of
     from nutdamp.presentation.loop_tables import loop_screen, stopped, warnings
 
@@ -79,7 +78,7 @@ def command(
         job.warn(warnings(body))
     outputs: list[Output] = [
         (csv, lambda: pulses_csv(run.flight)),
-        (track, partial(_rows, run, samples)),
+        (track, lambda: partial(write_track, run.flight.pieces(samples, run.until), run.flight.spacecraft.inertia)),
         (json, lambda: loop_json(plan)),
         (plot, partial(_picture, plan)),
         (mapped, partial(_map, body, drawn)),
@@ -88,12 +87,6 @@ def command(
     if run.stop.fault:
         say(f"nutdamp: the loop was stopped {stopped(run)}")
     leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
-
-
-def _rows(run: Run, samples: int) -> Callable[[IO[bytes]], None]:
-    from nutdamp.files.track_csv import write_track
-
-    return lambda stream: write_track(stream, run.flight.pieces(samples, run.until), run.flight.spacecraft.inertia)
 
 
 def _picture(plan: LoopPlan) -> Figure:

@@ -98,6 +98,7 @@ def command(
         _expect_certified(names, job.spacecraft)
 
     from nutdamp.decision import decide
+    from nutdamp.files.schemes_csv import schemes_csv
     from nutdamp.presentation import verdicts
 
     compared = compared_with(job, names, options)
@@ -111,7 +112,7 @@ def command(
         job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
     outputs: list[Output] = [
         (json, partial(_data, compared, decided, dispersed)),
-        (table, partial(_schemes, compared, decided)),
+        (table, partial(schemes_csv, compared, decided)),
         (all_plans, partial(_schemes_picture, compared, decided)),
         *_outputs_of_proof(proof, certificate, curve),
         *_outputs_of(chosen, csv, one_plan, figure),
@@ -242,12 +243,6 @@ def _data(compared: Comparison, decided: Decision | None, dispersed: RobustCompa
     from nutdamp.presentation import verdicts
 
     return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
-
-
-def _schemes(compared: Comparison, decided: Decision | None) -> str:
-    from nutdamp.files.schemes_csv import schemes_csv
-
-    return schemes_csv(compared, decided)
 
 
 def _picture(chosen: Plan, figure: str) -> Figure:

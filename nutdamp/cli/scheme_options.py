@@ -96,42 +96,31 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
         return command(*args, options=options, aim=aim, **parameters)
 
     wrapped: Any = gathered
-    sun = click.option(
+    option = functools.partial(click.option, cls=Grouped, group=GOAL)
+    sun = option(
         "--sun",
-        cls=Grouped,
-        group=GOAL,
         type=Direction(),
         metavar="ANGLE,ANGLE",
         help="The Sun, as --target; rhumb-line keeps its phase.",
     )
-    for option in (
+    for add in (
         *((debug_option,) if several else ()),
-        click.option(
-            "--with-disturbances",
-            cls=Grouped,
-            group=GOAL,
-            is_flag=True,
-            help="Plan on the motion with the disturbances of the file.",
-        ),
+        option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
         *((sun,) if several else ()),
-        click.option(
+        option(
             "--spin",
-            cls=Grouped,
-            group=GOAL,
             type=FinalSpin("rate"),
             metavar="RATE|keep",
             help="Final spin rate, such as 30rpm; optimal can set it.",
         ),
-        click.option(
+        option(
             "--target",
-            cls=Grouped,
-            group=GOAL,
             type=Direction(),
             metavar="ANGLE,ANGLE",
             help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
         ),
     ):
-        wrapped = option(wrapped)
+        wrapped = add(wrapped)
     return cast(Command, wrapped)
 
 

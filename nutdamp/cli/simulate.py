@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -75,6 +74,9 @@ def command(
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     plan = plan_or_read(job, flown, options, jitter=True, judged=not job.silent)
 
+    from nutdamp.files.simulation_json import simulation_json
+    from nutdamp.files.track_csv import write_track
+    from nutdamp.presentation.decisions import verdict
     from nutdamp.presentation.geometry import shown_until
     from nutdamp.presentation.verdicts import model_warnings
     from nutdamp.simulation import Simulation
@@ -86,23 +88,13 @@ def command(
     track = None
     if plot is not None or drawn:
         track = made.track(min(samples, PICTURED), shown_until(body, pulses) if until is None else until)
-    outputs: list[Output] = [(csv, partial(_rows, made)), (json, partial(_data, made))]
-    outputs.append((plot, partial(_picture, made, track, figure)))
+    outputs: list[Output] = [
+        (csv, lambda: partial(write_track, made.pieces(), body.inertia)),
+        (json, lambda: simulation_json(made, verdict(made.decision))),
+        (plot, partial(_picture, made, track, figure)),
+    ]
     job.deliver(outputs, partial(_screen, made), *[partial(_drawing, made, track)] * drawn)
     leave(missed=flown.fires and made.decision.met is False and len(made.flown.schedule) == len(pulses))
-
-
-def _rows(made: Simulation) -> Callable[[IO[bytes]], None]:
-    from nutdamp.files.track_csv import write_track
-
-    return lambda stream: write_track(stream, made.pieces(), made.plan.spacecraft.inertia)
-
-
-def _data(made: Simulation) -> dict[str, Any]:
-    from nutdamp.files.simulation_json import simulation_json
-    from nutdamp.presentation.decisions import verdict
-
-    return simulation_json(made, verdict(made.decision))
 
 
 def _picture(made: Simulation, track: Track | None, figure: str) -> Figure:

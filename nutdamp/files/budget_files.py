@@ -6,9 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from nutdamp import __version__
 from nutdamp.files.output import csv_text, number, truth
-from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.plan_json import heading
 from nutdamp.loop.budget import DAY, YEAR, Budget, Held
 
 HEADER = (
@@ -61,8 +60,7 @@ def budget_json(found: Budget) -> dict[str, Any]:
     """How the nutation grows, and every row."""
     body = found.spacecraft
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(body),
+        **heading(body),
         "growth_1_s": body.growth,
         "largest_deg": None if found.largest is None else math.degrees(found.largest),
         "until_largest_s": found.until_largest,

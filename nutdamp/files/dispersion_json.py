@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp import __version__
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Array, Distribution
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study
-from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
+from nutdamp.files.plan_json import final_json, heading, target_json
 from nutdamp.files.samples_csv import OUTPUT_COLUMNS
 from nutdamp.spacecraft import Spacecraft
 
@@ -30,8 +29,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
     """
     study = results.study
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(study.model.spacecraft),
+        **heading(study.model.spacecraft),
         "scheme": scheme,
         "samples": results.done,
         "requested": results.requested,

@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from nutdamp import __version__
 from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.outlook import Outlook
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import Carried, Estimate, estimates
 from nutdamp.files.fitted_file import notes
-from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.plan_json import heading
 
 
 def fit_json(
@@ -25,8 +24,7 @@ def fit_json(
     """
     model = found.model
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(model.spacecraft),
+        **heading(model.spacecraft),
         "record": {
             "start_s": model.record.start,
             "end_s": model.record.end,

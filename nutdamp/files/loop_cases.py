@@ -19,7 +19,7 @@ from nutdamp.files.dispersion_json import (
     shown,
 )
 from nutdamp.files.output import csv_text, number
-from nutdamp.files.plan_json import spacecraft_json
+from nutdamp.files.plan_json import heading
 from nutdamp.files.samples_csv import column, cone_columns
 from nutdamp.loop.diagnosis import Stop
 from nutdamp.loop.fleet import Flown
@@ -42,8 +42,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
     """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases; degrees, else SI."""
     study = results.study
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(study.spacecraft),
+        **heading(study.spacecraft),
         "law": study.law.loop.law,
         "until_s": study.until,
         "samples": results.done,

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp import __version__
 from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import (
     final_json,
+    heading,
     pulses_json,
     requirement_json,
     residual_json,
-    spacecraft_json,
     target_json,
 )
 from nutdamp.loop.plan import LoopPlan
@@ -27,8 +26,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     run, body = plan.flown_run, plan.spacecraft
     seen = [{"decided_s": one.decided, "seen_deg": math.degrees(one.seen)} for one in run.fired]
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(body),
+        **heading(body),
         "law": run.loop.law,
         "seed": run.seed,
         "case": run.case,
@@ -55,8 +53,7 @@ def verified_json(found: LoopVerification) -> dict[str, Any]:
     """What ``verify --loop --json`` gives: of each firing how far DOP853 differs."""
     run = found.run
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(run.spacecraft),
+        **heading(run.spacecraft),
         "scheme": "loop",
         "agree": None if found.missing else found.agree,
         "missing": found.missing or None,

@@ -21,11 +21,15 @@ RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error
 """Angles of a `Residual`."""
 
 
+def heading(spacecraft: Spacecraft) -> dict[str, Any]:
+    """How the JSON of every command begins: the version, and the spacecraft."""
+    return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
+
+
 def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
     """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(compared.spacecraft),
+        **heading(compared.spacecraft),
         "plans": [plan_json(plan) for plan in compared.plans],
         "recommended": None if compared.recommended is None else compared.recommended.scheme,
         **spoken,

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp import __version__
 from nutdamp.compliance import aim
 from nutdamp.files.output import csv_text, number
-from nutdamp.files.plan_json import final_json, plan_json, spacecraft_json, target_json
+from nutdamp.files.plan_json import final_json, heading, plan_json, target_json
 from nutdamp.robust import RobustComparison, front
 from nutdamp.screening import Candidate
 
@@ -67,8 +66,7 @@ def front_json(found: RobustComparison) -> dict[str, Any]:
     """The front of ``trade --robust``, the cheapest first, with plans as ``plan --json`` gives them."""
     numbered = enumerate(front(found), start=1)
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(found.comparison.spacecraft),
+        **heading(found.comparison.spacecraft),
         "probability": found.probability,
         "samples": found.samples,
         "seed": found.seed,

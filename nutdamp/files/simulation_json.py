@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp import __version__, outcome
+from nutdamp import outcome
 from nutdamp.aspect import aspects
 from nutdamp.files.decision_json import decision_json
-from nutdamp.files.plan_json import aspects_json, final_json, pulses_json, residual_json, spacecraft_json, target_json
+from nutdamp.files.plan_json import aspects_json, final_json, heading, pulses_json, residual_json, target_json
 from nutdamp.physics.attitude import full_turn
 from nutdamp.simulation import Simulation
 
@@ -18,8 +18,7 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
     flight, found, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(flight.spacecraft),
+        **heading(flight.spacecraft),
         "scheme": simulation.plan.scheme,
         "propagated": "flown" if simulation.real else "residual",
         "pulses": pulses_json(flight),

@@ -51,7 +51,7 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     return rows
 
 
-def write_track(stream: IO[bytes], pieces: Iterable[Track], inertia: Inertia) -> None:
+def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) -> None:
     """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
     stream.write(f"{','.join(HEADER)}\r\n".encode())
     for piece in pieces:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from nutdamp import __version__
 from nutdamp.files.output import csv_text, number, truth
-from nutdamp.files.plan_json import plan_json, spacecraft_json
+from nutdamp.files.plan_json import heading, plan_json
 from nutdamp.files.pulses_csv import pulses_csv
 from nutdamp.fronts import Front, Point, numbered
 from nutdamp.spacecraft import Spacecraft
@@ -59,8 +58,7 @@ def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]
     for index, front, point in numbered(found):
         numbers[id(front)].append({"point": index, "horizon_s": point.horizon, **plan_json(point.plan)})
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(spacecraft),
+        **heading(spacecraft),
         "fronts": [
             {"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": numbers[id(front)]}
             for front in found

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from nutdamp import __version__
-from nutdamp.files.plan_json import final_json, spacecraft_json, target_json
+from nutdamp.files.plan_json import final_json, heading, target_json
 from nutdamp.flight import Flight
 from nutdamp.verification import Verification
 
@@ -15,8 +14,7 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
     """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
     spacecraft = flown.spacecraft
     return {
-        "nutdamp": __version__,
-        "spacecraft": spacecraft_json(spacecraft),
+        **heading(spacecraft),
         "scheme": name,
         "agree": found.agree if found.checks else None,
         "disagreeing": list(found.disagreeing),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,12 @@ from nutdamp import arguments, views
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, decide
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
+from nutdamp.files.decision_json import decision_json
+from nutdamp.files.output import write_whole
+from nutdamp.files.plan_json import comparison_json, plan_json, spacecraft_json
+from nutdamp.files.pulses_csv import pulses_array, pulses_csv
+from nutdamp.files.schemes_csv import schemes_array, schemes_csv
+from nutdamp.files.track_csv import track_array, write_track
 from nutdamp.flight import Flight
 from nutdamp.planning import Plan
 from nutdamp.presentation import decisions, verdicts
@@ -28,18 +35,8 @@ views.reason.register(Plan, infeasibility)
 views.reason.register(Comparison, verdicts.reason)
 
 
-@views.data.register
-def _(spacecraft: Spacecraft) -> dict[str, Any]:
-    from nutdamp.files.plan_json import spacecraft_json
-
-    return spacecraft_json(spacecraft)
-
-
-@views.data.register
-def _(plan: Plan) -> dict[str, Any]:
-    from nutdamp.files.plan_json import plan_json
-
-    return plan_json(plan)
+views.data.register(Spacecraft, spacecraft_json)
+views.data.register(Plan, plan_json)
 
 
 @views.data.register
@@ -49,57 +46,39 @@ def _(compared: Comparison) -> dict[str, Any]:
 
 def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
     """What ``plan --json`` gives: the plans, the decision on one of them, and the words of both."""
-    from nutdamp.files.decision_json import decision_json
-    from nutdamp.files.plan_json import comparison_json
-
     made = comparison_json(compared, verdicts.spoken(compared))
     return {**made, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 
 @views.table.register
 def _(plan: Plan) -> views.Table:
-    from nutdamp.files.pulses_csv import pulses_array
-
     return pulses_array(plan.flight)
 
 
 @views.table.register
 def _(compared: Comparison) -> views.Table:
-    from nutdamp.files.schemes_csv import schemes_array
-
     return schemes_array(compared, decide(compared))
 
 
 @views.table.register
 def _(flight: Flight) -> views.Table:
-    from nutdamp.files.track_csv import track_array
-
     return track_array(flight.sampled(flight.samples, flight.shown_to), flight.spacecraft.inertia)
 
 
 @views.write_csv.register
 def _(plan: Plan, path: str | PathLike[str]) -> None:
-    from nutdamp.files.output import write_whole
-    from nutdamp.files.pulses_csv import pulses_csv
-
     write_whole(arguments.path("path", path), pulses_csv(feasible(plan).flight))
 
 
 @views.write_csv.register
 def _(compared: Comparison, path: str | PathLike[str]) -> None:
-    from nutdamp.files.output import write_whole
-    from nutdamp.files.schemes_csv import schemes_csv
-
     write_whole(arguments.path("path", path), schemes_csv(compared, decide(compared)))
 
 
 @views.write_csv.register
 def _(flight: Flight, path: str | PathLike[str]) -> None:
-    from nutdamp.files.output import whole_file
-    from nutdamp.files.track_csv import write_track
-
-    with whole_file(arguments.path("path", path)) as stream:
-        write_track(stream, flight.pieces(flight.samples, flight.shown_to), flight.spacecraft.inertia)
+    pieces = flight.pieces(flight.samples, flight.shown_to)
+    write_whole(arguments.path("path", path), partial(write_track, pieces, flight.spacecraft.inertia))
 
 
 @views.figure.register(Flight)

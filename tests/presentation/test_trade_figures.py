@@ -32,7 +32,7 @@ from nutdamp.spacecraft import Limits, Requirement
 
 @cache
 def traded() -> tuple[fronts.Front, ...]:
-    return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, fronts.EVERYWHERE))
+    return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, math.inf))
 
 
 @pytest.mark.slow
@@ -94,7 +94,7 @@ def test_a_front_that_is_missing_is_named_above_the_others() -> None:
 @pytest.mark.slow
 def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
     body = replace(BODY, requirement=Requirement(momentum_shift=math.radians(0.05)))
-    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))
+    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
     failing = {
         (point.plan.end, point.cost) for _, _, point in fronts.numbered(found) if point.plan.meets_requirement is False
     }
@@ -151,7 +151,7 @@ def test_trades_can_be_seen_on_white_and_in_the_dark() -> None:
 
 def test_a_schedule_that_ends_at_once_has_its_place_on_the_axis_of_time() -> None:
     body = replace(spinner(phase=0.0), requirement=Requirement(momentum_shift=math.radians(0.05)))
-    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, fronts.EVERYWHERE))
+    found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
     ends = [point.plan.pulses.end for _, _, point in fronts.numbered(found)]
     assert min(ends) == 0.0
     figure = figures.trade_figure(body, found)
