@@ -71,14 +71,14 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
         heads.append(f"{verdicts.exact_percent(cases.probability)} of cases")
     table = columns(*heads, "margin", "verdict", text=("verdict",))
     for line in decision.lines:
-        dispersed = [] if cases is None else [_size(line.bound, line.dispersed)]
-        cells = (_limit(line.bound), _size(line.bound, line.nominal), *dispersed, _size(line.bound, line.margin))
+        dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
+        cells = (limit(line.bound), size(line.bound, line.nominal), *dispersed, size(line.bound, line.margin))
         table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
     for one in decision.aspects:
-        for limit, angle, left in cone_margins(one):
+        for bound, angle, left in cone_margins(one):
             kept, none = left >= -SLACK, [""] * (cases is not None)
             said = coloured(KEPT[kept], kept)
-            table.add_row(f"axis from {one.keep.name}", limit, degrees(angle), *none, degrees(left), said)
+            table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} %"
@@ -92,12 +92,13 @@ def coloured(text: str, met: bool | None) -> Text:
     return Text(text, "" if met is None else "green" if met else "bold red")
 
 
-def _limit(bound: Bound) -> str:
-    limit = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else most(bound.most)
-    return f"≤ {limit}"
+def limit(bound: Bound) -> str:
+    """The most that may be left of a part."""
+    return f"≤ {quantity(bound.most, 'rad/s') if bound.part is Part.SPIN else most(bound.most)}"
 
 
-def _size(bound: Bound, value: float | None) -> str:
+def size(bound: Bound, value: float | None) -> str:
+    """What is left of a part, in rad/s or degrees."""
     return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
 
 

@@ -145,9 +145,8 @@ def _settled(run: Run) -> str:
 
 
 def _firings(run: Run) -> Table:
-    names = ("firing", "start", "on-time", "channel", "nutation seen", "before", "after")
-    units = ("", "s", "s", "", "deg", "deg", "deg")
-    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    heads = ("firing\n", "start\ns", "on-time\ns", "channel\n", "nutation seen\ndeg", "before\ndeg", "after\ndeg")
+    table = columns(*heads, text=("channel\n",))
     before, after = run.flight.around_pulses()
     for index, one in enumerate(run.fired[:SHOWN]):
         angles = (one.seen, float(before.nutation[index]), float(after.nutation[index]))
@@ -163,9 +162,8 @@ def verification_screen(found: LoopVerification) -> RenderableType:
     parts: list[RenderableType] = [header(run.spacecraft), Text(), Text(described(run.loop), style="bold"), Text()]
     if other is None:
         return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {found.missing}."))
-    names = ("firing", "channel", "start", "differs by", "on-time", "differs by", "nutation", "differs by")
-    units = ("", "", "s", "s", "s", "s", "deg", "deg")
-    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n",))
+    heads = ("start\ns", "differs by\ns", "on-time\ns", "differs by\ns", "nutation\ndeg", "differs by\ndeg")
+    table = columns("firing\n", "channel\n", *heads, text=("channel\n",))
     for index, (one, apart) in enumerate(zip(run.fired[:SHOWN], found.pairs, strict=False), start=1):
         start, on_time = one.pulse.loaded
         what = (f"{start:.4f}", _apart(apart[0]), f"{on_time:.4f}", _apart(apart[1]))

@@ -20,7 +20,7 @@ from nutdamp.flight import Residual
 from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
-from nutdamp.presentation.decisions import decision_screen
+from nutdamp.presentation.decisions import decision_screen, limit, size
 from nutdamp.presentation.end_tables import (
     add_aspects,
     angle_names,
@@ -30,7 +30,7 @@ from nutdamp.presentation.end_tables import (
     spin_text,
 )
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, mass, moment, most, quantity, steering
+from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, mass, moment, quantity, steering
 from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
@@ -187,14 +187,16 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
     if goal.axis is not None:
         rows.insert(-1, ("  off the target", lambda plan: _angle(plan.flown, "axis_error")))
     if goal.spin is not None:
-        rows.append(("  spin at the end", lambda plan: quantity(_final_spin(plan), "rad/s", 6)))
+        rows.append(("  spin at the end", lambda plan: quantity(plan.flight.settled.spin, "rad/s", 6)))
     if any(plan.delta_v is not None for plan in compared.plans):
-        rows.append(("  |ΔV|", lambda plan: quantity(_speed(plan), "m/s")))
+        rows.append(
+            ("  |ΔV|", lambda plan: MISSING if plan.delta_v is None else quantity(math.hypot(*plan.delta_v), "m/s"))
+        )
     if compliance.judged(compared.spacecraft):
         rows.append(("requirement:", lambda plan: verdicts.VERDICT[Decision(plan).met if plan.feasible else None]))
         rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
         cones = enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)])
-        rows += [_cone(at, one.keep.name, limit) for at, one in cones for limit, _, _ in cone_margins(one)]
+        rows += [_cone(at, one.keep.name, kept) for at, one in cones for kept, _, _ in cone_margins(one)]
     return rows
 
 
@@ -214,33 +216,23 @@ def _part(bound: Bound) -> tuple[str, Cell]:
 
     def cell(plan: Plan) -> str:
         (found,) = (one for one in plan.held if one.bound == bound)
-        text = quantity(found.left, "rad/s") if bound.part is Part.SPIN else degrees(found.left)
-        return text if found.met else f"{NOT} {text}"
+        return size(bound, found.left) if found.met else f"{NOT} {size(bound, found.left)}"
 
-    limit = quantity(bound.most, "rad/s") if bound.part is Part.SPIN else most(bound.most)
-    return f"  {bound.part.label} ≤ {limit}", cell
+    return f"  {bound.part.label} {limit(bound)}", cell
 
 
-def _cone(at: int, name: str, limit: str) -> tuple[str, Cell]:
+def _cone(at: int, name: str, kept: str) -> tuple[str, Cell]:
     """The row of one bound of the cone with the number ``at``, and the angle at which the plans come nearest to it."""
 
     def cell(plan: Plan) -> str:
-        found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == limit)
+        found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
         return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in found)
 
-    return f"  from {name} {limit}", lambda plan: cell(plan) if plan.feasible else MISSING
+    return f"  from {name} {kept}", lambda plan: cell(plan) if plan.feasible else MISSING
 
 
 def _angle(left: Residual | None, name: str) -> str:
     return MISSING if left is None else degrees(getattr(left, name))
-
-
-def _final_spin(plan: Plan) -> float | None:
-    return None if plan.spin_change is None else plan.spacecraft.spin + plan.spin_change
-
-
-def _speed(plan: Plan) -> float | None:
-    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
 
 
 def _comparison(compared: Comparison) -> Table:

@@ -48,16 +48,15 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
 
 def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
     before, after = flight.around_pulses()
-    names = ("pulse", "centre", "on-time", "channel", "", "nutation", "body cone", "space cone")
-    units = ("", "s", "s", "", "", "deg", "deg", "deg")
-    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)), text=("channel\n", "\n"))
+    cones = ("nutation\ndeg", "body cone\ndeg", "space cone\ndeg")
+    table = columns("pulse\n", "centre\ns", "on-time\ns", "channel\n", "\n", *cones, text=("channel\n", "\n"))
     for index in shown:
         pulse = flight.schedule.pulses[index]
         on_time = "ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}"
         what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
         for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
-            cones = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
-            table.add_row(*cells, when, *(in_degrees(cone) for cone in cones))
+            angles = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
+            table.add_row(*cells, when, *map(in_degrees, angles))
     return table
 
 

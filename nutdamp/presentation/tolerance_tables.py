@@ -17,6 +17,7 @@ from nutdamp.dispersion.sensitivity import FirstOrder
 from nutdamp.dispersion.study import EARLY, Results, Study
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.text import quantity
+from nutdamp.words import listed
 
 SHOWN = {
     "rad": ("deg", 180.0 / math.pi),
@@ -92,12 +93,8 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     study, rows = results.study, budget_rows(results.study)
     if not rows:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
-    inputs, first, sampled, budgeted = (
-        study.model.inputs.drawn,
-        study.first_order,
-        results.shares,
-        budgeted_outputs(study),
-    )
+    inputs, first = study.model.inputs.drawn, study.first_order
+    sampled, budgeted = results.shares, budgeted_outputs(study)
     shares = {output: first.shares(output) for output, _ in budgeted}
     aim = "H shift" if study.model.spacecraft.goal.axis is None else "axis err"
     heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
@@ -140,21 +137,16 @@ def _dominating(results: Results) -> list[RenderableType]:
             key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
             sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
         ranked = sorted(sums.items(), key=lambda one: -one[1])
-        leading = [f"{key} ({_percent(share)})" for key, share in ranked if share >= 0.1]
+        leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
         leading = leading or [ranked[0][0]]
         verb = "dominates" if len(leading) == 1 else "dominate"
-        named = leading[0] if len(leading) == 1 else f"{', '.join(leading[:-1])} and {leading[-1]}"
         if any(sums.values()):
-            lines.append(Text.assemble(f"The {name}: ", (named, "bold"), f" {verb}."))
+            lines.append(Text.assemble(f"The {name}: ", (listed(leading), "bold"), f" {verb}."))
     return lines
 
 
 def _share(share: float) -> str:
     return f"{100 * share:.1f}" if share >= 5e-4 else "0"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if share >= 5e-4 else "0"
 
 
 def in_words(name: str) -> str:

@@ -149,23 +149,13 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     if found.standing is Standing.COMPLIES:
         return
     required = found.standing is Standing.MISSES and bool(compliance.required(body))
-    what = "nutation" if body.goal.axis is None else "target"
+    does, do, what = ("damps", "damp", "nutation") if body.goal.axis is None else ("reaches", "reach", "target")
+    if required:
+        does, do, what = "meets", "meet", "requirement"
+    it, head = "It", f"{chosen.scheme} does not {do} the {what}"
     if len(compared.plans) > 1:
-        verb = (
-            "meets the requirement"
-            if required
-            else {"nutation": "damps the nutation", "target": "reaches the target"}[what]
-        )
-        head = f"none of the {len(compared.plans)} schemes compared {verb}"
-    else:
-        verb = (
-            "meet the requirement"
-            if required
-            else {"nutation": "damp the nutation", "target": "reach the target"}[what]
-        )
-        head = f"{chosen.scheme} does not {verb}"
+        it, head = chosen.scheme, f"none of the {len(compared.plans)} schemes compared {does} the {what}"
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
-    it = chosen.scheme if len(compared.plans) > 1 else "It"
     yield " ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared)))
 
 

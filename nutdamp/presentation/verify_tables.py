@@ -11,6 +11,7 @@ from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import AGREE, WITHOUT, Conservation, Verification
+from nutdamp.words import listed
 
 
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
@@ -61,18 +62,12 @@ def _course(one: Conservation) -> str:
 
 def methods_table(found: Verification) -> Table:
     """One row a way to fly the schedule: what it leaves, and how far it differs from the flown motion."""
-    names = ("method", "nutation", "shift of H", "axis", "H", "rates")
-    units = ("", "left, deg", "deg", "differs, rad", "rad", "relative")
-    table = columns(*(f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)))
+    left = ("nutation\nleft, deg", "shift of H\ndeg")
+    table = columns("method\n", *left, "axis\ndiffers, rad", "H\nrad", "rates\nrelative")
     for method in found.methods:
         if not method.missing:
-            differences = (method.axis, method.momentum, method.rate)
-            table.add_row(
-                method.name,
-                in_degrees(method.nutation),
-                in_degrees(method.momentum_shift),
-                *map(_difference, differences),
-            )
+            angles = map(in_degrees, (method.nutation, method.momentum_shift))
+            table.add_row(method.name, *angles, *map(_difference, (method.axis, method.momentum, method.rate)))
     return table
 
 
@@ -87,8 +82,7 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
     aimed = spacecraft.goal.axis is not None
     table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
     for row in found.budget:
-        angles = (row.nutation, row.axis_error)
-        table.add_row(row.name, *(in_degrees(angle) for angle in angles))
+        table.add_row(row.name, *map(in_degrees, (row.nutation, row.axis_error)))
     return table
 
 
@@ -97,8 +91,7 @@ def budget_note(found: Verification) -> str:
     names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
     if not names:
         return ""
-    subject = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     return (
-        f"Plans are checked by flights with {subject}, on which most schemes correct them; a row 'without' shows what "
-        f"the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, which may be more or less."
+        f"Plans are checked by flights with {listed(names)}, on which most schemes correct them; a row 'without' shows "
+        f"what the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, which may be more or less."
     )
