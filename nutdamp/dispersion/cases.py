@@ -33,7 +33,7 @@ from nutdamp.dispersion.elementwise import (
     turned,
 )
 from nutdamp.dispersion.fed import supplied, tank_of
-from nutdamp.dispersion.inputs import Inputs, list_inputs
+from nutdamp.dispersion.inputs import BY_VALVE, Inputs, list_inputs
 from nutdamp.lightening import shed
 from nutdamp.physics import attitude, feed
 from nutdamp.physics.rigid_cases import cos_sin
@@ -45,9 +45,6 @@ if TYPE_CHECKING:  # few spacecraft have valves
 
 DISC = 1e-12
 """Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
-
-BY_VALVE = ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit")
-"""Tolerances of a valve, or in the last place of a table."""
 
 NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg")
 """Tolerances of what is never below zero: draws that make it so are drawn again."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 from nutdamp.lightening import shed
@@ -19,8 +20,10 @@ from nutdamp.tolerances import Dispersions, Tolerance
 SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
 """Standard deviation of each kind for a size of one."""
 
-KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
+BY_VALVE = ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit")
+"""Tolerances of a valve, or in the last place of a table."""
 
+KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
 
 SCHEDULE_IDLE = "the schedule does not fire"
 
@@ -140,15 +143,15 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
         if tolerance is not None:
             yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")
     members = fired(spacecraft, schedule)
-    for name, tolerance in requested.thrust.items():
-        yield _thrust(name, tolerance, members)
-    for name, tolerance in requested.thrust_direction.items():
-        yield from _direction(name, tolerance, members)
-    for name, tolerance in requested.position.items():
-        yield from _position(name, tolerance, members)
-    for key in ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit"):
+    kinds = [("thrust", _thrust), ("thrust_direction", _direction), ("position", _position)]
+    kinds += [(key, partial(_valve, key)) for key in BY_VALVE]
+    for key, of_thruster in kinds:
         for name, tolerance in getattr(requested, key).items():
-            yield _valve(key, name, tolerance, members)
+            if name in members:
+                yield from of_thruster(name, tolerance, members[name])
+            else:
+                who = "the steerable torquer" if name == STEERABLE else name
+                yield Unused(f"{key.removeprefix('thrust_')} {name}", f"{SCHEDULE_IDLE} {who}")
     yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
     pulses = range(1, len(schedule) + 1)
     if requested.thrust_per_pulse is not None:
@@ -188,22 +191,11 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
     return members
 
 
-def _idle(name: str) -> str:
-    who = "the steerable torquer" if name == STEERABLE else name
-    return f"{SCHEDULE_IDLE} {who}"
+def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[Input | Unused]:
+    yield Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
 
 
-def _thrust(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:
-    if name not in members:
-        return Unused(f"thrust {name}", _idle(name))
-    return Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
-
-
-def _direction(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Iterator[Input | Unused]:
-    if name not in members:
-        yield Unused(f"direction {name}", _idle(name))
-        return
-    thruster = members[name]
+def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
     if thruster is None:
         yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
     elif thruster.force is None or thruster.position is None:
@@ -213,11 +205,7 @@ def _direction(name: str, tolerance: Tolerance, members: dict[str, Thruster | No
             yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
 
 
-def _position(name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Iterator[Input | Unused]:
-    if name not in members:
-        yield Unused(f"position {name}", _idle(name))
-        return
-    thruster = members[name]
+def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
     if thruster is None:
         yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
     elif thruster.force is None:
@@ -249,19 +237,16 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterat
             yield _input(name, key, tolerance, nominal, unit)
 
 
-def _valve(key: str, name: str, tolerance: Tolerance, members: dict[str, Thruster | None]) -> Input | Unused:
+def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
     """A tolerance of a valve, or of a table in its place."""
-    called = f"{key} {name}"
-    if name not in members:
-        return Unused(called, _idle(name))
-    thruster = members[name]
-    delay = getattr(None if thruster is None else thruster.valve, key, None)
-    if key == "impulse_bit":
-        measured = thruster is not None and thruster.valve is not None and not hasattr(thruster.valve, "open_delay")
-        if not measured:
-            return Unused(called, f"{name} has no impulse_bit")
-        return Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
-    return Unused(called, f"{name} has no valve") if delay is None else _input(called, key, tolerance, delay, "s")
+    called, valve = f"{key} {name}", None if thruster is None else thruster.valve
+    delay = getattr(valve, key, None)
+    if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
+        yield Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
+    elif key == "impulse_bit" or delay is None:
+        yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
+    else:
+        yield _input(called, key, tolerance, delay, "s")
 
 
 def _of_pulses(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.elementwise import Cases, Triple
+from nutdamp.dispersion.elementwise import Cases, Triple, parts_of
 from nutdamp.dispersion.kernel import Ends
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def measure(model: Model, ends: Ends, out: Array) -> None:
     sense = math.copysign(1.0, model.spacecraft.spin)
     out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
     out[1] = angle(ends.before, ends.after)
-    out[2] = angle(_constant(model.target), ends.pointed)
+    out[2] = angle(parts_of(model.target), ends.pointed)
     out[3] = ends.spin_change
     out[4] = np.nan if ends.propellant is None else ends.propellant
 
@@ -64,11 +64,6 @@ def _unit(vector: Triple) -> Triple:
     x, y, z = vector
     size = 1.0 / np.sqrt(x * x + y * y + z * z)
     return x * size, y * size, z * size
-
-
-def _constant(vector: Array) -> Triple:
-    x, y, z = vector.tolist()
-    return x, y, z
 
 
 def angle(first: Triple, second: Triple) -> Cases:

@@ -19,7 +19,7 @@ from nutdamp.limits import Windows, effective_on_time, effective_on_times, longe
 from nutdamp.loop_settings import BANG, ONE_PULSE, Loop
 from nutdamp.physics import damping, rates
 from nutdamp.schemes.four_pulse import DEFAULT_SHARE
-from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.schemes.tools.reasons import at_hand
 from nutdamp.spacecraft import Channel, Spacecraft
 
 if TYPE_CHECKING:
@@ -73,10 +73,7 @@ class Law:
         self.windows = Windows(spacecraft, endless=True)
         self.gauge = _gauge(inertia.moments)
         self.period, self.growth = spacecraft.body_period, spacecraft.growth
-        channels = usable(spacecraft)
-        if not channels:
-            raise Infeasible(no_channels(spacecraft))
-        self.actuators = tuple(map(self._actuator, channels))
+        self.actuators = tuple(map(self._actuator, at_hand(spacecraft, usable(spacecraft))))
 
     def _actuator(self, channel: Channel) -> Actuator:
         first, second, third = self.inertia.moments

@@ -46,7 +46,7 @@ class Margin:
 
     It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
     later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
-    not counted in these figures.
+    not counted in these figures. ``pull``: share of the nutation that a firing takes at its moment.
     """
 
     channel: str
@@ -57,6 +57,7 @@ class Margin:
     growth: float
     delay: float
     cause: Cause
+    pull: float = 0.0
 
     @property
     def damps(self) -> bool:
@@ -104,7 +105,7 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     most = _most_late(pull, growth)
     cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause)
+    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause, pull)
 
 
 def _most_late(pull: float, growth: float) -> float:
@@ -194,11 +195,5 @@ def _row(spacecraft: Spacecraft, loop: Loop, delays: Vector) -> Vector:
     except Infeasible:
         return np.full(len(delays), math.nan)
     rate = abs(spacecraft.inertia.body_rate * spacecraft.spin)
-    law = Law(spacecraft, loop)
-    worst = np.zeros(len(delays))
-    for actuator, margin in zip(law.actuators, found, strict=True):
-        size = law.size(loop.start, spacecraft.spin)
-        firing = law.firing(actuator, complex(abs(loop.sensor.scale) * size), spacecraft.spin)
-        pull = 0.0 if firing is None else abs(firing.acts) / size
-        worst = np.maximum(worst, np.abs(1.0 - pull * np.exp(1j * (margin.late + rate * delays))) * margin.growth)
-    return worst
+    left = [np.abs(1.0 - one.pull * np.exp(1j * (one.late + rate * delays))) * one.growth for one in found]
+    return np.asarray(np.max(left, axis=0))

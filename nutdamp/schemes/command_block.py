@@ -27,7 +27,7 @@ from nutdamp.schemes.options import CommandBlockOptions
 from nutdamp.schemes.tools import block_notes
 from nutdamp.schemes.tools.block_model import Trial, acts, evenly
 from nutdamp.schemes.tools.block_search import BLOCKS, FLOWN, MOST_WIDTHS, BlockSearch, Found, of_each_kind
-from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.schemes.tools.reasons import at_hand
 from nutdamp.schemes.tools.sun_pulses import fired
 from nutdamp.spacecraft import Channel, Spacecraft
 
@@ -60,10 +60,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
-    channels = usable(spacecraft)
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
-    search = Search(spacecraft, channels, commands)
+    search = Search(spacecraft, at_hand(spacecraft, usable(spacecraft)), commands)
     flights: list[Flown] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"

@@ -10,7 +10,7 @@ from nutdamp.limits import usable
 from nutdamp.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.schemes.options import FourPulseOptions
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
-from nutdamp.schemes.tools.reasons import no_alignment, no_channels
+from nutdamp.schemes.tools.reasons import at_hand, no_alignment
 from nutdamp.spacecraft import Channel, Spacecraft
 
 DEFAULT_SHARE = 0.125
@@ -25,9 +25,7 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
 
     Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
     """
-    channels = usable(spacecraft)
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
+    channels = at_hand(spacecraft, usable(spacecraft))
     builder = ImpulseBuilder(spacecraft)
     on_times = {channel.name: _on_time(builder, channel, options.on_time) for channel in channels}
     if spacecraft.inertia.a == 0.0:

@@ -24,7 +24,7 @@ from nutdamp.schemes import one_pulse
 from nutdamp.schemes.options import HalfConeOptions
 from nutdamp.schemes.tools import pair_search, predamping
 from nutdamp.schemes.tools.flown_builder import FlownBuilder
-from nutdamp.schemes.tools.reasons import no_channels, no_target, turn_of
+from nutdamp.schemes.tools.reasons import expect_aim, turn_of
 from nutdamp.schemes.tools.steerable_pair import SteerablePair
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
 
@@ -65,10 +65,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
 
     Raises Infeasible with the reason.
     """
-    if spacecraft.goal.axis is None:
-        raise Infeasible(no_target())
-    if spacecraft.torquer is None and not usable(spacecraft):
-        raise Infeasible(no_channels(spacecraft))
+    expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
         builder = predamping.damped(builder, one_pulse.schedule)
@@ -156,7 +153,9 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     if builder.allowed < cones + 1:
         raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {builder.allowed}")
     for remaining in range(cones, 1, -1):
-        builder.fire(_first_of(builder.here, remaining))
+        here = builder.here
+        steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
+        builder.fire(steered or (_fixed(here, remaining),))
     builder.fire(pair_search.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
     ideal = pointing.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
@@ -169,21 +168,13 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     return builder.schedule(note)
 
 
-def _first_of(here: Spacecraft, cones: int) -> tuple[Pulse, ...]:
-    """The pulse onto the first of ``cones`` half cones."""
-    torquer = here.torquer
-    if torquer is not None:
-        return SteerablePair(here, torquer).one(cones)
-    return (_fixed(here, usable(here), cones),)
-
-
-def _fixed(here: Spacecraft, channels: list[Channel], cones: int) -> Pulse:
+def _fixed(here: Spacecraft, cones: int) -> Pulse:
     """The earliest firing of a channel from which the row costs hardly more than from the best one.
 
     A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
     and what it misses then is made up for by the cones that follow.
     """
-    h, windows, target = _axial(here), Windows(here), here.target_axis
+    h, windows, target, channels = _axial(here), Windows(here), here.target_axis, usable(here)
     step = 2.0 * math.pi / abs(here.spin) / SAMPLES
     share = (windows.horizon - here.limits.earliest) / (cones + 1)
     span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from nutdamp.errors import Infeasible, TooShort
+from nutdamp.errors import TooShort
 from nutdamp.limits import longest_useful, usable
 from nutdamp.physics import rates
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes.options import SchemeOptions
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
-from nutdamp.schemes.tools.reasons import no_alignment, no_channels
+from nutdamp.schemes.tools.reasons import at_hand, no_alignment
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable
 
 TRAIN_SHARE = 0.25
@@ -33,9 +33,7 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
         if builder.pulses:
             return builder.schedule()
         raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
-    channels = usable(spacecraft)
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
+    channels = at_hand(spacecraft, usable(spacecraft))
     trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)

@@ -19,7 +19,6 @@ import numpy as np
 
 from nutdamp import work
 from nutdamp.errors import Infeasible
-from nutdamp.limits import usable
 from nutdamp.physics import pointing
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import one_pulse
@@ -27,7 +26,7 @@ from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.schemes.tools import least_squares, predamping
 from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
 from nutdamp.schemes.tools.pulse_train import LAST, Attempt, Train
-from nutdamp.schemes.tools.reasons import no_channels, no_target
+from nutdamp.schemes.tools.reasons import expect_aim
 from nutdamp.spacecraft import Spacecraft
 
 MOVED = (6, 12, LAST)
@@ -51,10 +50,7 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
     ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
-    if spacecraft.goal.axis is None:
-        raise Infeasible(no_target())
-    if spacecraft.torquer is None and not usable(spacecraft):
-        raise Infeasible(no_channels(spacecraft))
+    expect_aim(spacecraft)
     if options.on_time is None:
         return _train(spacecraft, options)
     try:

@@ -25,7 +25,7 @@ from nutdamp.schemes.options import TwoPulseOptions
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.flown_builder import tolerable
 from nutdamp.schemes.tools.impulse_builder import ALIGNED, ImpulseBuilder
-from nutdamp.schemes.tools.reasons import FADED, bounded_by, no_channels
+from nutdamp.schemes.tools.reasons import FADED, at_hand, bounded_by
 from nutdamp.schemes.tools.symmetric_model import model_of
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
 
@@ -87,10 +87,7 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         return _steered(spacecraft, torquer, options)
-    channels = for_pairs(spacecraft)
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
-    return _fixed(spacecraft, channels, options)
+    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)), options)
 
 
 # --- steerable torquer -----------------------------------------------------------------------------------------------
@@ -102,16 +99,13 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
     form = damping.half_pulses_as_printed if options.literal else damping.half_pulses
     halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
-    best: tuple[Pulse, Pulse] | None = None
-    for turns in range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2):
-        wait = turns * halves.wait
-        placed = (
-            _pair(spacecraft, torquer, halves, start, wait, on_times)
-            for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
-        )
-        best = next((pulses for pulses in placed if keeps_limits(spacecraft, pulses)), None)
-        if best is not None:
-            break
+    turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
+    placed = (
+        _pair(spacecraft, torquer, halves, start, wait, on_times)
+        for wait in (number * halves.wait for number in turns)
+        for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
+    )
+    best = next((pulses for pulses in placed if keeps_limits(spacecraft, pulses)), None)
     if best is None:
         raise Infeasible(
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "

@@ -123,16 +123,12 @@ class Program:
         strength = np.linalg.norm(self._torques, axis=1)
         self._unit = self._scale / strength  # s of firing that are worth all there is to do
         self._direction = self._torques / strength[:, None]
-        self._strong = self._unit < self.width
+        # Channels (channels,) that give all that is needed within one slot, and so act at a moment.
+        self.strong: NDArray[np.bool_] = self._unit < self.width
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
         self._grid: Vector | None = None
         self._looked = 0
-
-    @property
-    def strong(self) -> NDArray[np.bool_]:
-        """Channels (channels,) that give all that is needed within one slot, and so act at a moment."""
-        return np.asarray(self._strong)
 
     def solve(self, columns: Columns | None = None, *, enough: bool = False) -> Solution:
         """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation.
@@ -281,7 +277,7 @@ class Program:
 
     def reachable(self) -> bool | None:
         """Whether all slots together can supply the goal, by `reach`; None where that is not known."""
-        if self._scale == 0.0 or self._strong.any():  # strong ones act at moments, of which slots are only samples
+        if self._scale == 0.0 or self.strong.any():  # strong ones act at moments, of which slots are only samples
             return None
         work.spend(SOLVED + SLOT * self.forbidden.size)
         lost = self.influence.widths(np.array([self.width]))[0]
@@ -291,7 +287,7 @@ class Program:
 
     def _out_of_reach(self, weights: Vector) -> bool:
         """Whether prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
-        if self._strong.any():  # these act at moments, of which the slots are only samples
+        if self.strong.any():  # these act at moments, of which the slots are only samples
             return False
         size = float(np.abs(weights).max())
         most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
@@ -310,7 +306,7 @@ class Program:
         return self._slots(channel[chosen], slot[chosen])
 
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
-        return alone(channel, self.centres[slot], np.where(self._strong[channel], 0.0, self.width))
+        return alone(channel, self.centres[slot], np.where(self.strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: Columns, unmet: float) -> Columns:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
@@ -318,7 +314,7 @@ class Program:
         More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
         """
         gains = self._gains(duals)
-        weak = np.where(self._strong[:, None], -np.inf, gains)
+        weak = np.where(self.strong[:, None], -np.inf, gains)
         slots = taken.width > 0.0
         weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
         channel, slot = np.nonzero(weak > PRICE)
@@ -327,11 +323,11 @@ class Program:
             best = np.argpartition(weak[channel, slot], -most)[-most:]
             channel, slot = channel[best], slot[best]
         found = self._slots(channel, slot)
-        return found.joined(self._peaks(gains, duals)) if self._strong.any() else found
+        return found.joined(self._peaks(gains, duals)) if self.strong.any() else found
 
     def _peaks(self, gains: Vector, duals: Vector) -> Columns:
         """Moments within slots at which a strong channel is worth most."""
-        padded = np.pad(np.where(self._strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
+        padded = np.pad(np.where(self.strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
         middle = padded[:, 1:-1]
         channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
         order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
@@ -363,7 +359,7 @@ class Program:
         for number, burn in enumerate(burns):
             index = self.channels.index(burn.channel)
             reach = 0.5 * burn.on_time + SLOTS // 8 * self.width
-            if self._strong[index]:
+            if self.strong[index]:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
                 times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
                 times = times[np.diff(times, prepend=-np.inf) > 0.0]

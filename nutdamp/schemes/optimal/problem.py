@@ -19,7 +19,7 @@ from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.repair import UNMET
 from nutdamp.schemes.optimal.residual_equations import Equations
 from nutdamp.schemes.options import OptimalOptions
-from nutdamp.schemes.tools.reasons import no_channels
+from nutdamp.schemes.tools.reasons import at_hand
 from nutdamp.spacecraft import Spacecraft
 
 LEFT = math.radians(1e-6)
@@ -41,9 +41,7 @@ class Problem:
     def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
         self.spacecraft, self.options = spacecraft, options
         requested = spacecraft.goal.spin is not None
-        self.channels = tuple(usable(spacecraft, axial=requested))
-        if not self.channels:
-            raise Infeasible(no_channels(spacecraft))
+        self.channels = tuple(at_hand(spacecraft, usable(spacecraft, axial=requested)))
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
         self.equations = Equations(shift=not options.free_axis, spin=requested)

@@ -23,7 +23,7 @@ from nutdamp.physics import attitude, pointing
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.flown_builder import tolerable
-from nutdamp.schemes.tools.reasons import no_channels, turn_of
+from nutdamp.schemes.tools.reasons import at_hand, turn_of
 from nutdamp.schemes.tools.steerable_pair import SteerablePair
 from nutdamp.schemes.tools.symmetric_model import model_of
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
@@ -72,10 +72,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         if torquer.torque is not None or not model_of(spacecraft).exact:
             made = least_squares.correct(spacecraft, made, chosen=range(len(made)), momentum=True)
         return _checked(spacecraft, made)
-    channels = for_pairs(spacecraft)
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
-    return _fixed(spacecraft, channels)
+    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
 
 
 def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:

@@ -6,7 +6,7 @@ import cmath
 import math
 
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.limits import longest_useful
+from nutdamp.limits import longest_useful, usable
 from nutdamp.schedule import Pulse
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.spacecraft import Channel, Spacecraft
@@ -45,9 +45,19 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     return listed(names)
 
 
-def no_target() -> str:
-    """The scheme only turns the spin axis to a target, and there is none."""
-    return "needs a target axis: --target, or goal in the file"
+def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
+    """The ``channels`` that can damp; raises Infeasible where there are none."""
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    return channels
+
+
+def expect_aim(spacecraft: Spacecraft) -> None:
+    """Raises Infeasible without a target to which a scheme could turn the spin axis, or without what could do it."""
+    if spacecraft.goal.axis is None:
+        raise Infeasible("needs a target axis: --target, or goal in the file")
+    if spacecraft.torquer is None:
+        at_hand(spacecraft, usable(spacecraft))
 
 
 def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
