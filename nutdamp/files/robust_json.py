@@ -28,6 +28,14 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
         "reason": reason,
         "meets_requirement": found.meets_requirement,
+        "fresh": None
+        if found.fresh is None
+        else {
+            "samples": found.fresh.samples,
+            "seed": found.fresh.seed,
+            "met_fraction": found.fresh.met,
+            "interval": list(found.fresh.interval),
+        },
         "tightening": None
         if found.tightening is None
         else {

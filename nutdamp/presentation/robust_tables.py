@@ -35,6 +35,7 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
         Text(body.name, style="bold"),
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
+        *(Text(one) for one in filter(None, [_fresh(found)])),
         Text(verdicts.robust_cost(found)),
         *(Text(one) for one in filter(None, [verdicts.tightened(found), proved(proof)])),
         *figures(decided),
@@ -89,6 +90,17 @@ def proved(found: Certificate | None) -> str:
         f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; one that costs {100.0 * gap:.2g} % more is "
         f"known, and the plan, refined on the true motion, takes {spent}. It does not prove that "
         f"{verdicts.exact_percent(found.probability)} of cases comply."
+    )
+
+
+def _fresh(found: RobustComparison) -> str:
+    """How the plan fares in new cases; nothing where none were flown."""
+    if found.fresh is None:
+        return ""
+    met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
+    return (
+        f"Of {found.fresh.samples:,} new cases (seed {found.fresh.seed}), by which it was not chosen, {met} comply; "
+        f"95 % interval {low} to {high}."
     )
 
 
