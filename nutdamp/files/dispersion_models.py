@@ -113,87 +113,74 @@ def _json_schema(kind: str) -> dict[str, Any]:
 
 _Three = Annotated[list[ToleranceSection], Length(3, 3)]
 _ByThruster = dict[str, ToleranceSection]
+_Moment = Annotated[ToleranceSection, _Tolerance("inertia")]
+_Share = Annotated[ToleranceSection, _Tolerance("ratio")]
+_Time = Annotated[ToleranceSection, _Tolerance("time")]
+_Pressure = Annotated[ToleranceSection, _Tolerance("pressure")]
+_Times = Annotated[_ByThruster, _Tolerance("time", "thruster")]
 
 
 class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
 
-    A: Annotated[ToleranceSection, _Tolerance("inertia")] | None = Field(
-        "Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"}
-    )
-    C: Annotated[ToleranceSection, _Tolerance("inertia")] | None = Field(
-        "Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"}
-    )
+    A: _Moment | None = Field("Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"})
+    C: _Moment | None = Field("Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"})
     omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
         "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
     )
     thrust: Annotated[_ByThruster, _Tolerance("force", "thruster")] | None = Field(
         "Of each thruster, the same in all its pulses, % or N; or by name.", {"normal": "3 %"}
     )
-    thrust_per_pulse: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
-        "Of the thrust, in each pulse anew, %.", {"normal": "1 %"}
-    )
+    thrust_per_pulse: _Share | None = Field("Of the thrust, in each pulse anew, %.", {"normal": "1 %"})
     thrust_direction: Annotated[_ByThruster, _Tolerance("angle", "thruster")] | None = Field(
         "Tilt of each force about two axes across it, rad; or by name.", {"normal": "0.5 deg"}
     )
     position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
         "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
     )
-    timing: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
-        "Shift of each pulse, s.", {"uniform": "5 ms"}
-    )
-    timing_offset: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
-        "One shift of the whole schedule, s.", {"bias": "2 ms"}
-    )
+    timing: _Time | None = Field("Shift of each pulse, s.", {"uniform": "5 ms"})
+    timing_offset: _Time | None = Field("One shift of the whole schedule, s.", {"bias": "2 ms"})
     attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
         "Of the direction of the spin axis at t = 0, about two axes across it, rad.", {"normal": "0.2 deg"}
     )
-    open_delay: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+    open_delay: _Times | None = Field(
         "Of each valve's open_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
-    close_delay: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+    close_delay: _Times | None = Field(
         "Of each valve's close_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
-    rise_time: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+    rise_time: _Times | None = Field(
         "Of each valve's rise_time, the same in all its pulses, s; or by name.", {"normal": "0.5 ms"}
     )
-    fall_time: Annotated[_ByThruster, _Tolerance("time", "thruster")] | None = Field(
+    fall_time: _Times | None = Field(
         "Of each valve's fall_time, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
     )
     impulse_bit: Annotated[_ByThruster, _Tolerance("ratio", "thruster")] | None = Field(
         "Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.", {"normal": "2 %"}
     )
-    cold: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
-        "Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"}
-    )
+    cold: _Share | None = Field("Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"})
     sensor_bias: Annotated[ToleranceSection, _Tolerance(READING)] | None = Field(
         "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", {"normal": "0.01 deg/s"}
     )
-    sensor_scale: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+    sensor_scale: _Share | None = Field(
         "Of the scale of each gyro of a loop, or of its accelerometer, %.", {"normal": "1 %"}
     )
-    sensor_noise: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
-        "Of the noise of the sensor of a loop, %.", {"uniform": "20 %"}
-    )
-    sensor_delay: Annotated[ToleranceSection, _Tolerance("time")] | None = Field(
+    sensor_noise: _Share | None = Field("Of the noise of the sensor of a loop, %.", {"uniform": "20 %"})
+    sensor_delay: _Time | None = Field(
         "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", {"uniform": "2 ms"}
     )
-    cold_pulses: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
-        "Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"}
-    )
+    cold_pulses: _Share | None = Field("Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"})
     tank_propellant: Annotated[ToleranceSection, _Tolerance("mass")] | None = Field(
         "Of the propellant in the tank at t = 0, kg or %.", {"normal": "1 %"}
     )
-    tank_pressure: Annotated[ToleranceSection, _Tolerance("pressure")] | None = Field(
+    tank_pressure: _Pressure | None = Field(
         "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", {"normal": "0.2 bar"}
     )
-    tank_final_pressure: Annotated[ToleranceSection, _Tolerance("pressure")] | None = Field(
-        "Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"}
-    )
-    tank_exponent: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+    tank_final_pressure: _Pressure | None = Field("Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"})
+    tank_exponent: _Share | None = Field(
         "Of the power of the pressure that the thrust goes with, in %.", {"normal": "5 %"}
     )
-    inertia_per_kg: Annotated[ToleranceSection, _Tolerance("ratio")] | None = Field(
+    inertia_per_kg: _Share | None = Field(
         "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", {"normal": "10 %"}
     )
     correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
