@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.rigid_cases import cos_sin
 from nutdamp.spacecraft import Vector
 
@@ -14,9 +15,6 @@ Cases = Any
 """One number for all cases, or an array (n,): real, or complex where a derivative is taken by a complex step."""
 
 Triple = tuple[Cases, Cases, Cases]
-
-TINY = 1e-200
-"""Keeps quotients like sin x / x defined at zero, and changes nothing elsewhere."""
 
 
 def plus(first: Cases, second: Cases) -> Cases:

@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import DispersedCases, Model
-from nutdamp.dispersion.elementwise import TINY, Cases, Triple, plus, rotated, times, triple
+from nutdamp.dispersion.elementwise import Cases, Triple, plus, rotated, times, triple
 from nutdamp.dispersion.watched import watch_of
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.axis_watch import AxisWatch
+from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.rigid import Forcing
 from nutdamp.physics.rigid_cases import Bodies, Stretch, cos_sin
 

@@ -17,7 +17,7 @@ from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.correlation import Group
 from nutdamp.dispersion.draws import Draws
 from nutdamp.dispersion.fed import tank_of
-from nutdamp.dispersion.inputs import SCHEDULE_IDLE, Input, Inputs, list_inputs, of_sensor
+from nutdamp.dispersion.inputs import BY_VALVE, SCHEDULE_IDLE, Input, Inputs, list_inputs, of_sensor
 from nutdamp.loop.fleet import Case
 from nutdamp.loop.law import Law
 from nutdamp.loop_settings import ACCELEROMETER, Sensor
@@ -25,9 +25,6 @@ from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft import Attitude, Channel, Inertia, Spacecraft, Thruster, Vector
 from nutdamp.tolerances import Tolerance
-
-TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
-"""Numbers of a valve."""
 
 OF_FIRINGS = ("thrust_per_pulse", "timing")
 """Tolerances that each firing draws anew."""
@@ -186,7 +183,7 @@ class LoopModel:
         return tuple(found)
 
 
-OF_THRUSTERS = ("thrust", "direction", "position", *TIMES, "impulse_bit")
+OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)
 """First words of the inputs that make a thruster another."""
 
 
@@ -220,7 +217,7 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
     if isinstance(valve, Measured):
         factor = 1.0 + off("impulse_bit")
         return Measured(tuple((command, factor * given, centroid) for command, given, centroid in valve.rows))
-    return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in TIMES})
+    return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in BY_VALVE[:-1]})
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:

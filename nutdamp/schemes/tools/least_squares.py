@@ -261,13 +261,11 @@ class _Common:
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """The ``pulses`` about their centres, those alike ``factor`` times as large."""
-        return [_resized(self.spacecraft, one, factor) if alike(self.made, one) else one for one in pulses]
+        return [self._resized(one, factor) if alike(self.made, one) else one for one in pulses]
 
-
-def _resized(spacecraft: Spacecraft, pulse: Pulse, factor: float) -> Pulse:
-    moved = _Movable(spacecraft, pulse, sized=False)
-    made = moved.turn(moved.start, factor)
-    return replace(made, t=pulse.t)
+    def _resized(self, pulse: Pulse, factor: float) -> Pulse:
+        moved = _Movable(self.spacecraft, pulse, sized=False)
+        return replace(moved.turn(moved.start, factor), t=pulse.t)
 
 
 def _size(pulse: Pulse) -> float:
