@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.compliance import SAME_COST
 from nutdamp.fronts import Front, Point, numbered
+from nutdamp.planning import Plan
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import NOT, header
 from nutdamp.presentation.text import cost, degrees, moment
@@ -54,6 +56,29 @@ def _below(point: Point) -> bool:
 def fails(point: Point) -> bool:
     """Whether it does not meet the requirement of the file, or breaks a cone."""
     return point.plan.meets_requirement is False or point.plan.kept is False
+
+
+def beats(found: Sequence[Front], chosen: Plan) -> str:
+    """Which schedule of the fronts meets the requirement, costs less than the ``chosen`` one and ends no later.
+
+    Empty where none does. The cheapest of them is named, with the command that plans it.
+    """
+    better = [
+        (index, front, point, 1.0 - point.cost / chosen.pulses.cost_in(point.unit))
+        for index, front, point in numbered(found)
+        if point.plan.meets_requirement and point.plan.kept is not False and point.plan.pulses.end <= chosen.pulses.end
+    ]
+    better = [one for one in better if one[3] > SAME_COST]
+    if not better:
+        return ""
+    index, front, point, saved = max(better, key=lambda one: one[3])
+    options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
+    within = f'--set "limits.horizon={point.horizon:.6g} s"'
+    name = front_name(front, pointing=chosen.spacecraft.goal.axis is not None)
+    return (
+        f"point {index} meets the requirement too, costs {100.0 * saved:.2g} % less than the recommended plan and ends "
+        f"no later ({name}): plan --scheme {point.plan.scheme} {options}{within}."
+    )
 
 
 def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:

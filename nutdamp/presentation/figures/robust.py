@@ -46,8 +46,9 @@ def front_figure(found: RobustComparison) -> Figure:
     failing = [one for one in [*others, *rows] if (one.met or 0.0) < found.probability]
     if failing:
         axes.plot(*np.transpose([place(one) for one in failing]), "x", label="too few cases comply", **style.CROSS)
+    other_places = _places([place(one) for one in others])
     for row in range(len(rows)):
-        meant = labels.Meant(places[[row]], np.delete(places, row, axis=0))
+        meant = labels.Meant(places[[row]], np.vstack([np.delete(places, row, axis=0), other_places]))
         labels.add(axes, str(row + 1), places[row], INK, role="vital", meant=meant)
     level = exact_percent(found.probability)
     axes.axhline(100.0 * found.probability, color=PULSE, linewidth=1.2, zorder=1.5, label=f"required: {level}")

@@ -15,6 +15,7 @@ from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
 from nutdamp.presentation.geometry import Cones
+from nutdamp.presentation.text import degrees
 from nutdamp.spacecraft import Vector
 from nutdamp.track import Track
 
@@ -36,6 +37,9 @@ SPACE, BODY = 0.28, 0.15
 
 MARKS = "+os"
 """Of H, ω and the spin axis in the plane picture."""
+
+HIDDEN = 0.04
+"""Share of the space cone below which the body cone lies under the marks of spin axis and ω."""
 
 STEPS = (1.0, 2.0, 3.0, 5.0)
 
@@ -146,11 +150,17 @@ def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(found.body):
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
-        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label="body cone")
+        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(found)}")
     axes.plot([], [], color=MOTION, linewidth=1.0, label="path")
     if pulses:
         axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
     axes.plot([], [], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
+
+
+def _hidden(found: Cones) -> str:
+    """What the legend adds where the body cone is so small that the marks of the axes in it hide it."""
+    body, space = (float(np.arccos(np.clip(found.rotation @ one, -1.0, 1.0))) for one in (found.axis, found.momentum))
+    return f" ({degrees(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
 
 
 def name_directions(axes: Axes) -> None:

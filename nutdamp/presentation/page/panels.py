@@ -34,7 +34,7 @@ def picture(figure: Figure, caption: str, described: str, narrow: Figure | None 
     Without such a one its columns of panels are shown below each other there. Those are views of the same drawing,
     which has an id for them: so they take a line each and not a second picture.
     """
-    title, svg = figure.get_suptitle(), _untitled(figure)
+    title, svg = str(figure.get_label()) or figure.get_suptitle(), _untitled(figure)
     if narrow is not None:
         return Picture(svg, title, caption, described, narrow=_untitled(narrow))
     views = _views(figure)

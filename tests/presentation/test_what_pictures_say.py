@@ -1,0 +1,117 @@
+"""Captions, legends and notes name what is drawn, and nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import cross, spinner
+from colours import contrast
+from matplotlib.colors import to_hex
+
+from nutdamp import dispersion, flight, planning
+from nutdamp.comparison import compare
+from nutdamp.dispersion.study import Results, run
+from nutdamp.fronts import Front, Point
+from nutdamp.presentation import figures
+from nutdamp.presentation.page.document import Prose
+from nutdamp.presentation.page.html import block_html
+from nutdamp.presentation.page.pictures import dispersion_pictures_of
+from nutdamp.presentation.page.scales import strip_of
+from nutdamp.presentation.trade_tables import BELOW, beats, front_parts
+from nutdamp.schedule import Bounds, Schedule
+from nutdamp.spacecraft import Inertia, Limits, Requirement, Spacecraft
+from nutdamp.tolerances import Dispersions, Tolerance
+
+BODY = spinner(channels=cross(20.0))
+SPREAD = Dispersions(A=Tolerance("normal", 0.02, relative=True))
+
+
+@pytest.mark.parametrize("biased", [False, True])
+@pytest.mark.parametrize(
+    "required", [None, Requirement(nutation=0.01), Requirement(nutation=0.01, momentum_shift=0.01)]
+)
+def test_captions_of_dispersed_cases_name_no_bias_and_no_bound_that_is_not_drawn(
+    required: Requirement | None, biased: bool
+) -> None:
+    offset = Tolerance("bias", 0.01) if biased else None
+    body = replace(BODY, requirement=required, dispersions=replace(SPREAD, timing_offset=offset))
+    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False)
+    _, momentum, budget = dispersion_pictures_of(run(Results(made, 50)), "two-pulse")
+    assert ("required" in momentum.caption) == (required is not None and required.momentum_shift is not None)
+    assert ("bias" in budget.caption) == biased
+
+
+def test_the_sphere_names_pulses_where_they_move_the_axis() -> None:
+    plan = planning.plan(BODY, "two-pulse")
+    flights = flight.by_impulses(BODY, plan.pulses), plan.flight
+    for flown, named in zip(flights, (False, True), strict=True):
+        drawn = figures.flight_figure("sphere", flown, flown.sampled(400, 20.0))
+        assert ("pulse" in {text.get_text() for text in drawn.legends[0].get_texts()}) == named
+
+
+@pytest.mark.parametrize(("moment", "hidden"), [(80.0, False), (1.5, True)])
+def test_a_body_cone_under_the_marks_says_how_large_it_is(moment: float, hidden: bool) -> None:
+    """The half-angle of the body cone is about C/A of the nutation."""
+    body = replace(spinner(), inertia=Inertia((120.0, 120.0, moment)), omega0=np.array([0.003, 0.0, 3.0]))
+    flown = flight.flown(body, Schedule(), 20.0)
+    drawn = figures.flight_figure("sphere", flown, flown.sampled(400, 20.0))
+    (name,) = (text.get_text() for text in drawn.legends[0].get_texts() if "body cone" in text.get_text())
+    assert ("under the marks" in name) == hidden
+
+
+def test_hatching_of_times_that_are_closed_is_seen() -> None:
+    body = replace(BODY, limits=Limits(blackout=((0.0, 0.3),), horizon=60.0))
+    drawn = figures.flight_figure("timeline", *figures.shown(planning.plan(body, "two-pulse")))
+    closed = [bars for bars in drawn.axes[0].collections if bars.get_hatch()]
+    assert closed
+    for bars in closed:
+        (colour,) = np.asarray(bars.get_edgecolor()).tolist()
+        assert colour[3] == 1.0
+        assert contrast(to_hex(colour), "#ffffff") >= 3.0
+
+
+def test_options_and_relations_stay_in_one_line() -> None:
+    shown = block_html(Prose("report --disperse flies them; < 1e-9 deg is left, a-b breaks"))
+    assert '<span class="whole-word">--disperse</span> flies' in shown
+    assert '<span class="whole-word">&lt; 1e-9 deg</span> is left, a-b breaks' in shown
+
+
+@pytest.mark.parametrize("degrees", [0.5, 50.0])
+def test_the_moving_view_says_where_the_required_nutation_is(degrees: float) -> None:
+    body = replace(BODY, requirement=Requirement(nutation=math.radians(degrees)))
+    flown = flight.flown(body, planning.plan(body, "two-pulse").pulses, 20.0)
+    strip, (low, high) = strip_of(flown, flown.sampled(200, 20.0), 20.0)
+    inside = low < degrees < high
+    assert inside == (degrees < 1.0)
+    assert (strip.required is not None) == inside
+    assert strip.outside == ("" if inside else "50 deg")
+
+
+def fronts_of(body: Spacecraft, costs: tuple[float, ...]) -> tuple[Front, ...]:
+    """A front of one schedule a cost, with H anywhere, all of which end as the plan of two-pulse does."""
+    plan = planning.plan(body, "two-pulse")
+    spent = plan.pulses.cost_in("N m s")
+    made = []
+    for share in costs:
+        cheaper = [replace(one, impulse=share * one.impulse) for one in plan.pulses]
+        pulses = replace(plan.pulses, pulses=tuple(cheaper), bounds=Bounds(spent, None, "N m s", 60.0))
+        made.append(Point(replace(plan, schedule=pulses), 42.0, "N m s"))
+    return (Front(math.inf, tuple(made)),)
+
+
+def test_a_cheaper_schedule_that_ends_no_later_is_named_beside_the_recommended_one() -> None:
+    body = replace(BODY, requirement=Requirement(nutation=math.radians(30.0)))
+    chosen = compare(body, ["two-pulse"])["two-pulse"]
+    said = beats(fronts_of(body, (0.999999, 0.95, 0.9)), chosen)
+    assert said.startswith("point 3 meets the requirement too, costs 10 % less than the recommended plan")
+    assert said.endswith('--free-axis --set "limits.horizon=42 s".')
+    assert beats(fronts_of(body, (1.0, 1.1)), chosen) == ""
+
+
+def test_costs_below_their_first_order_least_are_explained() -> None:
+    for share, explained in ((0.9, True), (1.1, False)):
+        texts = [str(part) for part in front_parts(BODY, fronts_of(BODY, (share,)))]
+        assert (BELOW in texts) == explained
