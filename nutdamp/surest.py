@@ -298,9 +298,7 @@ class _Search:
         made = self.model.translate(as_pulses(self.model.body, found.burns))
         plain = commanding.plain(self.body) if self.body.thrust_laws else self.body
         aside = found.left[self.equations.chosen]
-        made = refine(
-            plain, made, self.equations, np.zeros(2), self.program.width, lambda one: flight.flown(plain, one), aside
-        )
+        made = refine(plain, made, self.equations, aside, self.program.width, lambda one: flight.flown(plain, one))
         try:
             return schemes.as_commands(SCHEME, self.body, made, self.options) if self.body.thrust_laws else made
         except Infeasible:

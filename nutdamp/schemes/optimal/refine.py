@@ -30,25 +30,21 @@ def refine(
     spacecraft: Spacecraft,
     made: Schedule,
     equations: Equations,
-    off: Vector,
+    aside: Vector,
     step: float,
     fly: Callable[[Schedule], Flight],
-    aside: Vector | None = None,
 ) -> Schedule:
     """``made`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
 
-    ``fly`` flies schedules of the ``spacecraft``; ``off`` (2,) N m s is where H is to end beside its target, ``aside``
-    (equations,) N m s, where given, what is to be left of all of them. What it leaves is for the caller to judge.
+    ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
+    leaves is for the caller to judge.
     """
     parameters = PulseParameters(spacecraft, made)
     size = float(np.linalg.norm(spacecraft.momentum))
-    beside = np.zeros(len(equations.chosen)) if aside is None else aside
-    if equations.shift and aside is None:
-        beside[2:4] = off
 
     def left(schedule: Schedule) -> tuple[Vector, Flight]:
         flown = fly(schedule)
-        return (residual_equations.misses(flown, equations) - beside) / size, flown
+        return (residual_equations.misses(flown, equations) - aside) / size, flown
 
     def slopes_of(schedule: Schedule, flown: Flight) -> Vector:
         return parameters.slopes(schedule, flown, equations, step) / size

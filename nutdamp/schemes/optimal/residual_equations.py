@@ -41,6 +41,10 @@ class Equations:
         """Rows of the five that count."""
         return [0, 1, *([2, 3] if self.shift else []), *([4] if self.spin else [])]
 
+    def beside(self, off: Vector) -> Vector:
+        """What is left (equations,) N m s where H ends ``off`` (2,) N m s beside its target, and nothing else is."""
+        return np.array([0.0, 0.0, *off, 0.0])[self.chosen]
+
 
 @dataclass(frozen=True, eq=False)
 class Influence:

@@ -289,7 +289,8 @@ class _Search(Problem):
         """An exact schedule on the ticks of the commands."""
         missed = residual_equations.misses(self.flown(made), self.equations)
         off = missed[2:4] if self.options.shift is not None else np.zeros(2)
-        return refine(self.spacecraft, made, self.equations, off, self.program().width, self.flown)
+        aside = self.equations.beside(off)
+        return refine(self.spacecraft, made, self.equations, aside, self.program().width, self.flown)
 
     def worth(self, made: Schedule) -> float:
         """What is to be least: the cost, or the number of pulses."""
@@ -356,7 +357,8 @@ class _Search(Problem):
             flown = self.flown(made)
             program.aim(residual_equations.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                made = refine(self.spacecraft, made, self.equations, solution.off, program.width, self.flown)
+                aside = self.equations.beside(solution.off)
+                made = refine(self.spacecraft, made, self.equations, aside, program.width, self.flown)
                 left, price = self.left(self.flown(made)), self.price(made)
                 found.append(_Found(0.0 if left <= LEFT else left, price, made))
                 if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
