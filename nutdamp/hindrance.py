@@ -46,10 +46,10 @@ class Hindrance:
             return Obstacle.LIMITS
         if body.disturbances:
             return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
-        if len(self.pulses) == limits.max_pulses:
-            return Obstacle.MAX_PULSES
         if self.nutation <= self.rounding:
             return Obstacle.RESOLUTION
+        if len(self.pulses) == limits.max_pulses:
+            return Obstacle.MAX_PULSES
         return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
 
     @property

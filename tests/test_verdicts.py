@@ -154,6 +154,7 @@ def test_a_blackout_is_not_said_to_limit_what_it_may_not_touch() -> None:
         (Limits(), (Disturbance(0.5 + 0j),), False, Obstacle.UNPLANNED_DISTURBANCES, "--with-disturbances plans with"),
         (Limits(), (Disturbance(0.5 + 0j),), True, Obstacle.STEADY_TILT, "The disturbances leave a steady tilt of 0."),
         (Limits(tick=0.3), (), False, Obstacle.RESOLUTION, "Rounding to limits.tick can leave up to "),
+        (Limits(tick=0.3, max_pulses=5), (), False, Obstacle.RESOLUTION, "Rounding to limits.tick can leave up to "),
     ],
 )
 def test_the_warning_names_what_stands_in_the_way(

@@ -255,23 +255,26 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
         turn = np.linspace(0.0, 2.0 * math.pi, 121)
         shown.append(limit * np.column_stack([np.cos(turn), np.sin(turn)]))
         axes.plot(*shown[-1].T, color=PULSE, linewidth=1.6, label=f"required: {limit:.4g}°")
-    axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
     style.square(axes, np.vstack(shown), margin=0.08)
+    if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
+        axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
     axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
     axes.set(xlabel=sky.x, ylabel=sky.y, title=title)
     legend(figure, [axes], 2)
 
 
 def _budget(figure: Figure | SubFigure, results: Results) -> None:
-    """Bars as long as the effects are, the largest on top: a tornado."""
-    rows = budget_rows(results.study)
+    """Bars as long as the effects are, on each side the largest on top (a tornado), those without a name last."""
+    found = budget_rows(results.study)
     pair = figure.subplots(1, 2)
-    places = -np.arange(len(rows), dtype=float)
-    names = [f"{row.name}, {row.size}" if row.size else row.name for row in rows]
+    places = -np.arange(len(found), dtype=float)
     parts = (Part.NUTATION, compliance.aim(results.study.model.spacecraft))
     for axes, part, colour, index in zip(pair, parts, (MOTION, MOMENTUM), (0, 1), strict=True):
         name = "nutation" if part is Part.NUTATION else part.label
         axes.set_title(f"{name}: one sigma\nof each input alone")
+        order = np.lexsort(([-row.effects[index] for row in found], [not row.size for row in found]))
+        rows = [found[place] for place in order.tolist()]
+        names = [f"{row.name}, {row.size}" if row.size else row.name for row in rows]
         effects = np.degrees([row.effects[index] for row in rows])
         most = float(effects.max(initial=0.0))
         limit, right = _limit(results, part), 1.3 * most

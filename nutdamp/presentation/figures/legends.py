@@ -25,9 +25,13 @@ LONGEST_NAME = 40
 
 def heading(figure: Figure, spacecraft: Spacecraft, text: str) -> None:
     """The line above a picture, and more of them where it is long: whose it is, then ``text``."""
-    lines = f"{short_name(spacecraft)}: {text}".split("\n")
-    figure.suptitle("\n".join(fill(line, int(LETTERS * figure.get_figwidth())) for line in lines))
-    figure.set_label("\n".join(lines))  # for pages, which break it by their own width
+    titled(figure, f"{short_name(spacecraft)}: {text}")
+
+
+def titled(figure: Figure, text: str) -> None:
+    """``text`` above a picture, in as many lines as its width takes."""
+    figure.suptitle("\n".join(fill(line, int(LETTERS * figure.get_figwidth())) for line in text.split("\n")))
+    figure.set_label(text)  # for pages, which break it by their own width
 
 
 def short_name(spacecraft: Spacecraft) -> str:

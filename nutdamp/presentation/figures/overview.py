@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from nutdamp.flight import Flight
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import history, labels, motion, sphere, style
-from nutdamp.presentation.figures.legends import legend
+from nutdamp.presentation.figures.legends import legend, titled
 from nutdamp.track import Track
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = Fal
         if axes.get_xlabel() == history.TIME and cut:
             axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if cut else ""
-    figure.suptitle(motion.title(flight) + part)
+    titled(figure, motion.title(flight) + part)
     labels.settle(figure)
     return figure
 

@@ -113,6 +113,7 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
         # A schedule serves for every later end, until a cheaper one does.
         times, levels = np.repeat([*ends, spacecraft.horizon], 2)[1:], np.repeat([*costs, costs[-1]], 2)[:-1]
         axes.plot(times, levels, color=colour, linestyle=line)
+        on_top: dict[str, Any] = {"color": colour, "clip_on": False}  # marks at the horizon lie on the frame
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         alone = []
         for index, owner, point in numbered(found):
@@ -125,9 +126,9 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
                 else:
                     covered.append((end, cost))
                     same[2].append(index)
-                    axes.plot(end, cost, mark, color=colour, markersize=10, markerfacecolor="none", zorder=3)
+                    axes.plot(end, cost, mark, markersize=10, markerfacecolor="none", zorder=3, **on_top)
         if alone:
-            axes.plot(*np.transpose(alone), mark, color=colour, markersize=5, zorder=3.5)
+            axes.plot(*np.transpose(alone), mark, markersize=5, zorder=3.5, **on_top)
     failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(found) if fails(point)]
     if failing:
         axes.plot(*np.transpose(failing), "x", label="does not meet the requirement", **style.CROSS)
