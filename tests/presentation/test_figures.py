@@ -124,10 +124,10 @@ def test_the_axis_track_ends_where_h_and_the_spin_axis_end() -> None:
     space = panel(drawn("motion", "wide pulses"), "Axis track")
     away = np.degrees(angle_between(track.axis, track.momentum[0]))
     assert np.hypot(*line(space, "path")[0]) == pytest.approx(away[0])
-    assert line(space, "H")[0] == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert len(line(space, "H")) == len(made.schedule) + 1
+    assert line(space, "H at t = 0 and after each pulse")[0] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert len(line(space, "H at t = 0 and after each pulse")) == len(made.schedule) + 1
     shift = np.degrees(made.residual.momentum_shift)
-    assert np.hypot(*line(space, "H")[-1]) == pytest.approx(shift, abs=1e-9)
+    assert np.hypot(*line(space, "H at t = 0 and after each pulse")[-1]) == pytest.approx(shift, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_the_target_is_marked_where_h_ends() -> None:
     space = panel(drawn("motion", "pointed"), "Axis track")
     (target,) = line(space, "target")
     assert np.degrees(0.14) * np.array([np.cos(1.0), np.sin(1.0)]) == pytest.approx(target)
-    assert line(space, "H")[-1] == pytest.approx(target, abs=1e-6)
+    assert line(space, "H at t = 0 and after each pulse")[-1] == pytest.approx(target, abs=1e-6)
 
 
 @pytest.mark.few(1)

@@ -64,12 +64,12 @@ def test_blocks_phases_signature_and_criteria() -> None:
         assert float(row["Sun phase deg"]) == pytest.approx(float(block["delay deg"]), abs=0.3)
         assert row["UTC"] == body.utc(float(row["time s"]), 3)
     start, after = rows(found, "What gyros")
-    assert (start["after"], after["after"]) == ("start", "block 1")
+    assert (start["coast"], after["coast"]) == ("before block 1", "after block 1")
     assert float(start["gyro, axis 3 rpm"]) == pytest.approx(12.0)
     rate = math.radians(float(after["gyro, square to it deg/s"]))
     shown = math.degrees(math.atan2(120.0 * rate, 180.0 * 12.0 * math.pi / 30.0))  # tan θ = A|ω|/(C|ω3|)
     assert float(after["nutation deg"]) == pytest.approx(shown, rel=1e-3)
-    assert float(after["its period in the body s"]) == pytest.approx(10.0)  # 2π/(|a| ω3), a = -1/2
+    assert float(after["period of that rate s"]) == pytest.approx(10.0)  # 2π/(|a| ω3), a = -1/2
     criteria = rows(found, "Abort criteria")
     assert len(fired) > len(criteria) == 12
     assert [int(row["after pulse"]) for row in criteria] == even(len(fired), 12)
@@ -90,7 +90,7 @@ def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() ->
     found = sheet(FILE, "rhumb-line", 3.0)
     fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")
     assert len(signature) == len(fired) + 1
-    assert signature[-1]["after"] == f"pulse {len(fired)}"
+    assert signature[-1]["coast"] == f"after pulse {len(fired)}"
     assert "the file gives no dispersions" in found.text
     plain = FILE.partition("sun: epoch")[0]
     other = sheet(plain, "rhumb-line", 3.0)

@@ -130,7 +130,8 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
                 style.heads(axes, moved, _halfway(moved), MOMENTUM)
     places = np.vstack(stations)
     marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
-    axes.plot(*places[marked].T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label="H")
+    name = "H at t = 0 and after each pulse"
+    axes.plot(*places[marked].T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label=name)
     return places
 
 

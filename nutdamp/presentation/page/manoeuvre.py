@@ -51,12 +51,10 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         "start, modulo 360 deg."
     )
     yield _signature(flown)
+    swings = " The Sun angle is that of H; the spin axis swings about it by the nutation."
     yield Prose(
-        "Gyro, square to axis 3: the largest transverse rate on the coast; it comes and goes with the period in the "
-        "body. Gyro, axis 3: the spin. The Sun angle is that of H; the spin axis swings about it by the nutation."
-        if body.sun is not None
-        else "Gyro, square to axis 3: the largest transverse rate on the coast; it comes and goes with the period in "
-        "the body. Gyro, axis 3: the spin."
+        "Gyro, square to axis 3: the largest transverse rate on the coast; about a fixed axis it oscillates with the "
+        "period given. Gyro, axis 3: the spin." + swings * (body.sun is not None)
     )
     if dispersed is not None:
         yield from _criteria(flown, dispersed)
@@ -88,12 +86,13 @@ def _firing(flown: Flight) -> Sheet:
 
 
 def _signature(flown: Flight) -> Sheet:
-    """One row before the first pulse, and one after each pulse or block: what gyros and Sun sensor should show."""
+    """One row for the coast before the first pulse or block, and one for that after each: what sensors should show."""
     body, made = flown.spacecraft, flown.schedule
     before, after = flown.around_pulses()
     counts = np.cumsum([block.count for block in made.blocks]) if made.blocks else np.arange(1, len(made) + 1)
     rows = counts - 1
-    names = [f"{'block' if made.blocks else 'pulse'} {index}" for index in range(1, len(counts) + 1)]
+    fired = "block" if made.blocks else "pulse"
+    names = [f"before {fired} 1", *(f"after {fired} {index}" for index in range(1, len(counts) + 1))]
 
     def states(name: str) -> Vector:
         return np.concatenate([getattr(before, name)[:1], getattr(after, name)[rows]])
@@ -105,11 +104,11 @@ def _signature(flown: Flight) -> Sheet:
     in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
     periods = [f"{time:.4g}" if math.isfinite(time) else MISSING for time in in_body]
     columns: list[tuple[Column, list[str]]] = [
-        (Column("after", number=False), ["start", *names]),
+        (Column("coast", number=False), names),
         *_when(body, states("t")),
         (Column("gyro, axis 3", "rpm"), [f"{spin * RPM:.5g}" for spin in spins.tolist()]),
         (Column("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
-        (Column("its period in the body", "s"), periods),
+        (Column("period of that rate", "s"), periods),
         (Column("nutation", "deg"), _plain(nutation)),
         (Column("nutation period", "s"), [f"{time:.4g}" for time in inertial]),
     ]

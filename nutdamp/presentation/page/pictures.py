@@ -10,7 +10,7 @@ from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan
-from nutdamp.presentation import figures
+from nutdamp.presentation import figures, geometry
 from nutdamp.presentation.figures.overview import NARROW
 from nutdamp.presentation.page.document import Picture
 from nutdamp.presentation.page.panels import picture
@@ -27,8 +27,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         (
             "motion",
             "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
-            "Axis track: the direction of the spin axis in space, with the places of the angular momentum H; "
-            "where they lie close together, they are enlarged in a panel of their own.",
+            "Axis track: the direction of the spin axis in space, with the places of the angular momentum H"
+            + (", enlarged in a panel of their own." if geometry.momentum_inset(flown, track) is not None else "."),
             "Pole curve in the body and track of the spin axis in space",
         ),
         (
