@@ -20,7 +20,7 @@ from nutdamp.words import listed
 
 def check_screen(spacecraft: Spacecraft) -> RenderableType:
     """Everything that ``check`` shows of one valid file."""
-    more = (*_spin_axis(spacecraft), *_sun_pulses(spacecraft))
+    more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft))
     parts: list[RenderableType] = [header(spacecraft, more)]
     if spacecraft.channels:
         parts += [Text(), channel_table(spacecraft)]
@@ -54,7 +54,7 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
 
 
-def _sun_pulses(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     """When Sun pulses come, and how finely blocks are timed by them."""
     clock, sensor, commands = survey.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
     if clock is None or sensor is None:
@@ -68,6 +68,12 @@ def _sun_pulses(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             f"{duration(time)} = {degrees(spin * time)}" for time in (commands.delay_step, commands.delay_max)
         )
         yield "delay", f"in steps of {step} of spin, up to {longest}"
+        widths = [duration(width) for width in commands.widths.tolist()]
+        step_of_widths = commands.width_step
+        if step_of_widths is None:
+            yield "width", listed(widths, "or")
+        else:
+            yield "width", f"in steps of {duration(step_of_widths)}, {widths[0]} to {widths[-1]}"
         every = listed([str(one) for one in commands.every], "or")
         yield "block", f"up to {commands.max_count} pulses, one every {'spin' if every == '1' else f'{every} spins'}"
 

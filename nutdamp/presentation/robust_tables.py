@@ -87,8 +87,8 @@ def proved(found: Certificate | None) -> str:
     spent = cost(found.plan.pulses.cost_in(unit), unit)
     return (
         "Certificate: no firing that keeps the requirement to first order with the margin of this plan, "
-        f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; one that costs {100.0 * gap:.2g} % more is "
-        f"known, and the plan, refined on the true motion, takes {spent}. It does not prove that "
+        f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; a firing of that program costs "
+        f"{100.0 * gap:.2g} % more, and the plan, refined on the true motion, takes {spent}. It does not prove that "
         f"{verdicts.exact_percent(found.probability)} of cases comply."
     )
 
@@ -99,7 +99,7 @@ def _fresh(found: RobustComparison) -> str:
         return ""
     met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
     return (
-        f"Of {found.fresh.samples:,} new cases (seed {found.fresh.seed}), by which it was not chosen, {met} comply; "
+        f"Of {found.fresh.samples:,} new cases (seed {found.fresh.seed}), not used for the choice, {met} comply; "
         f"95 % interval {low} to {high}."
     )
 

@@ -70,6 +70,8 @@ def test_the_spacecraft_stands_there_whole() -> None:
     assert found["mass"] == "611.7 kg"
     assert found["epoch"] == "2012-11-13T12:00:00Z"
     assert found["frame"] == "EME2000"
+    assert found["Sun sensor"].startswith("at azimuth 0 deg")
+    assert found["width"] == "in steps of 30 ms, 60 ms to 0.48 s"
     heads, first, *_ = table(ace(), "Thrusters")
     assert dict(zip(heads, first, strict=True)) == {
         "thruster": "P1",

@@ -39,7 +39,7 @@ def certificate_figure(found: Certificate) -> Figure:
     for axes in panels:
         _draw(axes, found, 1.0 if axes is panels[-1] and closer else last / found.spacecraft.body_period)
     if closer:
-        panels[0].set_title("as long as first order is good" if sure else "until the horizon")
+        panels[0].set_title("as long as first order holds" if sure else "until the horizon")
         panels[1].set(title="until the last pulse of the plan", xlim=(-0.03 * end, 1.06 * end))
     panels[-1].set_xlabel("time, s")
     figure.supylabel("q: worth of a second over what it costs", fontsize=style.TICK_SIZE)

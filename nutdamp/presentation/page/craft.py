@@ -10,7 +10,13 @@ import numpy as np
 from nutdamp import survey
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
-from nutdamp.presentation.check_tables import channel_table, disturbance_table, thrust_changes, valve_table
+from nutdamp.presentation.check_tables import (
+    channel_table,
+    disturbance_table,
+    sun_pulse_facts,
+    thrust_changes,
+    valve_table,
+)
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
@@ -34,7 +40,9 @@ def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
 
 def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
     """The spacecraft at t = 0, its requirement, and the limits of its plans."""
-    return facts_of(title, derived_table(spacecraft, (*_body(spacecraft), *_limits(spacecraft))))
+    return facts_of(
+        title, derived_table(spacecraft, (*_body(spacecraft), *_limits(spacecraft), *sun_pulse_facts(spacecraft)))
+    )
 
 
 def _body(body: Spacecraft) -> Iterator[tuple[str, str]]:
@@ -77,7 +85,7 @@ def thruster_sheet(body: Spacecraft) -> Sheet:
     columns = [Column("thruster", number=False), *(Column(name, unit, number=False) for name, unit in names)]
     columns += [Column("isp", "s"), Column("on-time", number=False), Column("channels", number=False)]
     rows = tuple((*_thruster(one, body), _channels(one, body)) for one in thrusters.values())
-    return Sheet("Thrusters, in the axes of the file", tuple(columns), rows)
+    return Sheet("Thrusters of the channels, in the axes of the file", tuple(columns), rows)
 
 
 def _thruster(one: Thruster, body: Spacecraft) -> tuple[str, ...]:
