@@ -13,7 +13,8 @@ from nutdamp.fronts import Front, Point, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import NOT, header
-from nutdamp.presentation.text import cost, degrees, moment
+from nutdamp.presentation.text import cost, degrees, duration, moment
+from nutdamp.recommendation import SAME_ANGLE
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 
@@ -59,26 +60,44 @@ def fails(point: Point) -> bool:
 
 
 def beats(found: Sequence[Front], chosen: Plan) -> str:
-    """Which schedule of the fronts meets the requirement, costs less than the ``chosen`` one and ends no later.
+    """Which schedule of the fronts is better than the ``chosen`` one, with the command that plans it; or nothing.
 
-    Empty where none does. The cheapest of them is named, with the command that plans it.
+    It meets the requirement, and costs less and ends no later, or costs as much, leaves as little shift of H and ends
+    sooner. The cheapest is named, of those that cost as much the one that ends first.
     """
+    unit, until = next(((point.unit, chosen.pulses.end) for _, _, point in numbered(found)), ("", 0.0))
     better = [
-        (index, front, point, 1.0 - point.cost / chosen.pulses.cost_in(point.unit))
+        (saved if saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point)
         for index, front, point in numbered(found)
-        if point.plan.meets_requirement and point.plan.kept is not False and point.plan.pulses.end <= chosen.pulses.end
+        if point.plan.meets_requirement and point.plan.kept is not False
+        for saved in [1.0 - point.cost / chosen.pulses.cost_in(unit)]
+        if (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]
-    better = [one for one in better if one[3] > SAME_COST]
     if not better:
         return ""
-    index, front, point, saved = max(better, key=lambda one: one[3])
+    saved, earlier, index, front, point = max(better, key=lambda one: one[:2])
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     within = f'--set "limits.horizon={point.horizon:.6g} s"'
     name = front_name(front, pointing=chosen.spacecraft.goal.axis is not None)
-    return (
-        f"point {index} meets the requirement too, costs {100.0 * saved:.2g} % less than the recommended plan and ends "
-        f"no later ({name}): plan --scheme {point.plan.scheme} {options}{within}."
+    how = (
+        f"costs {100.0 * saved:.2g} % less than the recommended plan and ends no later"
+        if saved
+        else f"costs as much as the recommended plan and ends {duration(earlier)} earlier"
     )
+    return (
+        f"point {index} meets the requirement too, {how} ({name}): plan --scheme {point.plan.scheme} {options}{within}."
+    )
+
+
+def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
+    """Whether a plan that saves that share of the cost, about none, ends clearly sooner and leaves H as near."""
+    shifts = [one.flight.residual.axis_error for one in (plan, chosen)]
+    ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
+    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= shifts[1] + SAME_ANGLE
+
+
+SOONER = 0.05
+"""Share of its time by which a plan that costs as much has to end sooner to be worth a remark."""
 
 
 def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:

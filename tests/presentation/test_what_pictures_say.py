@@ -111,6 +111,16 @@ def test_a_cheaper_schedule_that_ends_no_later_is_named_beside_the_recommended_o
     assert beats(fronts_of(body, (1.0, 1.1)), chosen) == ""
 
 
+def test_a_schedule_as_cheap_that_ends_sooner_is_named_beside_the_recommended_one() -> None:
+    """The same two pulses a nutation period earlier."""
+    body = replace(BODY, requirement=Requirement(nutation=math.radians(30.0)))
+    late = replace(body, limits=replace(body.limits, earliest=body.nutation_period))
+    chosen = compare(late, ["two-pulse"])["two-pulse"]
+    said = beats(fronts_of(body, (1.0,)), chosen)
+    assert "point 1 meets the requirement too, costs as much as the recommended plan and ends 6.283 s earlier" in said
+    assert beats(fronts_of(body, (1.0,)), compare(body, ["two-pulse"])["two-pulse"]) == ""
+
+
 def test_costs_below_their_first_order_least_are_explained() -> None:
     for share, explained in ((0.9, True), (1.1, False)):
         texts = [str(part) for part in front_parts(BODY, fronts_of(BODY, (share,)))]
