@@ -146,6 +146,9 @@ def test_a_cone_that_is_broken_is_not_met_whatever_is_left() -> None:
         f"{math.degrees(found.least) - 16.0:.4g} deg",
         "NOT kept",
     ]
+    flown = Decision(broken.plan, counted(0.714, 0.9, 0.1))  # cones count in each case; the row is of nominal values
+    (verdict_column,) = (list(column.cells) for column in decisions.decision_table(flown).columns[-1:])
+    assert str(verdict_column[-2]) == "NOT kept (nominal)"
     nothing_required = Decision(replace(broken.plan, spacecraft=replace(watched(16.0), requirement=None)))
     assert nothing_required.met is False
 

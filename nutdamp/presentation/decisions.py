@@ -77,7 +77,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
     for one in decision.aspects:
         for bound, angle, left in cone_margins(one):
             kept, none = left >= -SLACK, [""] * (cases is not None)
-            said = coloured(KEPT[kept], kept)
+            said = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
             table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
