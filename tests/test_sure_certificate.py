@@ -253,7 +253,10 @@ def test_the_command_writes_the_file_of_the_robust_plan_and_draws_its_curve(tmp_
     assert content["plan"]["cost"] == pytest.approx(chosen["propellant_kg"])
     assert content["probability"] == 0.997
     screen = " ".join(result.stdout.split())
-    assert f"{content['margin_sigmas']:.4g} σ, costs less than {1e3 * bound:.4g} g; a firing of that program costs" in screen
+    assert (
+        f"{content['margin_sigmas']:.4g} σ, costs less than {1e3 * bound:.4g} g; a firing of that program costs"
+        in screen
+    )
     assert "It does not prove that 99.7 % of cases comply." in screen
     assert "first-order least (margin" in picture.read_text()
 
