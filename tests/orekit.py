@@ -42,7 +42,8 @@ def start() -> None:
     orekit_jpype.initVM(vmargs="-Xshare:auto")
     jpype = import_module("jpype")
     # The machine ends with the process: torn down before, beside the threads of other libraries, it may crash it.
-    import_module("jpype.config").destroy_jvm = False
+    settings: Any = import_module("jpype.config")
+    settings.destroy_jvm = False
     folder = Path(tempfile.mkdtemp(prefix="orekit-data-"))
     (folder / "tai-utc.dat").write_text(tai_utc(), encoding="ascii")
     crawler = jpype.JClass("org.orekit.data.DirectoryCrawler")(jpype.JClass("java.io.File")(str(folder)))
