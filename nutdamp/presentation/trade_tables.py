@@ -65,12 +65,12 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
     It meets the requirement, and costs less and ends no later, or costs as much, leaves as little shift of H and ends
     sooner. The cheapest is named, of those that cost as much the one that ends first.
     """
-    unit, until = next(((point.unit, chosen.pulses.end) for _, _, point in numbered(found)), ("", 0.0))
+    until = chosen.pulses.end
     better = [
         (saved if saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point)
         for index, front, point in numbered(found)
         if point.plan.meets_requirement and point.plan.kept is not False
-        for saved in [1.0 - point.cost / chosen.pulses.cost_in(unit)]
+        for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
         if (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]
     if not better:
