@@ -163,6 +163,7 @@ def check(cases: list[Case], periods: float) -> int:
     return compared
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("batch", some(range(12), always=1))
 def test_25_random_cases_over_10_periods(batch: int) -> None:
     rng = np.random.default_rng(1970 + batch)

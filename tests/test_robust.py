@@ -146,6 +146,7 @@ def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
         assert found.meets_requirement
 
 
+@pytest.mark.slow
 def test_the_plan_chosen_flies_cases_that_are_new_to_the_choice() -> None:
     example = read_spacecraft(example_text(), "example.yaml")
     found = planned(example, ("two-pulse",))
@@ -158,6 +159,7 @@ def test_the_plan_chosen_flies_cases_that_are_new_to_the_choice() -> None:
     assert planned(replace(example, requirement=None), ("two-pulse",)).fresh is None
 
 
+@pytest.mark.slow
 def test_the_plan_in_which_most_cases_comply() -> None:
     """Whatever the nominal plan costs; of those within the sampling error of the best the cheapest."""
     narrow = Requirement(math.radians(0.4), math.radians(0.3))

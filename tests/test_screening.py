@@ -28,7 +28,7 @@ def example(requirement: Requirement | None) -> Spacecraft:
     return replace(read_spacecraft(example_text(), "example.yaml"), requirement=requirement)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "requirement",
     [

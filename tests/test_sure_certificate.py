@@ -85,7 +85,7 @@ def text_of(name: str, margin: float = MARGIN) -> str:
     return json_text(certificate_json(certificate(a_plan(bodies()[name], margin))))
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", bodies())
 def test_the_file_alone_proves_the_bound(name: str) -> None:
     content = json.loads(text_of(name))
@@ -95,6 +95,7 @@ def test_the_file_alone_proves_the_bound(name: str) -> None:
     assert "not_proved" in content
 
 
+@pytest.mark.slow
 def test_more_margin_never_costs_less() -> None:
     least = [check(text_of("built-in example", margin)) for margin in (0.0, 1.5, 3.0)]
     assert least == sorted(least)
@@ -242,6 +243,7 @@ def test_a_margin_that_cannot_be_kept_has_no_certificate() -> None:
         certificate(a_plan(bodies()["built-in example"], 60.0))
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_file_of_the_robust_plan_and_draws_its_curve(tmp_path: Path) -> None:
     file, picture = tmp_path / "proof.json", tmp_path / "primer.svg"
     command = ["plan", "--quiet", "--robust", "--scheme", "optimal", "--certificate", str(file)]
@@ -261,6 +263,7 @@ def test_the_command_writes_the_file_of_the_robust_plan_and_draws_its_curve(tmp_
     assert "first-order least (margin" in picture.read_text()
 
 
+@pytest.mark.slow
 def test_a_robust_plan_that_is_not_of_the_program_has_none(tmp_path: Path) -> None:
     """Where nothing is required there is no margin to keep."""
     command = ["plan", "--robust", "--set", "requirement={}", "--certificate", "proof.json"]

@@ -122,6 +122,7 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
     assert costs[0] < 0.8 * body.least_impulse  # a quarter of the nutation may stay
 
 
+@pytest.mark.slow
 def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme() -> None:
     """85.6 % of cases comply with two-pulse, and with less of any other scheme or variant."""
     body = read_spacecraft(example_text(), "example.yaml")

@@ -167,6 +167,7 @@ def test_the_warning_names_what_stands_in_the_way(
     assert text in verdicts.warnings(compared)[0]
 
 
+@pytest.mark.slow
 def test_no_scheme_is_said_to_leave_the_least_where_another_leaves_less() -> None:
     """ACE: all of them end on ticks, one leaves least; each names what rounding can leave, which is more."""
     body = nutdamp.load(Path(__file__).parent.parent / "configs" / "ace.yaml")

@@ -72,6 +72,7 @@ def test_the_file_written_keeps_comments_and_moves_to_an_epoch(run: Run, tmp_pat
     assert {(one, other): value for one, other, value in known.correlation}["A", "C"] > 0.999
 
 
+@pytest.mark.slow
 def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_path: Path) -> None:
     blind = run("disperse", "-q", "--set", "requirement.probability=99.7%", "--json", "blind.json")
     assert blind.returncode == 4

@@ -28,7 +28,7 @@ def odd(run: Run, tmp_path: Path) -> str:
     return ODD
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -164,7 +164,7 @@ def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, a
     assert left(tmp_path) == []
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("output", some(["report.html", "-"], always=1))
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
 def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str, package: str) -> None:

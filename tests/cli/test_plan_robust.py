@@ -59,7 +59,7 @@ def test_the_same_again(run: Run, sat: Path) -> None:
     assert run(*arguments).stdout == run(*arguments).stdout
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "status"), [(3.0, 0), (0.001, 4)])
 def test_the_requirement_with_its_probability(run: Run, sat: Path, degrees: float, status: int) -> None:
     requirement = f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\n"

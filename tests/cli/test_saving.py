@@ -91,6 +91,7 @@ root.main()
 """
 
 
+@pytest.mark.few(1)
 @POSIX
 @pytest.mark.parametrize(
     ("arguments", "module", "function"),

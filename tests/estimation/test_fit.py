@@ -64,6 +64,7 @@ def scores(seeds: Iterable[int]) -> list[Score]:
     return [score(gyro_case(seed)) for seed in seeds]
 
 
+@pytest.mark.slow
 def test_the_true_values_of_eight_records_are_in_the_95_percent_region() -> None:
     """All but one at most: 7.6 are expected."""
     assert sum(one.inside for one in scores(range(8))) >= 7

@@ -65,7 +65,7 @@ def test_two_hundred_records_of_every_kind_are_in_their_regions(tmp_path: Path) 
     assert np.mean(off**2, axis=0) == pytest.approx(1.0, abs=0.35)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1311, 1323, 12])
 def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(tmp_path: Path, seed: int) -> None:
     """Turned by whole turns besides, or from far off: the search must reach the least cost there is."""

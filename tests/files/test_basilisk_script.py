@@ -54,13 +54,14 @@ def check(plan: Plan, folder: Path) -> None:
     }
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.basilisk
 @pytest.mark.parametrize("case", some(messages.CASES, always=4))
 def test_the_residual_is_that_of_the_plan(case: str, tmp_path: Path) -> None:
     check(messages.planned(case), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.basilisk
 def test_ideal_impulses_and_disturbances(tmp_path: Path) -> None:
     ideal = planning.plan(replace(messages.spacecraft("prolate"), steerable=None), "one-pulse")
@@ -73,7 +74,7 @@ def test_ideal_impulses_and_disturbances(tmp_path: Path) -> None:
     check(disturbed, tmp_path)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.basilisk
 @pytest.mark.parametrize("case", ["prolate", "tilted tensor, backwards", "ace"])
 def test_a_schedule_that_leaves_nutation(case: str, tmp_path: Path) -> None:

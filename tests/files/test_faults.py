@@ -144,6 +144,7 @@ def judge(outcome: Callable[[], Spacecraft]) -> None:
         assert str(fault).encode()
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=mutated())
 def test_a_mutated_example_is_read_or_refused(data: bytes, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ CASES = {
 }
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_dop853_fires_alike(name: str) -> None:
     found = verify_loop(CASES[name], 40.0)

@@ -54,6 +54,7 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     assert all(ring.get_markersize() > mark.get_markersize() for ring in rings for mark in marks)
 
 
+@pytest.mark.slow
 def test_the_recommended_plan_is_marked_among_the_trade() -> None:
     chosen: Plan | None = compared().recommended
     assert chosen is not None

@@ -68,6 +68,7 @@ def test_four_pulses_of_lunar_prospector_take_as_much_propellant_as_reported() -
     assert made.schedule.propellant == pytest.approx(0.01, abs=0.005)
 
 
+@pytest.mark.slow
 def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
     """The turn of report 30, 8.5 deg, as a user asks for it: the plan has its 40 pulses of 0.2 s, in one block."""
     goal = ("--target", "270deg,75.06deg", "--set", "state.nutation=0deg", "--max-blocks", "1")

@@ -104,7 +104,7 @@ def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: 
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
 @pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
 def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:

@@ -118,6 +118,7 @@ def every_plan_keeps_its_bound(seed: int) -> int:
     return feasible
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", some(range(0, 80, 8)))
 def test_no_plan_of_any_scheme_is_below_its_bound(first: int) -> None:
     assert sum(every_plan_keeps_its_bound(seed) for seed in range(first, first + 8)) > 8

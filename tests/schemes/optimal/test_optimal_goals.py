@@ -64,7 +64,7 @@ def spin_thrusters() -> tuple[Channel, ...]:
     return (*thrusters(), *pair)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize("factor", some([0.7, 1.0, 1.02, 1.4], always=2))
 def test_the_spin_ends_as_asked(spin: float, factor: float) -> None:
