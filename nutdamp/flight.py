@@ -28,11 +28,20 @@ IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
 """The two models by which a schedule is flown."""
 
+IDEAL_IMPULSES = "exact motion, ideal impulses"
+"""How the second model is named to people where no pulse has a width."""
+
 PLANNED_STEPS = 30_000
 """Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
 
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
 """Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+
+
+def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
+    """By which model ``schedules`` are flown, as people read it: widths are named where a pulse has one."""
+    wide = model != REAL_WIDTHS or any(pulse.on_time for schedule in schedules for pulse in schedule)
+    return model if wide else IDEAL_IMPULSES
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,8 +88,15 @@ def fronts(
     others = _others(spacecraft, options) if why else []
     unit = "N m s" if options.least == "impulse" else _unit([*(one for _, one, _ in found), *others])
     result: list[Front] = []
+    made_for = [(kept, Point(one, horizon, unit)) for kept, one, horizon in found]
     for shift in ordered:
-        points = [Point(one, horizon, unit) for kept, one, horizon in found if kept <= shift or _keeps(one, shift)]
+        own = [point for kept, point in made_for if kept <= shift]
+        others_too = [
+            point
+            for kept, point in made_for
+            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, one) for one in own))
+        ]
+        points = [*own, *others_too]
         if not points:
             points = [Point(one, spacecraft.horizon, unit) for one in others if _keeps(one, shift)]
         kept = undominated(points, result[-1].points if result else ())
@@ -111,6 +118,13 @@ def _by_others(points: Sequence[Point]) -> bool:
 def _keeps(one: Plan, shift: float) -> bool:
     """Whether H ends no farther from its target than ``shift`` rad."""
     return one.flight.residual.axis_error <= shift + LEFT
+
+
+def _serves(point: Point, instead_of: Point) -> bool:
+    """Whether a schedule costs as little, ends as soon and leaves H as near: on ticks none leaves it just there."""
+    one, other = point.plan, instead_of.plan
+    as_near = one.flight.residual.axis_error <= other.flight.residual.axis_error
+    return as_near and one.pulses.end <= other.pulses.end and point.cost <= instead_of.cost
 
 
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:

@@ -25,6 +25,9 @@ AGREE = 1e-9
 """rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
 
 
+IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"
+"""The rows of the budget that every schedule has, besides pulse width."""
+
 WITHOUT = "without "
 """How the rows of the budget begin that leave out what plans include."""
 
@@ -246,13 +249,13 @@ def _budget(
     inertia = spacecraft.inertia
     ideal = spacecraft if expected else replace(spacecraft, disturbances=())
     sharp = _sharp(ideal, exact)
-    rows = [("none: ideal impulses", ideal, sharp), ("pulse width", ideal, exact)]
+    rows = [(IDEAL, ideal, sharp), ("pulse width", ideal, exact)]
     if spacecraft.limits.tick is not None:
         rounded = Schedule(supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact)))
         rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
     if spacecraft.disturbances and not expected:
         rows.append(("disturbances", spacecraft, sharp))
-    rows.append(("all: as flown", spacecraft, schedule))
+    rows.append((AS_FLOWN, spacecraft, schedule))
     if any(pulse.impulse[2] != 0.0 for pulse in exact):
         rows.append((f"{WITHOUT}axial torque", ideal, _sharp(ideal, _transverse(exact))))
     if not inertia.symmetric:

@@ -214,3 +214,17 @@ def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch:
     assert "no schedule of optimal: " in said
     assert "the search ended at its limit of work" in said
     assert "two-pulse" in said or "four-pulse" in said
+
+
+@pytest.mark.slow
+def test_no_front_holds_what_a_schedule_of_another_front_beats_in_everything() -> None:
+    """On ticks no schedule leaves H just where it was: one that leaves it as near, as soon and as cheaply counts."""
+    body = nutdamp.load(CONFIGS / "couples-minisat.yaml")
+    found = fronts.fronts(body, OptimalOptions(), count=6, shifts=(0.0, math.inf))
+    points = [point for front in found for point in front.points]
+    for point in points:
+        for other in points:
+            same = math.isclose(point.cost, other.cost, rel_tol=SAME_COST)
+            sooner = other.plan.end < 0.999 * point.plan.end
+            near = other.plan.flight.residual.axis_error <= point.plan.flight.residual.axis_error
+            assert not (near and sooner and (same or other.cost < point.cost))

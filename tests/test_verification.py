@@ -25,11 +25,11 @@ from nutdamp.errors import MissingExtra
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.presentation.verify_tables import conservation, verdict
+from nutdamp.presentation.verify_tables import budget_note, conservation, verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
 from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
-from nutdamp.verification import AGREE, Conservation, Verification, verify
+from nutdamp.verification import AGREE, AS_FLOWN, IDEAL, Conservation, Imperfection, Verification, verify
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 
@@ -323,3 +323,13 @@ def test_what_is_conserved_is_no_number_of_noughts(
     found = Verification((), Conservation("|H|", momentum), Conservation("energy", energy, changed), ())
     assert said in conservation(found)
     assert found.drifting == (("|H|",) if momentum > AGREE else ())
+
+
+@pytest.mark.parametrize(("ideal", "flown", "said"), [(1e-4, 1e-6, True), (1e-6, 1e-4, False), (1e-4, 1e-4, False)])
+def test_ideal_impulses_that_leave_more_than_the_flown_pulses_are_explained(
+    ideal: float, flown: float, said: bool
+) -> None:
+    rows = (Imperfection(IDEAL, 0.0, ideal, ideal), Imperfection(AS_FLOWN, 0.0, flown, flown))
+    kept = Conservation("|H|", 0.0, ())
+    note = budget_note(Verification((), kept, kept, rows))
+    assert note.startswith("As ideal impulses the pulses leave more than as flown") == said

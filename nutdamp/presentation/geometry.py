@@ -291,3 +291,9 @@ def around(axis: Vector, start: Vector) -> Vector:
     return np.asarray(
         axis * (axis @ start) + np.cos(turn) * square + np.sin(turn) * np.cross(axis, square), dtype=np.float64
     )
+
+
+def closed(spacecraft: Spacecraft, until: float) -> list[tuple[float, float]]:
+    """Begin and end, s, of the times to ``until`` s in which no pulse may be on."""
+    windows = [(0.0, spacecraft.limits.earliest), *spacecraft.limits.blackout]
+    return [(begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins]

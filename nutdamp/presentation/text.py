@@ -28,6 +28,11 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     return f"{value:.{digits}g} {unit}"
 
 
+def digits(value: float, count: int) -> str:
+    """A number to ``count`` figures, final zeros too, for columns and labels where the others have as many."""
+    return f"{value:#.{count}g}".rstrip(".")
+
+
 def sentence(clause: str) -> str:
     """A clause with a capital letter, unless it begins with a key of the file, and a full stop, unless it asks."""
     first, _, _ = clause.partition(" ")

@@ -15,8 +15,10 @@ from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import NOT, header
 from nutdamp.presentation.text import cost, degrees, duration, moment
 from nutdamp.recommendation import SAME_ANGLE
+from nutdamp.schedule import STEERABLE
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
+from nutdamp.words import listed
 
 
 def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableType:
@@ -86,6 +88,29 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
     )
     return (
         f"point {index} meets the requirement too, {how} ({name}): plan --scheme {point.plan.scheme} {options}{within}."
+    )
+
+
+def apart(found: Sequence[Front], chosen: Plan) -> str:
+    """Why the ``chosen`` plan may cost less than the schedules that are traded: it is of another scheme; or nothing."""
+    points = [point for _, _, point in numbered(found) if point.plan.pulses.end <= chosen.pulses.end]
+    if not points or chosen.scheme in schemes_of(found):
+        return ""
+    spent, cheapest = chosen.pulses.cost_in(points[0].unit), min(point.cost for point in points)
+    if spent >= cheapest * (1.0 - SAME_COST):
+        return ""
+    reasons = []
+    if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
+        reasons.append("it fires the steerable torquer, which the schedules of the trade do not")
+    left = max(point.plan.flight.residual.nutation for point in points)
+    if chosen.flight.residual.nutation > left + SAME_ANGLE:
+        reasons.append(
+            f"it leaves {degrees(chosen.flight.residual.nutation)} of nutation, they at most {degrees(left)}"
+        )
+    because = f": {listed(reasons)}" if reasons else ""
+    return (
+        f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than the "
+        f"schedules of the trade that end no later, and is not among them{because}."
     )
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -10,8 +13,11 @@ from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import header
 from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.spacecraft import Spacecraft
-from nutdamp.verification import AGREE, WITHOUT, Conservation, Verification
+from nutdamp.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.words import listed
+
+SHOWN = 1e-9 * math.pi / 180.0
+"""rad; differences that people see."""
 
 
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
@@ -87,10 +93,22 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
 
 
 def budget_note(found: Verification) -> str:
-    """What the rows that leave something out are, in a sentence; empty where nothing is left out."""
+    """What the rows that leave something out are, and why ideal impulses may leave more; empty where neither is so."""
     names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
-    if not names:
-        return ""
+    ideal, flown = (next(row for row in found.budget if row.name == name) for name in (IDEAL, AS_FLOWN))
+    notes = []
+    if max(ideal.nutation - flown.nutation, ideal.axis_error - flown.axis_error) > SHOWN:
+        notes.append(
+            "As ideal impulses the pulses leave more than as flown: plans are tuned to the widths that are fired, so "
+            "that the rows do not add up."
+        )
+    if names:
+        notes.append(_without(names))
+    return " ".join(notes)
+
+
+def _without(names: Sequence[str]) -> str:
+    """What rows without ``names`` are."""
     return (
         f"Plans are checked by flights with {listed(names)}, on which most schemes correct them; a row 'without' shows "
         f"what the same pulses leave on a body without {'them' if len(names) > 1 else 'it'}, which may be more or less."

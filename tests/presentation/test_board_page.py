@@ -143,7 +143,7 @@ def test_equations_and_symbols_are_those_of_the_guide() -> None:
     (listing,) = (one.text for one in ace().all("pre") if "M(17)" in one.text)
     for number in ("M(1)", "M(17)", "M(18)", "M(19)"):
         assert re.search(rf"^{re.escape(number)} ", listing, re.MULTILINE)
-    assert facts(ace(), "Symbols")["J_v"] == "impulse of pulse v, J1 + i J2, N m s"
+    assert facts(ace(), "Symbols")["J_v"] == "impulse of pulse v, N m s: about axis 1, + i times that about axis 2"
 
 
 @pytest.mark.slow

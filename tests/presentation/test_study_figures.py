@@ -30,6 +30,7 @@ from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.figures import dispersion as drawing
 from nutdamp.presentation.figures import schemes
+from nutdamp.presentation.figures.style import PULSE
 from nutdamp.presentation.tolerance_tables import budget_rows, in_words
 from nutdamp.presentation.trade_tables import fails
 from nutdamp.recommendation import Standing
@@ -374,7 +375,10 @@ def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
     assert share is not None
     assert dots(axes)["two-pulse"][0] == pytest.approx(100.0 * share)
     assert set(dots(axes)) == {"two-pulse", chosen.scheme}
-    assert all((mark in "xX") == (share < 0.997) for _, mark, _ in dots(axes).values())
+    assert share < 0.997
+    assert all(mark in "xX" for _, mark, _ in dots(axes).values())
+    rows = [text.get_text() for text in axes.get_yticklabels()]
+    assert {row.partition("\n")[0] for row in rows if "too few cases comply" in row} == {"two-pulse", chosen.scheme}
     assert axes.get_xlim()[1] < 105.0
     assert line(axes, "required")[0, 0] == pytest.approx(99.7)
 
@@ -398,7 +402,10 @@ def test_a_scheme_that_breaks_a_cone_is_marked_as_not_met() -> None:
     assert any(plan.meets_requirement for plan in found.plans)
     figure = figures.schemes_figure(found)
     check_layout(figure)
-    assert all(mark in "xX" for axes in figure.axes for _, mark, _ in dots(axes).values())
+    # Below the scale a mark points there, in the colour of the others that fail.
+    assert all(mark in "xX<" for axes in figure.axes for _, mark, _ in dots(axes).values())
+    marks = [one for axes in figure.axes for one in axes.lines if str(one.get_marker()) in "oxX<"]
+    assert {one.get_color() for one in marks if len(np.asarray(one.get_xdata()))} == {PULSE}
     assert all(fails(Point(plan, 100.0, "N m s")) for plan in found.plans)
 
 

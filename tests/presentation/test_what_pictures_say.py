@@ -20,9 +20,9 @@ from nutdamp.presentation.page.document import Prose
 from nutdamp.presentation.page.html import block_html
 from nutdamp.presentation.page.pictures import dispersion_pictures_of
 from nutdamp.presentation.page.scales import strip_of
-from nutdamp.presentation.trade_tables import BELOW, beats, front_parts
+from nutdamp.presentation.trade_tables import BELOW, apart, beats, front_parts
 from nutdamp.schedule import Bounds, Schedule
-from nutdamp.spacecraft import Inertia, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft import Inertia, Limits, Requirement, Spacecraft, Steerable
 from nutdamp.tolerances import Dispersions, Tolerance
 
 BODY = spinner(channels=cross(20.0))
@@ -120,6 +120,41 @@ def test_a_schedule_as_cheap_that_ends_sooner_is_named_beside_the_recommended_on
     said = beats(fronts_of(body, (1.0,)), chosen)
     assert "point 1 meets the requirement too, costs as much as the recommended plan and ends 6.283 s earlier" in said
     assert beats(fronts_of(body, (1.0,)), compare(body, ["two-pulse"])["two-pulse"]) == ""
+
+
+def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> None:
+    body = replace(BODY, steerable=Steerable(20.0))
+    chosen = planning.plan(body, "one-pulse")
+    assert {pulse.channel for pulse in chosen.pulses} == {"steerable"}
+    dearer = fronts_of(BODY, (1.0,))
+    spent = dearer[0].points[0].plan.pulses.cost_in("N m s")
+    cheap = replace(chosen, schedule=replace(chosen.pulses, pulses=tuple(
+        replace(one, impulse=one.impulse * 0.9 * spent / chosen.pulses.total_impulse, t=one.t + 60.0)
+        for one in chosen.pulses
+    )))  # fmt: skip
+    said = apart(dearer, cheap)
+    assert said.startswith("the recommended plan, by one-pulse, costs 10 % less than the schedules of the trade that")
+    assert "it fires the steerable torquer, which the schedules of the trade do not" in said
+    assert "deg of nutation, they at most" in said
+    assert apart(dearer, dearer[0].points[0].plan) == ""
+
+
+@pytest.mark.parametrize(("torque", "model"), [(20.0, "real pulse widths"), (None, "exact motion, ideal impulses")])
+def test_titles_speak_of_widths_where_pulses_have_some(torque: float | None, model: str) -> None:
+    body = spinner(steerable=Steerable(torque))
+    compared = compare(body, ["one-pulse", "two-pulse"])
+    assert f"schemes by {model}" in " ".join(figures.schemes_figure(compared).get_suptitle().split())
+    flown = compared["two-pulse"].flight
+    drawn = figures.flight_figure("timeline", *figures.shown(compared["two-pulse"]))
+    assert f"by {model}" in " ".join(drawn.get_suptitle().split())
+    assert flown.model == "real pulse widths"
+
+
+def test_the_moving_view_has_the_times_without_firings() -> None:
+    body = replace(BODY, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0))
+    flown = flight.flown(body, Schedule(), 20.0)
+    strip, _ = strip_of(flown, flown.sampled(200, 20.0), 20.0)
+    assert strip.closed == ((0.0, 200.0), (500.0, 200.0), (1900.0, 100.0))
 
 
 def test_costs_below_their_first_order_least_are_explained() -> None:

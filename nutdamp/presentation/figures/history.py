@@ -150,7 +150,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
     axes.set_xlim(-EDGE * until, until)
     axes.set_ylim(-0.5, max(len(names), 1) - 0.1)
     named = "must not fire"
-    for begins, ends in _closed(flight, until):
+    for begins, ends in geometry.closed(flight.spacecraft, until):
         for row in rows.values():
             axes.broken_barh(
                 [(begins, ends - begins)], (row - 0.5 * BAR, BAR), facecolor="none", edgecolor=GREY, hatch="////",
@@ -166,7 +166,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
     if flight.schedule.through_valves:
         title += ": effective on-times, not the commands"
     if any(pulse.channel == STEERABLE for pulse in flight.schedule) and not brief:
-        title += ", direction of the torque from body axis +1"
+        title += ", with room: direction of the torque from body axis +1"
     axes.set_title(fill(title, int(HEADING * axes.figure.bbox.width / axes.figure.dpi)))
     if not names:
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")
@@ -193,13 +193,6 @@ def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
     if pulse.channel == STEERABLE:
         how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
     return f"{number}: {how}"
-
-
-def _closed(flight: Flight, until: float) -> list[tuple[float, float]]:
-    """Times, cut at ``until``, in which no pulse may be on."""
-    limits = flight.spacecraft.limits
-    windows = [(0.0, limits.earliest), *limits.blackout]
-    return [(begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins]
 
 
 def _numbers(axes: Axes, flight: Flight, track: Track) -> None:

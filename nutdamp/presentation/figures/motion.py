@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.flight import Flight
+from nutdamp.flight import Flight, model_name
 from nutdamp.presentation import geometry
 from nutdamp.presentation.end_tables import direction_text
 from nutdamp.presentation.figures import labels, style
@@ -54,7 +54,7 @@ def motion(flight: Flight, track: Track) -> Figure:
 def title(flight: Flight) -> str:
     """What every sheet is headed with: who is flown by which scheme and model, and with what result."""
     left, count = flight.residual, len(flight.schedule)
-    how = " ".join(filter(None, (flight.scheme, f"by {flight.model}")))
+    how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
     swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
     goal = flight.spacecraft.goal.axis
     aim = "shift of H" if goal is None else "H off the target"

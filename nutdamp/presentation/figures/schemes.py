@@ -12,6 +12,7 @@ from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
+from nutdamp.flight import model_name
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
@@ -19,6 +20,7 @@ from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, 
 from nutdamp.presentation.text import in_degrees
 from nutdamp.presentation.verdicts import percent
 from nutdamp.recommendation import Standing, by_propellant
+from nutdamp.spacecraft import Vector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +32,7 @@ DECADES = 5.0
 SPAN = 0.1
 """Of a linear axis at least, as a part of its largest value: what is equal but for rounding looks equal."""
 
-FAILS: dict[str, Any] = {"color": PULSE, "markersize": 7, "markeredgewidth": 1.6, "linestyle": ""}
+FAILS: dict[str, Any] = {"color": PULSE, "markersize": 7, "markeredgewidth": 1.6}
 """Mark of what does not meet the requirement, or does not damp."""
 
 ABREAST = 3
@@ -59,46 +61,58 @@ class Quantity(NamedTuple):
     most: float = math.inf
 
 
+class Rows(NamedTuple):
+    """The plans from above, the ``chosen`` one of them, and what is said of those that fall short, by scheme."""
+
+    plans: Sequence[Plan]
+    chosen: Plan | None
+    short: Mapping[str, str]
+
+
 @style.styled
 def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Figure:
     """Dot plots of the schemes; ``decided`` knows which cases of which scheme comply, where they were dispersed."""
     columns = _columns(compared)
     if decided is not None and decided.cases is not None and decided.shares:
         columns.append(_complying(decided.shares, decided.cases.probability))
-    plans = sorted(compared.plans, key=_place)
     chosen = compared.recommended if decided is None else decided.plan
+    short = {plan.scheme: said for plan in compared.plans if (said := _short(plan, decided))}
+    plans = sorted(compared.plans, key=lambda plan: _place(plan, short))
     abreast = min(ABREAST, -(-len(columns) // 2))
     figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
     cells = list(figure.subplots(2, abreast).flat)
     for axes, column in zip(cells, columns, strict=False):
-        _column(axes, column, plans, chosen)
+        _column(axes, column, Rows(plans, chosen, short))
     for axes in cells[len(columns) :]:
         axes.remove()
     legend(figure, cells[: len(columns)], 3)
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
-    if chosen is not None and _misses(chosen):
-        verdict += f" ({_short(chosen)})"
-    heading(figure, compared.spacecraft, f"schemes by real pulse widths\n{verdict}")
+    if chosen is not None and chosen.scheme in short:
+        verdict += f" ({short[chosen.scheme]})"
+    how = model_name(plan.pulses for plan in compared.plans)
+    heading(figure, compared.spacecraft, f"schemes by {how}\n{verdict}")
     labels.settle(figure)
     return figure
 
 
-def _place(plan: Plan) -> int:
+def _place(plan: Plan, short: Mapping[str, str]) -> int:
     """Schemes that reach more are higher up, those without a plan at the foot."""
     if not plan.feasible:
         return len(Standing)
-    return list(Standing).index(Standing.MISSES if _misses(plan) else plan.standing)
+    return list(Standing).index(Standing.MISSES if plan.scheme in short else plan.standing)
 
 
-def _misses(plan: Plan) -> bool:
-    """Whether the requirement or a cone is not kept, or nothing is damped."""
-    return plan.standing is Standing.MISSES or plan.kept is False
-
-
-def _short(plan: Plan) -> str:
-    """What is to be said of a plan that misses what is required of it or of its cases."""
-    required = compliance.required(plan.spacecraft) or plan.kept is False
-    return "requirement NOT met" if required else "does not damp"
+def _short(plan: Plan, decided: Decision | None) -> str:
+    """What is to be said of a plan that misses what is required of it or of its cases; empty where it does not."""
+    if not plan.feasible:
+        return ""
+    if plan.standing is Standing.MISSES or plan.kept is False:
+        required = compliance.required(plan.spacecraft) or plan.kept is False
+        return "requirement NOT met" if required else "does not damp"
+    if decided is None or decided.cases is None:
+        return ""
+    few = decided.shares.get(plan.scheme, 1.0) < decided.cases.probability
+    return "NOT met: too few cases comply" if few else ""
 
 
 def _columns(compared: Comparison) -> list[Quantity]:
@@ -151,28 +165,18 @@ def _complying(shares: Mapping[str, float], probability: float) -> Quantity:
     return Quantity("complying cases, %", share, text, required=100.0 * probability, most=100.0)
 
 
-def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | None) -> None:
-    values = [column.value(plan) if plan.feasible else None for plan in plans]
+def _column(axes: Axes, column: Quantity, rows: Rows) -> None:
+    values = [column.value(plan) if plan.feasible else None for plan in rows.plans]
     known = [value for value in values if value is not None]
     floor = None if column.floor is None else column.floor.least
     lines = [line for line in (floor, column.required) if line is not None]
     low = _scale(axes, [*known, *lines], column)
-    for row, (plan, value) in enumerate(zip(plans, values, strict=True)):
+    for row, (plan, value) in enumerate(zip(rows.plans, values, strict=True)):
         axes.axhline(-row, color=GREY, linewidth=0.5, alpha=0.5)
-        if value is None:
-            continue
-        few = column.most < math.inf and column.required is not None and value < column.required
-        less, place = value < low, np.array([max(value, low), -row])
-        if few or _misses(plan):
-            name = ("recommended, " if plan is chosen else "") + _short(plan)
-            axes.plot(*place, "X" if plan is chosen else "x", clip_on=False, **FAILS)
-            axes.plot([], [], "X" if plan is chosen else "x", label=name, **FAILS)
-        else:
-            face = MOTION if plan is chosen else PAPER
-            look: dict[str, Any] = {"color": MOTION, "markerfacecolor": face, "markersize": 6, "linestyle": ""}
-            axes.plot(*place, "<" if less else "o", clip_on=False, zorder=3, **look)
-            axes.plot([], [], "o", label="recommended" if plan is chosen else "other schemes", **look)
-        labels.add(axes, column.text(value), place, INK, role="vital")
+        if value is not None:
+            place = np.array([max(value, low), -row])
+            _mark(axes, place, rows.short.get(plan.scheme, ""), chosen=plan is rows.chosen, less=value < low)
+            labels.add(axes, column.text(value), place, INK, role="vital")
     if column.floor is not None:
         name = f"least to leave as little as {column.floor.scheme}"
         axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name, zorder=1.5)
@@ -180,21 +184,33 @@ def _column(axes: Axes, column: Quantity, plans: Sequence[Plan], chosen: Plan | 
         axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required", zorder=1.5)
     axes.set_xlabel(column.name)
     axes.grid(axis="x")
-    _name_rows(axes, plans, chosen)
+    _name_rows(axes, rows)
 
 
-def _name_rows(axes: Axes, plans: Sequence[Plan], chosen: Plan | None) -> None:
+def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) -> None:
+    """The mark of a plan at ``place`` (2,), and of what it says in the legend; ``less``: below the scale."""
+    look: dict[str, Any] = {"color": MOTION, "markerfacecolor": MOTION if chosen else PAPER, "markersize": 6}
+    mark, name = "o", "recommended" if chosen else "other schemes"
+    if short:
+        look, mark, name = FAILS, "X" if chosen else "x", ("recommended, " if chosen else "") + short
+    axes.plot(*place, "<" if less else mark, clip_on=False, zorder=3, linestyle="", **look)
+    axes.plot([], [], mark, label=name, linestyle="", **look)
+    if less:
+        axes.plot([], [], "<", color=GREY, markersize=6, linestyle="", label="less than the axis shows")
+
+
+def _name_rows(axes: Axes, rows: Rows) -> None:
     """Schemes beside their rows; those that fall short say so there."""
-    short = [plan.feasible and _misses(plan) for plan in plans]
-    names = [
-        f"{plan.scheme}\n{_short(plan) if fails else 'no plan'}" if fails or not plan.feasible else plan.scheme
-        for plan, fails in zip(plans, short, strict=True)
-    ]
-    axes.set_yticks(-np.arange(len(plans)), names)
-    axes.set_ylim(-len(plans) + 0.45, 0.7)
+    names = []
+    for plan in rows.plans:
+        said = rows.short.get(plan.scheme, "") if plan.feasible else "no plan"
+        names.append(f"{plan.scheme}\n{said}" if said else plan.scheme)
+    axes.set_yticks(-np.arange(len(names)), names)
+    axes.set_ylim(-len(names) + 0.45, 0.7)
     axes.tick_params(axis="y", length=0, pad=6)
-    for tick, plan, fails in zip(axes.get_yticklabels(), plans, short, strict=True):
-        tick.set(fontweight="bold" if plan is chosen else "normal", color=FIRED if fails else INK, fontsize=style.SMALL)
+    for tick, plan in zip(axes.get_yticklabels(), rows.plans, strict=True):
+        colour = FIRED if plan.scheme in rows.short else INK
+        tick.set(fontweight="bold" if plan is rows.chosen else "normal", color=colour, fontsize=style.SMALL)
 
 
 def _scale(axes: Axes, values: list[float], column: Quantity) -> float:

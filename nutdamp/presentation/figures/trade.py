@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nutdamp.flight import model_name
 from nutdamp.fronts import Front, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
-from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PAPER, PULSE
+from nutdamp.presentation.figures.style import INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
 from nutdamp.spacecraft import Spacecraft
 
@@ -50,7 +51,8 @@ def trade_figure(
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
     names = ", ".join(schemes_of(found))
-    heading(figure, spacecraft, f"what time costs, by {names}, flown by real pulse widths")
+    how = model_name(point.plan.pulses for _, _, point in numbered(found))
+    heading(figure, spacecraft, f"what time costs, by {names}, flown by {how}")
     reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, found))
     points = [point for _, _, point in numbered(found)]
     if not points:
@@ -66,7 +68,7 @@ def trade_figure(
     proved = [point.bounds.rigorous for point in points]
     if None not in proved:
         least = min(scale * value for value in proved if value is not None)
-        axes.axhline(least, color=GREY, linewidth=0.9, linestyle=":", label="no schedule takes less")
+        axes.axhline(least, color=INK, linewidth=1.0, linestyle=":", label="no schedule takes less")
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
         look: dict[str, Any] = {
@@ -76,7 +78,8 @@ def trade_figure(
             "linestyle": "",
             "zorder": 4,
         }
-        axes.plot(*place, "*", label=f"recommended: {chosen.scheme}", **look)
+        other = "" if chosen.scheme in schemes_of(found) else " (not traded)"
+        axes.plot(*place, "*", label=f"recommended: {chosen.scheme}{other}", **look)
     axes.set_xlim(right=REACH * spacecraft.horizon)
     axes.margins(y=0.12)
     axes.set_xlabel("end of the last pulse, s")

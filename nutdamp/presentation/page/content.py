@@ -45,7 +45,7 @@ from nutdamp.presentation.page.pictures import (
 )
 from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees
-from nutdamp.presentation.trade_tables import beats, front_parts
+from nutdamp.presentation.trade_tables import apart, beats, front_parts
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
@@ -187,9 +187,9 @@ def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) 
 def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:
     """What an earlier end costs, as ``trade`` has it."""
     tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
-    better = "" if compared.recommended is None else beats(traded, compared.recommended)
-    if better:
-        tables.append(Remarks((("Note", better),)))
+    chosen = compared.recommended
+    notes = [] if chosen is None else [said for say in (beats, apart) if (said := say(traded, chosen))]
+    tables += [Remarks((("Note", said),)) for said in notes]
     drawn = pictured and any(front.points for front in traded)
     pictures = (trade_picture_of(compared, traded),) if drawn else ()
     return Section("trade", "Time against cost", (*tables, *pictures))

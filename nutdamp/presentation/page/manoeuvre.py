@@ -17,7 +17,7 @@ from nutdamp.presentation.block_tables import blocks_table
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
 from nutdamp.presentation.page.sheets import on_times
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
-from nutdamp.presentation.text import MISSING, in_degrees, longitude, moment
+from nutdamp.presentation.text import MISSING, in_degrees, longitude
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -161,7 +161,7 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
 def _when(body: Spacecraft, times: Vector) -> list[tuple[Column, list[str]]]:
     """Columns of times from t = 0, and of dates where there is an epoch."""
     dates = [body.utc(time, MILLISECONDS) for time in times.tolist()]
-    columns = [(Column("time", "s"), [moment(time).removesuffix(" s") for time in times.tolist()])]
+    columns = [(Column("time", "s"), [f"{time:.4f}" for time in times.tolist()])]
     return [*columns, (Column("UTC", number=False), [date or MISSING for date in dates])] if any(dates) else columns
 
 

@@ -50,10 +50,7 @@ class Panel(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A firing in the row of its channel, in units of the SVG.
-
-    ``outside``: a required nutation that lies beyond the scale.
-    """
+    """A firing in the row of its channel, in units of the SVG."""
 
     row: int
     start: float
@@ -63,7 +60,7 @@ class Bar(NamedTuple):
 class Strip(NamedTuple):
     """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale.
+    ``outside``: a required nutation that lies beyond the scale. ``closed``: left and width of what must not fire.
     """
 
     times: Scale
@@ -73,6 +70,7 @@ class Strip(NamedTuple):
     outside: str
     channels: tuple[str, ...]
     bars: tuple[Bar, ...]
+    closed: tuple[tuple[float, float], ...]
 
 
 def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
@@ -142,5 +140,9 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         outside=most(math.radians(level)) if level is not None and not low < level < high else "",
         channels=channels,
         bars=tuple(bars),
+        closed=tuple(
+            (round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
+            for begins, ends in geometry.closed(body, until)
+        ),
     )
     return strip, [low, high]

@@ -10,7 +10,7 @@ import numpy as np
 from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
-from nutdamp.flight import Residual
+from nutdamp.flight import Residual, model_name
 from nutdamp.outcome import spin_phases
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
@@ -18,7 +18,7 @@ from nutdamp.presentation.decisions import COUNT, KEPT
 from nutdamp.presentation.end_tables import angle_names, angle_texts, bounds_text
 from nutdamp.presentation.page.document import Column, Sheet
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, ratios
-from nutdamp.presentation.text import MISSING, in_degrees, longitude
+from nutdamp.presentation.text import MISSING, digits, in_degrees, longitude
 from nutdamp.schedule import Schedule
 
 Cell = Callable[[Plan], str]
@@ -35,8 +35,9 @@ def comparison_sheet(compared: Comparison, decided: Decision | None = None) -> S
         rows.append((plan.scheme, *(cells if plan.feasible else [verdicts.no_plan(plan), *cells[1:]])))
     mark = next((index for index, plan in enumerate(compared.plans) if plan is compared.recommended), None)
     names = (Column("scheme", number=False), *(column for column, _ in columns))
+    how = model_name(plan.pulses for plan in compared.plans)
     return Sheet(
-        "What each scheme costs and leaves with nominal values, flown through the real pulse widths",
+        f"What each scheme costs and leaves with nominal values, by {how}",
         names,
         tuple(rows),
         mark,
@@ -82,7 +83,7 @@ def _share(decided: Decision, scheme: str) -> str:
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:
-    return MISSING if value is None else f"{scale * value:.4g}"
+    return MISSING if value is None else digits(scale * value, 4) if value else "0"
 
 
 def _pointing(plan: Plan, which: int) -> str:
@@ -108,7 +109,7 @@ def pulse_sheet(plan: Plan) -> Sheet:
         on_times(plan.pulses),
         *([(Column("on-time, effective", "s"), effective)] if plan.pulses.through_valves else []),
         (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
-        (Column("impulse", "N m s"), [f"{pulse.magnitude:.4g}" for pulse in pulses]),
+        (Column("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]),
     ]
     for cone in ("nutation", "body_cone", "space_cone"):
         for track, when in zip(tracks, ("before", "after"), strict=True):
