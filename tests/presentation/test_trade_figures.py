@@ -212,3 +212,17 @@ def test_a_plan_that_ends_early_is_drawn_again_where_its_pulses_can_be_told_apar
     places = closer.transData.transform(fired)
     assert closer.get_window_extent().count_contains(places) == len(places)
     assert np.diff(np.sort(places[:, 0])).min() > 10.0 * figure.dpi / 72.0
+
+
+def test_curves_of_many_periods_are_drawn_by_their_peaks() -> None:
+    """Curves would fill the panel; burns stand on the line of the peaks, which is what they cost."""
+    body = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
+    figure = figures.certificate_figure(certificate(planning.plan(body, "optimal")))
+    check_layout(figure)
+    upper, closer = figure.axes
+    assert upper.get_title().endswith("the highest of each period")
+    for axes, least in ((upper, 0.85), (closer, -1.1)):
+        values = np.concatenate([line(axes, name)[:, 1] for name in ("+1", "-1", "+2", "-2")])
+        assert values.max() == pytest.approx(1.0, abs=1e-3)
+        assert least < values.min()
+        assert (values.min() < 0.0) == (axes is closer)
