@@ -16,6 +16,7 @@ from nutdamp.comparison import compare
 from nutdamp.dispersion.study import Results, run
 from nutdamp.fronts import Front, Point
 from nutdamp.presentation import figures
+from nutdamp.presentation.figures.motion import _together
 from nutdamp.presentation.page.document import Prose
 from nutdamp.presentation.page.html import block_html
 from nutdamp.presentation.page.pictures import dispersion_pictures_of
@@ -155,6 +156,15 @@ def test_the_moving_view_has_the_times_without_firings() -> None:
     flown = flight.flown(body, Schedule(), 20.0)
     strip, _ = strip_of(flown, flown.sampled(200, 20.0), 20.0)
     assert strip.closed == ((0.0, 200.0), (500.0, 200.0), (1900.0, 100.0))
+
+
+def test_pulses_in_one_place_of_a_path_have_one_number() -> None:
+    """Three in a row at least, each beside the one before; with more than can be numbered, none are gathered."""
+    near, far = np.zeros(2), np.array([1.0, 0.0])
+    assert _together([far, near, near, near, far], 2.0) == [[0], [1, 2, 3], [4]]
+    assert _together([near, near, far, far], 2.0) == [[0], [1], [2], [3]]
+    assert _together([far * 0.09 * step for step in range(4)], 2.0) == [[0, 1, 2, 3]]
+    assert all(len(group) == 1 for group in _together([near] * 40, 2.0))
 
 
 def test_costs_below_their_first_order_least_are_explained() -> None:

@@ -28,6 +28,9 @@ ALIKE = math.radians(2.0)
 NUMBERED = 17
 """Pulses of a path that are numbered, and have arrowheads, at most."""
 
+CROWD, NEAR = 3, 0.05
+"""Pulses in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
+
 MANY = 12
 """Pulses from which on lines and arrowheads are small."""
 
@@ -154,7 +157,7 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
             fine = _refined(rows)
             style.heads(axes, fine, [len(fine) - 1], PULSE, size)
-    _number(axes, [_refined(rows) for rows in firings])
+    _number(axes, [_refined(rows) for rows in firings], width)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
         axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
@@ -165,13 +168,30 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     labels.add(axes, "t = 0", points[0], INK, role="vital")
 
 
-def _number(axes: Axes, firings: Sequence[Vector]) -> None:
-    """Numbers of pulses beside their stretches of a path, (n, 2) each."""
+def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
+    """Numbers of pulses beside their stretches of a path, (n, 2) each; first and last of those in one place."""
     some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
-    for number in style.thinned(len(firings), NUMBERED):
-        others = [rows for other, rows in enumerate(some) if other != number]
-        meant = labels.Meant(some[number], np.vstack([np.empty((0, 2)), *others]))
-        labels.add(axes, str(number + 1), firings[number][len(firings[number]) // 2], FIRED, meant=meant)
+    for group in _together([rows[len(rows) // 2] for rows in firings], width):
+        own, first, last = np.vstack([some[number] for number in group]), group[0] + 1, group[-1] + 1
+        others = [rows for other, rows in enumerate(some) if other not in group]
+        meant = labels.Meant(own, np.vstack([np.empty((0, 2)), *others]))
+        middle = firings[group[len(group) // 2]]
+        text = str(first) if first == last else f"{first}\N{EN DASH}{last}"
+        labels.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
+
+
+def _together(places: Sequence[Vector], width: float) -> list[list[int]]:
+    """The pulses to be numbered, from 0: `CROWD` or more in a row, each near the one before, have one label."""
+    numbered = style.thinned(len(places), NUMBERED)
+    if len(numbered) < len(places):
+        return [[number] for number in numbered]
+    groups: list[list[int]] = []
+    for number in numbered:
+        if groups and np.hypot(*(places[number] - places[groups[-1][-1]])) < NEAR * width:
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    return [part for group in groups for part in ([group] if len(group) >= CROWD else [[one] for one in group])]
 
 
 def _refined(rows: Vector) -> Vector:
