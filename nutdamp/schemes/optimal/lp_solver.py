@@ -51,7 +51,7 @@ class GrowingProgram:
     def __init__(self, right: Vector, limits: Vector, level: Vector) -> None:
         self._level = level
         self._costs = np.zeros(0)
-        self._highs = _silent()
+        self._highs = _SilentSolver()
         least = np.concatenate([right / level, np.full(len(limits), -highspy.kHighsInf)])
         for lower, upper in zip(least.tolist(), [*(right / level).tolist(), *limits.tolist()], strict=True):
             self._highs.addRow(lower, upper, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
@@ -108,14 +108,20 @@ class GrowingProgram:
         return found
 
 
-def _silent() -> highspy.Highs:
+class _SilentSolver(highspy.Highs):
     """A solver that prints nothing, on one thread, with a bound on its steps."""
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.setOptionValue("threads", 1)
-    highs.setOptionValue("parallel", "off")
-    highs.setOptionValue("simplex_iteration_limit", MOST_STEPS)
-    highs.setOptionValue("ipm_iteration_limit", MOST_STEPS)
-    highs.setOptionValue("dual_feasibility_tolerance", 1e-9)
-    highs.setOptionValue("primal_feasibility_tolerance", 1e-9)
-    return highs
+
+    def __init__(self) -> None:
+        highspy.Highs.__init__(self)
+        self.setOptionValue("output_flag", False)
+        self.setOptionValue("threads", 1)
+        self.setOptionValue("parallel", "off")
+        self.setOptionValue("simplex_iteration_limit", MOST_STEPS)
+        self.setOptionValue("ipm_iteration_limit", MOST_STEPS)
+        self.setOptionValue("dual_feasibility_tolerance", 1e-9)
+        self.setOptionValue("primal_feasibility_tolerance", 1e-9)
+
+    def enableCallbacks(self) -> None:
+        """Called by the constructor; in highspy 1.16 this prints a banner to stdout, where CSV and JSON go."""
+        self.setOptionValue("output_flag", False)
+        highspy.Highs.enableCallbacks(self)
