@@ -259,6 +259,11 @@ class Schedule:
         return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
 
     @property
+    def idealised(self) -> bool:
+        """Whether any of the pulses is an ideal impulse, which takes no time."""
+        return any(pulse.on_time == 0.0 for pulse in self.pulses)
+
+    @property
     def through_valves(self) -> bool:
         """Whether any of the pulses is not what it is commanded."""
         return any(pulse.command is not None for pulse in self.pulses)

@@ -63,6 +63,11 @@ def better(decision: Decision) -> str:
     return f"more cases comply with {shares} than with {decision.plan.scheme} ({verdicts.percent(own, probability)})."
 
 
+def notes(decision: Decision) -> Iterator[str]:
+    """What must be known beside the verdict: which other schemes comply more often, and what was idealised."""
+    yield from filter(None, (better(decision), verdicts.idealised(decision.plan)))
+
+
 def decision_table(decision: Decision, values: str = "nominal") -> Table:
     """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads what is left."""
     cases = decision.cases
@@ -142,10 +147,10 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
 
 
 def requirement(decision: Decision) -> Iterator[Text]:
-    """The verdict as a line of a screen, and which schemes comply more often."""
+    """The verdict as a line of a screen, and what must be known beside it."""
     yield statement(decision)
-    if better(decision):
-        yield Text.assemble(("Note: ", "bold"), better(decision))
+    for note in notes(decision):
+        yield Text.assemble(("Note: ", "bold"), note)
 
 
 def figures(decision: Decision) -> list[RenderableType]:

@@ -17,7 +17,7 @@ from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
-from nutdamp.dispersion.statistics import Array
+from nutdamp.dispersion.statistics import Array, Distribution
 from nutdamp.dispersion.study import Results, Study
 from nutdamp.flight import Flight
 from nutdamp.presentation import verdicts
@@ -25,6 +25,7 @@ from nutdamp.presentation.end_tables import bounds_text, end_table
 from nutdamp.presentation.layout import columns, facts
 from nutdamp.presentation.text import MISSING, degrees
 from nutdamp.presentation.tolerance_tables import SHOWN, budgeted_outputs, in_words, of_nominal, tolerance_budget
+from nutdamp.spacecraft import Spacecraft
 from nutdamp.words import listed
 
 if TYPE_CHECKING:
@@ -42,8 +43,9 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
     """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
+    parts += angles_note(results.study.model.spacecraft)
     if not results.exact:
-        parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
+        parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and all are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
@@ -66,21 +68,38 @@ def _title(results: Results, scheme: str) -> Text:
 
 
 def _percentiles(results: Results) -> Table:
-    table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "max")
+    table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "all")
+    shares = np.array(PERCENTS) / 100.0
     nominal = results.study.outputs_of({})
     for output, name, scale, plan in zip(OUTPUTS, NAMES, SCALES, nominal, strict=True):
         found = results.distribution(output)
         if found is None:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
-        values = [*found.quantiles(np.array(PERCENTS) / 100.0), found.maximum]
         largest = scale * max(abs(found.minimum), abs(found.maximum))
         # The nominal value has digits of its own: other places show it alone.
         own = "0" if abs(scale * plan) < NOTHING else f"{scale * plan:.4g}"
-        table.add_row(Text(name, style="dim"), own, *(beside(scale * value, largest) for value in values))
+        for sign, reached in _tails(found, shares):
+            values = (beside(scale * value, largest) for value in reached)
+            table.add_row(Text(name.replace(",", f"{sign},"), style="dim"), own, *values)
     for column in table.columns[1:]:
         column.no_wrap = True
     return table
+
+
+def _tails(found: Distribution, shares: Array) -> Iterator[tuple[str, list[float]]]:
+    """What these shares of the cases, and all, do not exceed; where values are negative, what they stay above too."""
+    upward, downward = found.maximum > 0.0, found.minimum < 0.0
+    if upward or not downward:
+        yield " ≤" * downward, [*found.quantiles(shares).tolist(), found.maximum]
+    if downward:
+        yield " ≥", [*found.quantiles(1.0 - shares).tolist(), found.minimum]
+
+
+def angles_note(body: Spacecraft) -> list[RenderableType]:
+    """From where the angles of H are counted in dispersed cases, where it has no target."""
+    said = "Shift of H: from H at t = 0 of the same case; axis error: from H at t = 0 with nominal values."
+    return [Text(said, style="dim")] if body.goal.axis is None else []
 
 
 def beside(value: float, largest: float) -> str:

@@ -62,17 +62,23 @@ def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
         off = degrees(flown.residual.axis_error)
         table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
     table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
-    lasting = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
-    if lasting:
-        end = "as the last pulse ends, at " + moment(flown.schedule.end)
-        end = end if flown.until is None else f"at {moment(flown.until)}"
-        table.add_row("", f"{end}; changed further by {' and '.join(lasting)}")
+    if lasting(flown):
+        table.add_row("", lasting(flown))
     add_aspects(table, watched)
     if body.attitude is None:
         table.add_row("", FRAME_N)
     elif body.attitude.frame is not None:
         table.add_row("frame", body.attitude.frame)
     return table
+
+
+def lasting(flown: Flight) -> str:
+    """Of when the end is told where it does not last, and what changes it further; empty where nothing does."""
+    body = flown.spacecraft
+    causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
+    end = "as the last pulse ends, at " + moment(flown.schedule.end)
+    end = end if flown.until is None else f"at {moment(flown.until)}"
+    return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 
 def add_aspects(table: Table, found: Iterable[Aspect]) -> None:

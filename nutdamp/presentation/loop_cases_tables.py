@@ -18,6 +18,7 @@ from nutdamp.presentation import verdicts
 from nutdamp.presentation.dispersion_tables import (
     PERCENTS,
     add_angles,
+    angles_note,
     beside,
     bounded,
     bounded_heads,
@@ -54,7 +55,8 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     if results.redrawn:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
-    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results), Text()]
+    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results)]
+    parts += [*angles_note(study.spacecraft), Text()]
     parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
     parts += list(_shares(results))
     anew = ", ".join(f"{in_words(one.name)} {size_text(one)}" for one in study.model.of_firings)

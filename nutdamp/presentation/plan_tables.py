@@ -16,7 +16,7 @@ from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, decide
 from nutdamp.demands import SLACK
-from nutdamp.flight import Residual
+from nutdamp.flight import REAL_WIDTHS, Residual, model_name
 from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
@@ -34,6 +34,7 @@ from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, ma
 from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
+from nutdamp.words import listed
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:
@@ -78,7 +79,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if spacecraft.dissipation is not None:
         table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
     beyond = beyond_floors(spacecraft)
-    floor = f"no least impulse with {beyond}" if beyond else "no schedule needs less"
+    floor = f"no least impulse with {beyond}" if beyond else "removing all nutation takes no less"
     name = "impulse" if beyond else "least impulse"
     table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:
@@ -304,6 +305,13 @@ def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
     if len({day for day, _ in known}) == 1:
         return known[0][0], clocks
     return "", [f"{day} {clock}" for (day, _), clock in zip(known, clocks, strict=True)]
+
+
+def flown_by(compared: Comparison) -> str:
+    """By which model schemes are flown beside each other, and which of them fire ideal impulses where others do not."""
+    how = model_name(plan.pulses for plan in compared.plans)
+    ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
+    return how if how != REAL_WIDTHS or not ideal else f"{how} (ideal impulses: {listed(ideal)})"
 
 
 def channel_text(pulse: Pulse, body: Spacecraft) -> str:

@@ -78,16 +78,22 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
     if not better:
         return ""
     saved, earlier, index, front, point = max(better, key=lambda one: one[:2])
+    off = [one.flight.residual.axis_error for one in (point.plan, chosen)]
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     within = f'--set "limits.horizon={point.horizon:.6g} s"'
-    name = front_name(front, pointing=chosen.spacecraft.goal.axis is not None)
+    pointing = chosen.spacecraft.goal.axis is not None
+    name = front_name(front, pointing=pointing)
+    where = "leaves H {} off the target" if pointing else "shifts H by {}"
+    instead = f"; it {where.format(degrees(off[0]))} instead of {degrees(off[1])}"
+    aside = instead * (abs(off[0] - off[1]) > SAME_ANGLE)
     how = (
         f"costs {100.0 * saved:.2g} % less than the recommended plan and ends no later"
         if saved
         else f"costs as much as the recommended plan and ends {duration(earlier)} earlier"
     )
     return (
-        f"point {index} meets the requirement too, {how} ({name}): plan --scheme {point.plan.scheme} {options}{within}."
+        f"point {index} meets the requirement too, {how} ({name}){aside}: "
+        f"plan --scheme {point.plan.scheme} {options}{within}."
     )
 
 
@@ -127,15 +133,15 @@ SOONER = 0.05
 
 def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
     """A row for each point; ``by_others``: with its scheme."""
-    names = ("ends at", "cost", "first-order least", "pulses", "shift of H", "saves")
+    names = ("ends at", "cost", "first-order least", "pulses", "shift of H", "against first")
     table = columns("point", *names, *("scheme",) * by_others, text=("scheme",))
     dearest = front.points[0].cost
     for index, owner, point in numbered(found):
         if owner is front:
             spent, least = (cost(value, point.unit) for value in (point.cost, point.bounds.first_order))
-            plan, saved = point.plan, 100.0 * (1.0 - point.cost / dearest)
+            plan, more = point.plan, round(100.0 * (point.cost / dearest - 1.0), 1) + 0.0  # no negative zero
             shift = degrees(plan.flight.residual.momentum_shift)
-            cells = moment(plan.pulses.end), spent, least, str(len(plan.pulses)), shift, f"{saved:.1f} %"
+            cells = moment(plan.pulses.end), spent, least, str(len(plan.pulses)), shift, f"{more:.1f} %"
             table.add_row(f"{index} {NOT}" if fails(point) else str(index), *cells, *[plan.scheme] * by_others)
     return table
 

@@ -159,6 +159,15 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     yield " ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared)))
 
 
+def idealised(plan: Plan) -> str:
+    """That a plan fires impulses which take no time, and why; empty where it does not."""
+    if not plan.pulses.idealised:
+        return ""
+    torquer = plan.spacecraft.steerable
+    unknown = ": the file has no steerable.torque" if torquer is None or torquer.torque is None else ""
+    return f"{plan.scheme} fires ideal impulses, which take no time{unknown}."
+
+
 def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
     """How far the impulse sum (17) ends from real widths, where that is more than may be."""
     apart = outcome.deviations(impulses, flown)

@@ -359,7 +359,7 @@ def test_the_floor_is_that_of_what_optimal_leaves() -> None:
     figure = figures.schemes_figure(compared())
     words = {text.get_text() for text in figure.legends[0].get_texts()}
     assert "least to leave as little as optimal" in words
-    assert "no schedule takes less" not in words
+    assert "no schedule that leaves as little takes less" not in words
     assert all(axes.get_xlim()[0] >= 0.0 for axes in figure.axes)
 
 

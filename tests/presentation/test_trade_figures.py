@@ -44,7 +44,7 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     named = [int(number) for note in axes.texts for number in note.get_text().split(", ")]
     assert sorted(named) == list(range(1, count + 1))
     words = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert {"H ends where it was", "H may end anywhere", "no schedule takes less"} <= words
+    assert {"H ends where it was", "H may end anywhere", "no schedule that leaves as little takes less"} <= words
     first, second = ({(p.plan.end, p.cost) for p in front.points} for front in traded())
     assert first & second, "no point is on both fronts"
     assert "the same schedule, on this front too" in words

@@ -227,11 +227,13 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     aim = compliance.aim(body)
     points, limit = momentum_cases(results), _limit(results, aim)
     centre = "H(0)" if aim is Part.SHIFT else "the target"
+    # A case has an H(0) of its own: the shift of H is counted from there, so that it is the centre in each.
+    about = "the H(0) of each case" if aim is Part.SHIFT else centre
     sky = geometry.sky_names(results.study.nominal, centre)
-    title = f"Where H ends, about {centre}\n{sky.view}"
+    title = f"Where H ends, about {about}\n{sky.view}"
     widest = float(np.hypot(*points.T).max())
     if widest < NOTHING:
-        axes.set_title(f"Where H ends, about {centre}")
+        axes.set_title(f"Where H ends, about {about}")
         required = "" if limit is None else f", required {limit:.4g}°"
         style.words(axes, f"all {results.done:,} cases:\nwithin {NEXT_TO_NOTHING} of {centre}{required}")
         return

@@ -165,8 +165,11 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
     title = "Firings"
     if flight.schedule.through_valves:
         title += ": effective on-times, not the commands"
-    if any(pulse.channel == STEERABLE for pulse in flight.schedule) and not brief:
-        title += ", with room: direction of the torque from body axis +1"
+    roomy = (
+        not brief and axes.figure.bbox.width / axes.figure.dpi > style.PHONE
+    )  # for the angles that bars are labelled with
+    if roomy and any(pulse.channel == STEERABLE for pulse in flight.schedule):
+        title += "; angles: direction of the torque from body axis +1"
     axes.set_title(fill(title, int(HEADING * axes.figure.bbox.width / axes.figure.dpi)))
     if not names:
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")

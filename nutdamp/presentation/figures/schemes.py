@@ -12,11 +12,11 @@ from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import NEGLIGIBLE, Part
 from nutdamp.decision import Decision
-from nutdamp.flight import model_name
 from nutdamp.planning import Plan
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
+from nutdamp.presentation.plan_tables import flown_by
 from nutdamp.presentation.text import in_degrees
 from nutdamp.presentation.verdicts import percent
 from nutdamp.recommendation import Standing, by_propellant
@@ -89,8 +89,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     verdict = "no recommendation" if chosen is None else f"recommended: {chosen.scheme}"
     if chosen is not None and chosen.scheme in short:
         verdict += f" ({short[chosen.scheme]})"
-    how = model_name(plan.pulses for plan in compared.plans)
-    heading(figure, compared.spacecraft, f"schemes by {how}\n{verdict}")
+    heading(figure, compared.spacecraft, f"schemes by {flown_by(compared)}\n{verdict}")
     labels.settle(figure)
     return figure
 

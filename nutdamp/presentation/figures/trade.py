@@ -68,7 +68,9 @@ def trade_figure(
     proved = [point.bounds.rigorous for point in points]
     if None not in proved:
         least = min(scale * value for value in proved if value is not None)
-        axes.axhline(least, color=INK, linewidth=1.0, linestyle=":", label="no schedule takes less")
+        axes.axhline(
+            least, color=INK, linewidth=1.0, linestyle=":", label="no schedule that leaves as little takes less"
+        )
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
         look: dict[str, Any] = {

@@ -18,7 +18,7 @@ from nutdamp.decision import Decision, cases_of, decide
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
-from nutdamp.presentation.end_tables import bounds_text, direction_text, spin_text, target_text
+from nutdamp.presentation.end_tables import bounds_text, direction_text, lasting, spin_text, target_text
 from nutdamp.presentation.page.craft import ends_note, ends_sheet, spacecraft_blocks
 from nutdamp.presentation.page.document import (
     UNCONTROLLED,
@@ -135,22 +135,25 @@ def _decision(decided: Decision) -> Iterator[Block]:
     """The parts of the requirement with their margins, and what else the reader must know to decide."""
     cases = decided.cases
     how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
-    title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin"
+    when = lasting(decided.flight)
+    title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin{when and f' ({when})'}"
     yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
     if decided.aspects:
         yield aspects_sheet(decided)
-    if decisions.better(decided):
-        yield Remarks((("Note", decisions.better(decided)),))
+    notes = tuple(("Note", note) for note in decisions.notes(decided))
+    if notes:
+        yield Remarks(notes)
 
 
 def _figures(decided: Decision) -> Iterator[Figure]:
-    """The numbers to read first: the verdict, where it points at the end, what it costs."""
+    """The numbers to read first: the verdict, where it points at the end, what it costs; all but the first nominal."""
     body, final = decided.plan.spacecraft, decided.final
     yield Figure("requirement", decisions.verdict(decided))
+    nominal = "" if decided.cases is None else ", nominal"
     for name, end in (("spin axis ends at", final.axis), ("H ends at", final.momentum)):
-        yield Figure(name, direction_text(body, end), target_text(body, end))
+        yield Figure(f"{name}{nominal}", direction_text(body, end), target_text(body, end))
     goal = "" if body.goal.spin is None else f"target: {spin_text(body.goal.spin)}"
-    yield Figure("final spin", spin_text(final.spin), goal)
+    yield Figure(f"final spin{nominal}", spin_text(final.spin), goal)
     for one in decided.aspects:
         yield Figure(f"axis from {one.keep.name}", f"{degrees(one.least)} to {degrees(one.largest)}", _keeping(one))
     for name, value in decisions.cost(decided):

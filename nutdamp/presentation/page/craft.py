@@ -46,14 +46,15 @@ def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a 
 
 
 def _body(body: Spacecraft) -> Iterator[tuple[str, str]]:
-    yield "mass", MISSING if body.mass is None else mass(body.mass)
+    yield "mass", "not in the file" if body.mass is None else mass(body.mass)
     if not body.inertia.aligned:
         rows = "; ".join(vector(row) for row in body.inertia.tensor)
         yield "inertia tensor", f"{rows} kg m², in the axes of the file"
     steerable = body.steerable
     if steerable is not None:
         isp, arm = quantity(steerable.isp, "s"), quantity(steerable.lever_arm, "m")
-        yield "steerable", f"{quantity(steerable.torque, 'N m')}, isp {isp}, lever arm {arm}"
+        strength = "ideal impulses" if steerable.torque is None else quantity(steerable.torque, "N m")
+        yield "steerable", f"{strength}, isp {isp}, lever arm {arm}"
     if body.attitude is not None:
         yield "epoch", body.attitude.epoch or MISSING
         yield "frame", body.attitude.frame or MISSING

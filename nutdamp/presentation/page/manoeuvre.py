@@ -17,7 +17,8 @@ from nutdamp.presentation.block_tables import blocks_table
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
 from nutdamp.presentation.page.sheets import on_times
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
-from nutdamp.presentation.text import MISSING, in_degrees, longitude
+from nutdamp.presentation.text import MISSING, digits, in_degrees, longitude
+from nutdamp.schedule import STEERABLE
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 
@@ -50,6 +51,8 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         else "Spin phase: the angle by which the body has turned about axis 3 since t = 0, at the commanded "
         "start, modulo 360 deg."
     )
+    if any(pulse.channel == STEERABLE for pulse in plan.pulses):
+        yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")
     yield _signature(flown)
     swings = " The Sun angle is that of H; the spin axis swings about it by the nutation."
     yield Prose(
@@ -82,6 +85,8 @@ def _firing(flown: Flight) -> Sheet:
         on_times(flown.schedule),
         (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
     ]
+    if flown.schedule.idealised:
+        columns.append((Column("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]))
     return _sheet("Pulses to fire", columns)
 
 

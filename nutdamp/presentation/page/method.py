@@ -37,7 +37,7 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
         scheme = guide.found(chosen.scheme)
         lines += _listed(scheme, _formulas(scheme)[0])
     yield Listing("Equations", "\n".join(lines))
-    symbols = _symbols(topics, chosen, " ".join(lines))
+    symbols = _symbols(topics, chosen, " ".join([*lines, "θ"]))
     yield Facts("Symbols", (*symbols, *_floors(compared.spacecraft)))
     yield Points(guide.SOURCES[:1])
 

@@ -73,7 +73,10 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """What does not move in the view, and what moves as the JSON ``data``; ``command``: what writes the same rows."""
+    """What does not move in the view, and what moves as the JSON ``data``.
+
+    ``how``: the model that is flown; ``command``: what writes the same rows.
+    """
 
     panels: tuple[Panel, ...]
     strip: Strip
@@ -83,6 +86,7 @@ class Moving:
     named: tuple[Named, ...]
     dated: bool
     steep: bool
+    how: str
     command: tuple[str, ...]
     data: str
 
@@ -156,6 +160,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
     speeds, speed = _speeds(until)
     return Moving(
         panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None, turns > STEEP,
+        flight.model_name([flown.schedule]),
         ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
          f"--samples {samples}", "--csv FILE"),
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),

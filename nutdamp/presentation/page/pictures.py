@@ -44,7 +44,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     ]
     if len(plan.pulses):
         through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
-        said = "Which channel fires, when and for how long." + through * plan.pulses.through_valves
+        how = "by which impulse" if plan.pulses.idealised else "for how long"
+        said = f"Which channel fires, when and {how}." + through * plan.pulses.through_valves
         drawn.append(("timeline", said, "Timeline of the firings"))
     return tuple(
         picture(
@@ -61,8 +62,8 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
     """The schemes beside each other; raises MissingExtra."""
     return picture(
         figures.schemes_figure(compared, decided),
-        "A row for each scheme: what it costs, when it ends, what it leaves. A cross marks a scheme that falls short, "
-        "whatever it costs. Values below the range of an axis are drawn at its left edge.",
+        "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, crosses mark "
+        "it in every column. Values below the range of an axis are drawn at its left edge.",
         "Dot plots of cost, end, nutation and shift of H by scheme",
     )
 
@@ -96,7 +97,8 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         (
             "momentum",
             "Where H ends in each case, with the ellipse that holds as many cases as must comply"
-            + (", and what is required of it." if bounded else "."),
+            + (", and what is required of it." if bounded else ".")
+            + " The shift of H is counted from where H was at t = 0 in that case." * (body.goal.axis is None),
             "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
         ),
         (

@@ -10,14 +10,14 @@ import numpy as np
 from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
-from nutdamp.flight import Residual, model_name
+from nutdamp.flight import Residual
 from nutdamp.outcome import spin_phases
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.decisions import COUNT, KEPT
 from nutdamp.presentation.end_tables import angle_names, angle_texts, bounds_text
 from nutdamp.presentation.page.document import Column, Sheet
-from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, ratios
+from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text, flown_by, ratios
 from nutdamp.presentation.text import MISSING, digits, in_degrees, longitude
 from nutdamp.schedule import Schedule
 
@@ -35,9 +35,8 @@ def comparison_sheet(compared: Comparison, decided: Decision | None = None) -> S
         rows.append((plan.scheme, *(cells if plan.feasible else [verdicts.no_plan(plan), *cells[1:]])))
     mark = next((index for index, plan in enumerate(compared.plans) if plan is compared.recommended), None)
     names = (Column("scheme", number=False), *(column for column, _ in columns))
-    how = model_name(plan.pulses for plan in compared.plans)
     return Sheet(
-        f"What each scheme costs and leaves with nominal values, by {how}",
+        f"What each scheme costs and leaves with nominal values, by {flown_by(compared)}",
         names,
         tuple(rows),
         mark,
