@@ -317,3 +317,30 @@ def test_it_says_where_the_nominal_case_ends_and_where_it_should(
     words = " ".join(done.stdout.split())
     assert "alone on the nutation and on the axis error" in words
     assert "on the shift of H" not in words
+
+
+def spin_rows(screen: str) -> dict[str, list[float]]:
+    """Numbers of the rows of spin changes, mrad/s, by what stands before them."""
+    rows = re.findall(r"^spin change ?([≤≥]?), mrad/s +(.+)$", screen, re.MULTILINE)
+    return {sign: [float(number) for number in numbers.split()] for sign, numbers in rows}
+
+
+def test_spin_changes_have_both_tails_where_they_have_both_signs(run: Run, tmp_path: Path) -> None:
+    """So many of the cases do not exceed a value of the one row, and stay above that of the other."""
+    done = run("disperse", "--scheme", "two-pulse", "--samples", "400", "--quiet", "--csv", "s.csv", columns=140)
+    with (tmp_path / "s.csv").open(encoding="utf-8") as file:
+        changes = 1e3 * np.array([float(row["spin_change_rad_s"]) for row in csv.DictReader(file)])
+    assert changes.min() < 0.0 < changes.max()
+    rows, shares = spin_rows(done.stdout), np.array([float(percent) / 100.0 for percent in PERCENTS])
+    assert rows["≤"][1:] == pytest.approx([*np.quantile(changes, shares), changes.max()], abs=1e-3)
+    assert rows["≥"][1:] == pytest.approx([*np.quantile(changes, 1.0 - shares), changes.min()], abs=1e-3)
+
+
+def test_spin_changes_of_one_sign_have_one_row(run: Run) -> None:
+    """The upper stage only loses spin: what counts is how much, so the row falls to the largest loss."""
+    assert run("init", "--from", "upper-stage", "stage.yaml").returncode == 0
+    done = run("disperse", "stage.yaml", "--scheme", "one-pulse", "--samples", "300", "--quiet", columns=140)
+    (sign,), (numbers,) = spin_rows(done.stdout).keys(), spin_rows(done.stdout).values()
+    assert sign == "≥"
+    assert numbers[1:] == sorted(numbers[1:], reverse=True)
+    assert numbers[-1] < 0.0

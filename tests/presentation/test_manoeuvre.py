@@ -98,6 +98,21 @@ def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() ->
     assert "Sun angle deg" not in rows(other, "What gyros")[0]
 
 
+def test_ideal_impulses_are_loaded_by_size_and_direction(run: Run, tmp_path: Path) -> None:
+    """They have no on-time to load; the page says beside the verdict that they are ideal."""
+    assert run("init", "--from", "magnus-oblate", "oblate.yaml").returncode == 0
+    compared = compare(read_spacecraft((tmp_path / "oblate.yaml").read_text(), "oblate.yaml", ()), ["two-pulse"])
+    tree = parsed(page_html(report_page(compared, Repeat("", "", ""), pictured=False)).removeprefix("<!DOCTYPE html>"))
+    (found,) = (one for one in tree.all("section") if one.attributes["id"] == "manoeuvre")
+    for pulse, row in zip(compared["two-pulse"].pulses, rows(found, "Pulses to fire"), strict=True):
+        assert row["on-time s"] == "ideal"
+        assert float(row["impulse N m s"]) == pytest.approx(pulse.magnitude, rel=1e-3)
+        towards = math.degrees(math.atan2(pulse.impulse[1], pulse.impulse[0])) % 360.0
+        assert row["channel"] == f"steerable {towards:.2f}°"
+    assert "the direction of its torque, from body axis +1 towards +2" in found.text
+    assert "two-pulse fires ideal impulses, which take no time: the file has no steerable.torque" in tree.text
+
+
 @pytest.mark.slow
 def test_the_command_writes_it(run: Run, tmp_path: Path) -> None:
     done = run("report", "-", "--target", "20deg,82deg", "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
