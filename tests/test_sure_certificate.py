@@ -85,7 +85,7 @@ def text_of(name: str, margin: float = MARGIN) -> str:
     return json_text(certificate_json(certificate(a_plan(bodies()[name], margin))))
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", bodies())
 def test_the_file_alone_proves_the_bound(name: str) -> None:
     content = json.loads(text_of(name))

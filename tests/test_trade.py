@@ -44,6 +44,7 @@ def test_fronts_go_from_strict_to_free(found: tuple[fronts.Front, ...]) -> None:
     assert [front.shift for front in found] == [0.0, HALF_DEGREE, math.inf]
 
 
+@pytest.mark.slow
 def test_later_points_are_cheaper(found: tuple[fronts.Front, ...]) -> None:
     for front in found:
         assert len(front.points) >= 2
@@ -52,6 +53,7 @@ def test_later_points_are_cheaper(found: tuple[fronts.Front, ...]) -> None:
             assert one.cost > two.cost
 
 
+@pytest.mark.slow
 def test_every_point_is_a_schedule_that_flies(body: Spacecraft, found: tuple[fronts.Front, ...]) -> None:
     for front in found:
         for point in front.points:
@@ -82,6 +84,7 @@ def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known(body: 
         assert by_impulse.cost == pytest.approx(by_propellant.plan.pulses.total_impulse, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_allowed_more_costs_no_more(found: tuple[fronts.Front, ...]) -> None:
     for strict, free in itertools.pairwise(found):
         for point in strict.points:

@@ -38,7 +38,7 @@ def limited(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         ("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "Tolerance budget"),
         slow("disperse --scheme two-pulse --samples 20000 --resume big.npz --json small.json", "Tolerance budget"),
         slow("plan --plot big.svg --json small.json", "Recommended"),
-        ("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
+        slow("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
     ],
 )
 def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, command: str, result: str) -> None:

@@ -30,7 +30,7 @@ BODY = spinner(channels=cross(20.0))
 SPREAD = Dispersions(A=Tolerance("normal", 0.02, relative=True))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("biased", [False, True])
 @pytest.mark.parametrize(
     "required", [None, Requirement(nutation=0.01), Requirement(nutation=0.01, momentum_shift=0.01)]
