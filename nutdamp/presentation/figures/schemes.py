@@ -81,8 +81,11 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     abreast = min(ABREAST, -(-len(columns) // 2))
     figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
     cells = list(figure.subplots(2, abreast).flat)
-    for axes, column in zip(cells, columns, strict=False):
-        _column(axes, column, Rows(plans, chosen, short))
+    for index, (axes, column) in enumerate(zip(cells, columns, strict=False)):
+        rows = Rows(plans, chosen, short)
+        _column(axes, column, rows)
+        # Why a scheme falls short is said at the left alone: beside every panel it would leave them no room.
+        _name_rows(axes, rows, why=index % abreast == 0)
     for axes in cells[len(columns) :]:
         axes.remove()
     legend(figure, cells[: len(columns)], 3)
@@ -183,7 +186,6 @@ def _column(axes: Axes, column: Quantity, rows: Rows) -> None:
         axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required", zorder=1.5)
     axes.set_xlabel(column.name)
     axes.grid(axis="x")
-    _name_rows(axes, rows)
 
 
 def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) -> None:
@@ -198,11 +200,11 @@ def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) ->
         axes.plot([], [], "<", color=GREY, markersize=6, linestyle="", label="less than the axis shows")
 
 
-def _name_rows(axes: Axes, rows: Rows) -> None:
-    """Schemes beside their rows; those that fall short say so there."""
+def _name_rows(axes: Axes, rows: Rows, *, why: bool) -> None:
+    """Schemes beside their rows; those that fall short have another colour, and say ``why``."""
     names = []
     for plan in rows.plans:
-        said = rows.short.get(plan.scheme, "") if plan.feasible else "no plan"
+        said = rows.short.get(plan.scheme, "") * why if plan.feasible else "no plan"
         names.append(f"{plan.scheme}\n{said}" if said else plan.scheme)
     axes.set_yticks(-np.arange(len(names)), names)
     axes.set_ylim(-len(names) + 0.45, 0.7)

@@ -62,8 +62,8 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
     """The schemes beside each other; raises MissingExtra."""
     return picture(
         figures.schemes_figure(compared, decided),
-        "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, crosses mark "
-        "it in every column. Values below the range of an axis are drawn at its left edge.",
+        "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, its row says "
+        "so, whatever it costs. Values below the range of an axis are drawn at its left edge.",
         "Dot plots of cost, end, nutation and shift of H by scheme",
     )
 
