@@ -193,7 +193,7 @@ def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> 
     chosen = compared.recommended
     notes = [] if chosen is None else [said for say in (beats, apart) if (said := say(traded, chosen))]
     tables += [Remarks((("Note", said),)) for said in notes]
-    drawn = pictured and any(front.points for front in traded)
+    drawn = pictured and any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
     pictures = (trade_picture_of(compared, traded),) if drawn else ()
     return Section("trade", "Time against cost", (*tables, *pictures))
 

@@ -20,7 +20,7 @@ from nutdamp.presentation.check_tables import (
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, quantity, vector
+from nutdamp.presentation.text import MISSING, degrees, digits, duration, mass, moment, quantity, vector
 from nutdamp.spacecraft import Spacecraft, Thruster, Vector
 
 
@@ -119,7 +119,8 @@ def ends_sheet(flown: Flight) -> Sheet:
         for which, name in enumerate(angle_names(body)):
             cells = (MISSING if one is None else angle_texts(body, one)[which] for one in (before, after, target))
             rows.append((f"{what}: {name}", *cells))
-    rows.append(("|H|", quantity(size, "N m s"), quantity(float(np.linalg.norm(end)), "N m s"), MISSING))
+    sizes = (f"{digits(value, 4)} N m s" for value in (size, float(np.linalg.norm(end))))
+    rows.append(("|H|", *sizes, MISSING))
     goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
     rows.append(("spin", spin_text(body.spin), spin_text(final.spin), goal))
     largest = body.nutation, final.nutation

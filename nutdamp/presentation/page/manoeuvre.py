@@ -44,13 +44,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
     if plan.pulses.blocks:
         yield sheet_of("Command blocks to load", blocks_table(flown, named=True))
     yield _firing(flown)
-    yield Prose(
-        "Spin phase: the angle by which the body has turned about axis 3 since t = 0. Sun phase: the angle by which it "
-        "has turned since the Sun passed the sensor. Both at the commanded start, modulo 360 deg."
-        if _senses(body)
-        else "Spin phase: the angle by which the body has turned about axis 3 since t = 0, at the commanded "
-        "start, modulo 360 deg."
-    )
+    yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
         yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")
     yield _signature(flown)
@@ -64,6 +58,18 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         return
     how = "report --disperse flies them" if body.dispersions is not None else "the file gives no dispersions"
     yield Facts("Abort criteria", (("not known", f"they come from dispersed cases; {how}"),))
+
+
+def _phases(plan: Plan) -> str:
+    """What the phases of pulses and the delays of blocks are counted from."""
+    spin = "Spin phase: the angle by which the body has turned about axis 3 since t = 0"
+    if not _senses(plan.spacecraft):
+        return f"{spin}, at the commanded start, modulo 360 deg."
+    delays = " A delay in deg is the delay times the spin: nutation near the Sun makes the Sun phase another angle."
+    return (
+        f"{spin}. Sun phase: the angle from the Sun sensor to the Sun about axis 3, against the spin. Both at the "
+        "commanded start, modulo 360 deg." + delays * bool(plan.pulses.blocks)
+    )
 
 
 def _senses(body: Spacecraft) -> bool:
