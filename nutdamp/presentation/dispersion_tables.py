@@ -19,7 +19,7 @@ from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.statistics import Array, Distribution
 from nutdamp.dispersion.study import Results, Study
-from nutdamp.flight import Flight
+from nutdamp.flight import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import bounds_text, end_table
 from nutdamp.presentation.layout import columns, facts
@@ -60,7 +60,8 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
 
 def _title(results: Results, scheme: str) -> Text:
     study = results.study
-    how = "real widths and true tensor" if study.flown else "the impulse sum (17)"
+    pulses = "ideal impulses" if model_name([study.model.schedule]) == IDEAL_IMPULSES else "real widths"
+    how = f"{pulses} and true tensor" if study.flown else "the impulse sum (17)"
     drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from nutdamp.compliance import Part
 from nutdamp.dispersion.outputs import VECTORS
 from nutdamp.dispersion.statistics import Distribution
 from nutdamp.dispersion.study import EARLY, Results
+from nutdamp.flight import model_name
 from nutdamp.physics import attitude
 from nutdamp.presentation import geometry
 from nutdamp.presentation.figures import labels, style
@@ -60,7 +61,7 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     """The figure ``overview``, ``cases``, ``momentum`` or ``budget``; raises KeyError for others."""
     study = results.study
     figure = DRAWN[name](results)
-    how = "real pulse widths" if study.flown else "impulse sum (17)"
+    how = model_name([study.model.schedule]) if study.flown else "impulse sum (17)"
     shown = f"{scheme} by {how}, {results.done:,} dispersed cases"
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
@@ -244,7 +245,9 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     ends = np.stack([few, few + short], axis=1).reshape(-1, 2)
     dots = Path(ends, [Path.MOVETO, Path.LINETO] * len(few))
     dots.should_simplify = False
-    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", linewidth=1.6, capstyle="round", alpha=DENSE))
+    # Above the ellipse: where all cases lie on a line, it would hide them.
+    look: dict[str, Any] = {"linewidth": 1.6, "capstyle": "round", "alpha": DENSE, "zorder": 2.5}
+    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", **look))
     some = f"{len(few):,} of the {results.done:,} cases" if len(few) < results.done else f"the {results.done:,} cases"
     axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=some)
     axes.plot(
@@ -259,7 +262,7 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
         axes.plot(*shown[-1].T, color=PULSE, linewidth=1.6, label=f"required: {limit:.4g}°")
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
-        axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, label=centre)
+        axes.plot(0.0, 0.0, "+", color=INK, markersize=9, markeredgewidth=1.4, zorder=3, label=centre)
     axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
     axes.set(xlabel=sky.x, ylabel=sky.y, title=title)
     legend(figure, [axes], 2)
