@@ -62,7 +62,8 @@ def test_blocks_phases_signature_and_criteria() -> None:
     assert len(fired) == int(block["pulses"])
     for row in fired:  # without nutation the Sun phase is the delay
         assert float(row["Sun phase deg"]) == pytest.approx(float(block["delay deg"]), abs=0.3)
-        assert row["UTC"] == body.utc(float(row["time s"]), 3)
+        time = float(row["time s"])  # rounded to 0.1 ms
+        assert row["UTC"] in {body.utc(time + off, 3) for off in (-6e-5, 0.0, 6e-5)}
     start, after = rows(found, "What gyros")
     assert (start["coast"], after["coast"]) == ("before block 1", "after block 1")
     assert float(start["gyro, axis 3 rpm"]) == pytest.approx(12.0)
