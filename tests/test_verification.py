@@ -306,12 +306,17 @@ def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Pa
     ("momentum", "energy", "changed", "said"),
     [
         (0.0, 0.0, (), "|H| and the energy are constant to the last digit."),
-        (0.0, 2.3e-15, (), "energy is constant but for rounding (< 1e-12 of itself at most)."),
+        (
+            0.0,
+            2.3e-15,
+            (),
+            "to the last digit, the energy is constant but for rounding (< 1e-12 of itself at most).",
+        ),
         (
             3.1e-9,
             0.0,
             (),
-            "|H| is NOT constant (3.1e-09 of itself at most), the energy is constant but for rounding (0 ",
+            "|H| is NOT constant (3.1e-09 of itself at most), the energy is constant to the last digit.",
         ),
         (2e-13, 2e-4, ("dissipation",), "the energy is changed by dissipation (2.0e-04 of itself at most)."),
     ],

@@ -60,6 +60,8 @@ def conservation(found: Verification) -> str:
 
 
 def _course(one: Conservation) -> str:
+    if one.drift == 0.0 and not one.changed:
+        return "is constant to the last digit"
     how = "is NOT constant" if one.kept is False else "is constant but for rounding"
     if one.changed:
         how = f"is changed by {' and '.join(one.changed)}"

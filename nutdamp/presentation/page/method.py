@@ -91,12 +91,12 @@ def checks_sheet(plan: Plan, found: Verification) -> Sheet:
             rows.append((method.name, *MOTION_WITHIN, "not flown", MISSING))
         elif method.outside:
             passed = method.difference <= AGREE
-            rows.append((method.name, *MOTION_WITHIN, f"{method.difference:.1e}", PASSED[passed]))
+            rows.append((method.name, *MOTION_WITHIN, _size(method.difference), PASSED[passed]))
     for course in (found.momentum, found.energy):
         verdict = (
             f"not judged: changed by {' and '.join(course.changed)}" if course.kept is None else PASSED[course.kept]
         )
-        rows.append((f"{course.name} on coasts", "keeps to", f"{AGREE:g} of itself", f"{course.drift:.1e}", verdict))
+        rows.append((f"{course.name} on coasts", "keeps to", f"{AGREE:g} of itself", _size(course.drift), verdict))
     one, other = (left_by(flown) for flown in (flight.by_impulses(body, plan.pulses), plan.flight))
     for part, most in tolerated(body).items():
         first, second = (end.spin if part is Part.SPIN else left_of(part, end, body) for end in (one, other))
@@ -107,6 +107,10 @@ def checks_sheet(plan: Plan, found: Verification) -> Sheet:
         rows.append((f"impulse sum (17): {part.label}", "differs from real widths by at most", allowed, shown, verdict))
     heads = ("check", "criterion", "threshold", "found", "verdict")
     return Sheet("Checks and their thresholds", tuple(Column(head, number=False) for head in heads), tuple(rows))
+
+
+def _size(difference: float) -> str:
+    return f"{difference:.1e}" if difference else "0"
 
 
 MOTION_WITHIN = (
