@@ -327,7 +327,7 @@ def test_complying_cases_end_at_all_of_them() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize(("kilograms", "unit", "shown"), [((1.593, 0.654), "kg", "0.654"), ((0.0128,), "g", "12.8")])
+@pytest.mark.parametrize(("kilograms", "unit", "shown"), [((1.593, 0.654), "kg", "0.6540"), ((0.0128,), "g", "12.80")])
 def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], unit: str, shown: str) -> None:
     plans = [
         Plan(

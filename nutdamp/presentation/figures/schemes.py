@@ -17,7 +17,7 @@ from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import FIRED, GREY, INK, MOTION, PAPER, PULSE
 from nutdamp.presentation.plan_tables import flown_by
-from nutdamp.presentation.text import in_degrees
+from nutdamp.presentation.text import digits, in_degrees
 from nutdamp.presentation.verdicts import percent
 from nutdamp.recommendation import Standing, by_propellant
 from nutdamp.spacecraft import Vector
@@ -145,11 +145,15 @@ def _columns(compared: Comparison) -> list[Quantity]:
             for part in (Part.NUTATION, aim)
         ),
         Quantity(
-            ("propellant, g" if light else "propellant, kg") if propellant else "impulse, N m s", cost, "{:.4g}".format,
+            ("propellant, g" if light else "propellant, kg") if propellant else "impulse, N m s", cost, _figures,
             floor=min(proved, default=None),
         ),
         Quantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
     ]  # fmt: skip
+
+
+def _figures(value: float) -> str:
+    return digits(value, 4)
 
 
 def _angle(value: float) -> str:

@@ -15,6 +15,7 @@ from nutdamp.presentation.figures.overview import NARROW
 from nutdamp.presentation.page.document import Picture
 from nutdamp.presentation.page.panels import picture
 from nutdamp.presentation.tolerance_tables import budget_rows
+from nutdamp.schedule import STEERABLE
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
@@ -46,6 +47,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
         how = "by which impulse" if plan.pulses.idealised else "for how long"
         said = f"Which channel fires, when and {how}." + through * plan.pulses.through_valves
+        if any(pulse.channel == STEERABLE for pulse in plan.pulses):
+            said += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
         drawn.append(("timeline", said, "Timeline of the firings"))
     return tuple(
         picture(
