@@ -92,7 +92,7 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
         else f"costs as much as the recommended plan and ends {duration(earlier)} earlier"
     )
     return (
-        f"point {index} meets the requirement too, {how} ({name}){aside}: "
+        f"point {index} meets the requirement with nominal values too, {how} ({name}){aside}: "
         f"plan --scheme {point.plan.scheme} {options}{within}."
     )
 

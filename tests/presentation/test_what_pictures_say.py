@@ -108,7 +108,9 @@ def test_a_cheaper_schedule_that_ends_no_later_is_named_beside_the_recommended_o
     body = replace(BODY, requirement=Requirement(nutation=math.radians(30.0)))
     chosen = compare(body, ["two-pulse"])["two-pulse"]
     said = beats(fronts_of(body, (0.999999, 0.95, 0.9)), chosen)
-    assert said.startswith("point 3 meets the requirement too, costs 10 % less than the recommended plan")
+    assert said.startswith(
+        "point 3 meets the requirement with nominal values too, costs 10 % less than the recommended plan"
+    )
     assert said.endswith('--free-axis --set "limits.horizon=42 s".')
     assert beats(fronts_of(body, (1.0, 1.1)), chosen) == ""
 
@@ -119,7 +121,8 @@ def test_a_schedule_as_cheap_that_ends_sooner_is_named_beside_the_recommended_on
     late = replace(body, limits=replace(body.limits, earliest=body.nutation_period))
     chosen = compare(late, ["two-pulse"])["two-pulse"]
     said = beats(fronts_of(body, (1.0,)), chosen)
-    assert "point 1 meets the requirement too, costs as much as the recommended plan and ends 6.283 s earlier" in said
+    assert said.startswith("point 1 meets the requirement with nominal values too, costs as much as")
+    assert "and ends 6.283 s earlier" in said
     assert beats(fronts_of(body, (1.0,)), compare(body, ["two-pulse"])["two-pulse"]) == ""
 
 
