@@ -26,7 +26,7 @@ AGREE = 1e-9
 
 
 IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"
-"""The rows of the budget that every schedule has, besides pulse width."""
+"""The rows of the budget that every schedule has."""
 
 WITHOUT = "without "
 """How the rows of the budget begin that leave out what plans include."""
@@ -249,7 +249,9 @@ def _budget(
     inertia = spacecraft.inertia
     ideal = spacecraft if expected else replace(spacecraft, disturbances=())
     sharp = _sharp(ideal, exact)
-    rows = [(IDEAL, ideal, sharp), ("pulse width", ideal, exact)]
+    rows = [(IDEAL, ideal, sharp)]
+    if any(pulse.on_time for pulse in exact):
+        rows.append(("pulse width", ideal, exact))
     if spacecraft.limits.tick is not None:
         rounded = Schedule(supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact)))
         rows.append(("command resolution", ideal, _sharp(ideal, rounded)))

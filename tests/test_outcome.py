@@ -161,7 +161,7 @@ def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run) ->
     table = {line[:22].strip(): line[22:].split() for line in done.stdout.splitlines()}
     assert table["spin axis: tilt"] == ["11.9392", "deg", "10.0000", "deg"]
     assert table["spin axis: azimuth"] == ["49.0449", "deg", "45.0000", "deg"]
-    assert "Warning: the impulse sum (17) and real widths differ by 2.1 deg of axis error" in done.stdout
+    assert "Warning: the impulse sum (17) and real widths differ by 2.1 deg of error of H" in done.stdout
     silent = run(*options, "--json", "-")
     assert "warning: the impulse sum (17) and real widths differ by 2.1 deg" in silent.stderr
     data = json.loads(silent.stdout)

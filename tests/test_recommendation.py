@@ -311,6 +311,9 @@ def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
     found = Comparison(many.spacecraft, (many, few))
     assert found.recommended is many
     assert verdicts.hints(found) == ("few takes 5 pulses instead of 10, for 4.9 g more propellant (4.9 %).",)
+    shares = {"many": 0.352, "few": 0.67}
+    (hint,) = verdicts.hints(found, shares)
+    assert hint.endswith("(4.9 %); 67.0 % instead of 35.2 % of cases comply.")
     for pulses, propellant in ((6, 0.1049), (5, 0.1051)):
         other = judged("few", 0.0, propellant=propellant, pulses=pulses)
         assert recommend([many, other]).simpler is None

@@ -143,7 +143,7 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     (text,) = warnings
     assert text.startswith(f"none of the {len(compared.plans)} schemes compared ")
     nutation = f"{math.degrees(chosen.flown.nutation):.4g} deg of nutation"
-    assert any(said in text for said in (nutation, "of axis error", "of shift of H"))
+    assert any(said in text for said in (nutation, "of error of H", "of shift of H"))
     untried = body.channels and all(one.scheme != "optimal" for one in compared.plans)
     assert ("--scheme optimal was not compared" in text) == bool(untried), number
     return chosen.standing

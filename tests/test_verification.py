@@ -28,7 +28,7 @@ from nutdamp.physics import attitude
 from nutdamp.presentation.verify_tables import budget_note, conservation, verdict
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import Options
-from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft, Steerable
 from nutdamp.verification import AGREE, AS_FLOWN, IDEAL, Conservation, Imperfection, Verification, verify
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
@@ -153,6 +153,14 @@ def test_the_budget_names_each_imperfection_of_the_body() -> None:
     ]
     assert plan.flown is not None
     assert rows["all: as flown"].nutation == plan.flown.nutation
+
+
+def test_ideal_impulses_have_no_width_in_the_budget() -> None:
+    body = spinner(steerable=Steerable())
+    plans = [planning.plan(one, "one-pulse") for one in (body, EXAMPLE)]
+    names = [[row.name for row in verify(one.spacecraft, one.pulses).budget] for one in plans]
+    assert names[0] == [IDEAL, AS_FLOWN]
+    assert names[1][:2] == [IDEAL, "pulse width"]
 
 
 @pytest.mark.slow

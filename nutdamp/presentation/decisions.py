@@ -73,7 +73,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
     cases = decision.cases
     heads = ["requirement", "limit", values]
     if cases is not None:
-        heads.append(f"{verdicts.exact_percent(cases.probability)} of cases")
+        heads.append(f"dispersed ({verdicts.exact_percent(cases.probability)})")
     table = columns(*heads, "margin", "verdict", text=("verdict",))
     for line in decision.lines:
         dispersed = [] if cases is None else [size(line.bound, line.dispersed)]

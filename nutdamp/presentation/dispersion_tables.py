@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from nutdamp.loop.study import LoopResults
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-NAMES = ("nutation, deg", "shift of H, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
+NAMES = ("nutation, deg", "shift of H, deg", "error of H, deg", "spin change, mrad/s", "propellant, g")
 NOTHING = 1e-9
 """In these units, what is less is rounding."""
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
@@ -43,7 +43,7 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
     """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
-    parts += angles_note(results.study.model.spacecraft)
+    parts.append(angles_note(results.study.model.spacecraft))
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and all are exact.", style="dim"))
     if nominal is not None:
@@ -97,10 +97,11 @@ def _tails(found: Distribution, shares: Array) -> Iterator[tuple[str, list[float
         yield " ≥", [*found.quantiles(1.0 - shares).tolist(), found.minimum]
 
 
-def angles_note(body: Spacecraft) -> list[RenderableType]:
-    """From where the angles of H are counted in dispersed cases, where it has no target."""
-    said = "Shift of H: from H at t = 0 of the same case; axis error: from H at t = 0 with nominal values."
-    return [Text(said, style="dim")] if body.goal.axis is None else []
+def angles_note(body: Spacecraft) -> Text:
+    """From where the angles of H are counted in dispersed cases."""
+    aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
+    said = f"Shift of H: from H at t = 0 of the same case; error of H: from {aim}."
+    return Text(f"{said} The spin axis swings about H by the nutation.", style="dim")
 
 
 def beside(value: float, largest: float) -> str:
@@ -162,7 +163,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         "case",
         "nutation\ndeg",
         "shift of H\ndeg",
-        "axis error\ndeg",
+        "error of H\ndeg",
         *bounded_heads(study.model.spacecraft.keep),
         "what counts most, in sigmas",
         text=("what counts most, in sigmas",),

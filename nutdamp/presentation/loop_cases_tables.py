@@ -37,7 +37,7 @@ NAMES = {
     "quiet": ("left then, deg", 180.0 / math.pi),
     "nutation": ("largest, deg", 180.0 / math.pi),
     "momentum_shift": ("shift of H, deg", 180.0 / math.pi),
-    "axis_error": ("axis error, deg", 180.0 / math.pi),
+    "axis_error": ("error of H, deg", 180.0 / math.pi),
     "spin_change": ("spin off, mrad/s", 1e3),
     "propellant": ("propellant, g", 1e3),
     "firings": ("firings", 1.0),
@@ -56,7 +56,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
     parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results)]
-    parts += [*angles_note(study.spacecraft), Text()]
+    parts += [angles_note(study.spacecraft), Text()]
     parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
     parts += list(_shares(results))
     anew = ", ".join(f"{in_words(one.name)} {size_text(one)}" for one in study.model.of_firings)

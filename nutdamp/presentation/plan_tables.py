@@ -104,7 +104,7 @@ def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
     if bounds:
         yield verdicts.required(spacecraft)
     if any(bound.part is Part.DISTANCE for bound in bounds):
-        yield "momentum_shift bounds the axis error: H from the target"
+        yield "momentum_shift bounds the error of H: its angle from the target"
 
 
 def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:

@@ -96,7 +96,7 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     inputs, first = study.model.inputs.drawn, study.first_order
     sampled, budgeted = results.shares, budgeted_outputs(study)
     shares = {output: first.shares(output) for output, _ in budgeted}
-    aim = "H shift" if study.model.spacecraft.goal.axis is None else "axis err"
+    aim = "H shift" if study.model.spacecraft.goal.axis is None else "H error"
     heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
     table = columns("input\n", "one sigma\nor bias", *heads)
     for row in rows:
@@ -112,13 +112,13 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         for output, _ in budgeted
     ]
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
-    table.add_row(Text("together", style="dim"), "", *texts)
+    table.add_row(Text("in combination", style="dim"), "", *texts)
     count = min(results.done, EARLY)
     how = "central differences" if study.model.schedule.blocks else "analytic derivatives"
     note = (
         f"Effect of each input alone on the nutation and on the {budgeted[1][1]}, and its share of their "
         f"variance: linear by {how}, cases as the first {count:,} cases show it (first-order Sobol "
-        "index)."
+        "index), an estimate: its column need not add to 100 %."
     )
     if study.model.groups:
         note += " Correlated inputs vary together, and their effect is the root mean square of what they do together."

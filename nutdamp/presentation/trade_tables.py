@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.compliance import SAME_COST
+from nutdamp.compliance import DAMPED_ANGLE, SAME_COST
 from nutdamp.fronts import Front, Point, numbered
 from nutdamp.planning import Plan
 from nutdamp.presentation.layout import columns
@@ -38,8 +38,10 @@ def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[Renderab
             parts.append(_table(found, front, by_others=by_others))
     if any(_below(point) for _, _, point in numbered(found)):
         parts += [Text(), Text(BELOW, style="dim")]
+    if any(_off(front, point) for front in found for point in front.points):
+        parts += [Text(), Text(OFF, style="dim")]
     if any(fails(point) for _, _, point in numbered(found)):
-        parts += [Text(), Text(f"{NOT} does not meet the requirement")]
+        parts += [Text(), Text(f"{NOT} {FAILS}")]
     return parts
 
 
@@ -50,10 +52,23 @@ BELOW = (
 """Of points that cost less than their first-order least."""
 
 
+def _off(front: Front, point: Point) -> bool:
+    """Whether H ends visibly beside where a front has it."""
+    return front.shift == 0.0 and point.plan.flight.residual.axis_error > DAMPED_ANGLE
+
+
+OFF = "Where H is not to move, the shift of H is what real widths, ticks and the shortest and longest on-times leave."
+"""Of points whose H ends a little beside where it is to end."""
+
+
 def _below(point: Point) -> bool:
     """Whether it costs less than its first-order least, as the table writes both."""
     least = point.bounds.first_order
     return least is not None and point.cost < least and cost(point.cost, point.unit) != cost(least, point.unit)
+
+
+FAILS = "does not meet the requirement with nominal values"
+"""Of points that `fails` tells."""
 
 
 def fails(point: Point) -> bool:
@@ -99,11 +114,16 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
 
 def apart(found: Sequence[Front], chosen: Plan) -> str:
     """Why the ``chosen`` plan may cost less than the schedules that are traded: it is of another scheme; or nothing."""
-    points = [point for _, _, point in numbered(found) if point.plan.pulses.end <= chosen.pulses.end]
-    if not points or chosen.scheme in schemes_of(found):
+    points = [
+        point for _, _, point in numbered(found) if point.plan.pulses.end <= chosen.pulses.end and not fails(point)
+    ]
+    if not points:
         return ""
     spent, cheapest = chosen.pulses.cost_in(points[0].unit), min(point.cost for point in points)
     if spent >= cheapest * (1.0 - SAME_COST):
+        alike = spent < cheapest and cost(spent, points[0].unit) != cost(cheapest, points[0].unit)
+        return ALIKE * alike
+    if chosen.scheme in schemes_of(found):
         return ""
     reasons = []
     if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
@@ -116,8 +136,12 @@ def apart(found: Sequence[Front], chosen: Plan) -> str:
     because = f": {listed(reasons)}" if reasons else ""
     return (
         f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than the "
-        f"schedules of the trade that end no later, and is not among them{because}."
+        f"schedules of the trade that meet the requirement and end no later, and is not among them{because}."
     )
+
+
+ALIKE = "costs within 0.1 % of each other count as equal: the recommended plan is no point of its own for so little."
+"""Of a plan that costs as little less than the points as does not count."""
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:

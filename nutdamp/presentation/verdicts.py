@@ -6,7 +6,8 @@ The floors below give data; all sentences about them are here, so that every scr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import compliance, outcome, schemes
@@ -244,8 +245,11 @@ def _spent(plan: Plan) -> str:
     )
 
 
-def hints(compared: Comparison) -> tuple[str, ...]:
-    """What the reader may prefer: a plan that keeps H much better, or takes far fewer pulses, for little more."""
+def hints(compared: Comparison, shares: Mapping[str, float] = MappingProxyType({})) -> tuple[str, ...]:
+    """What the reader may prefer: a plan that keeps H much better, or takes far fewer pulses, for little more.
+
+    ``shares``: of schemes that were dispersed, by name, the share of cases that comply.
+    """
     found, said = compared.recommendation, []
     chosen = found.plan
     for other in dict.fromkeys((found.steadier, found.simpler)):
@@ -258,7 +262,10 @@ def hints(compared: Comparison) -> tuple[str, ...]:
         if other is found.simpler:
             pulses = f"{len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)}"
             gains.append(f"takes {pulses} instead of {len(chosen.pulses)}")
-        said.append(f"{other.scheme} {' and '.join(gains)}, for {_dearer(other, chosen, found.by_propellant)}.")
+        dearer = _dearer(other, chosen, found.by_propellant)
+        complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
+        cases = f"; {' instead of '.join(complying)} of cases comply" * (len(complying) == 2)
+        said.append(f"{other.scheme} {' and '.join(gains)}, for {dearer}{cases}.")
     return tuple(said)
 
 
@@ -352,7 +359,7 @@ def tightened(found: RobustComparison) -> str:
 
 def left_name(spacecraft: Spacecraft) -> str:
     """What a plan is to leave least of."""
-    return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
+    return "nutation" if spacecraft.goal.axis is None else "nutation or error of H"
 
 
 def _more(difference: float, shown: str, what: str) -> str:

@@ -315,7 +315,7 @@ def test_it_says_where_the_nominal_case_ends_and_where_it_should(
     assert re.search(r"^target +tilt 10\.0000 deg, azimuth 45\.0000 deg; H ends .+ deg off$", done.stdout, re.MULTILINE)
     assert re.search(r"^spin axis ends at +tilt 1[01]\.[0-9]{4} deg", done.stdout, re.MULTILINE)
     words = " ".join(done.stdout.split())
-    assert "alone on the nutation and on the axis error" in words
+    assert "alone on the nutation and on the error of H" in words
     assert "on the shift of H" not in words
 
 

@@ -338,8 +338,8 @@ def test_each_part_of_the_requirement_is_shown_beside_what_is_left(run: Run) -> 
     cells = [cell.strip() for cell in rows["shift of H ≤ 0.2 deg"] if cell.strip()]
     assert cells == ["✗ 3.462", "< 1e-9", "0.1684", "< 1e-9"]
     aimed = run("plan", "--quiet", "--target", "2deg,0deg", "--scheme", "optimal").stdout
-    assert "  axis error ≤ 0.2 deg" in aimed
-    said = "momentum_shift bounds the axis error: H from the target"
+    assert "  error of H ≤ 0.2 deg" in aimed
+    said = "momentum_shift bounds the error of H: its angle from the target"
     assert said in aimed
     assert said not in done.stdout
 

@@ -224,5 +224,5 @@ def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Pat
     assert run("report", "--scheme", "half-cone", "--target", "10deg,45deg", "-o", "page.md").returncode == 0
     page = (tmp_path / "page.md").read_text("utf-8")
     assert "H ends at: **tilt 10.0000 deg, azimuth 45.0000 deg**" in page
-    assert "| axis error | ≤ 0.2 deg |" in page
+    assert "| error of H | ≤ 0.2 deg |" in page
     assert page.count("| off the target") >= 1

@@ -184,7 +184,7 @@ def test_a_single_case_ends_alike_by_both_models(run: Run, tmp_path: Path) -> No
     (tmp_path / "f.yaml").write_text(FILE + DISPERSED)
     done = run("disperse", "f.yaml", "--target", "20deg,82deg", "--scheme", "command-block", "--case", "7")
     assert done.returncode == 0, done.stderr
-    row = next(line for line in done.stdout.splitlines() if line.startswith("axis error"))
+    row = next(line for line in done.stdout.splitlines() if line.startswith("error of H"))
     impulses, flown = (float(row.split()[index]) for index in (4, 6))
     assert impulses == pytest.approx(flown, abs=0.02)
 

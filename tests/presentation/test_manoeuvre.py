@@ -87,6 +87,17 @@ def test_blocks_phases_signature_and_criteria() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("required", "strict"), [(0.05, True), (20.0, False)])
+def test_after_the_last_pulse_no_more_than_the_requirement_counts(required: float, strict: bool) -> None:
+    found = sheet(DISPERSED.replace("nutation: 0.3 deg", f"nutation: {required} deg"), "rhumb-line", 3.0, 100)
+    *before, last = (float(row["nutation: abort above deg"]) for row in rows(found, "Abort criteria"))
+    assert (last == required) == strict
+    assert strict == ("the criterion of nutation is the requirement" in found.text)
+    assert max(before) > 0.05, "on the way the limits are those of the cases"
+    assert f"may still miss the requirement (nutation within {required:g} deg and" in found.text
+
+
+@pytest.mark.slow
 def test_schemes_without_blocks_have_a_sheet_too_and_say_what_criteria_need() -> None:
     found = sheet(FILE, "rhumb-line", 3.0)
     fired, signature = rows(found, "Pulses to fire"), rows(found, "What gyros")

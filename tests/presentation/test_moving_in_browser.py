@@ -23,6 +23,7 @@ from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html
+from nutdamp.presentation.page.scales import LEAD
 from nutdamp.schemes import CLASSIC
 
 pytestmark = pytest.mark.browser
@@ -130,7 +131,8 @@ def test_one_cursor_moves_in_every_picture(browse: Browse, written: Any) -> None
             assert place(page, "pole") == (rows["pole1"][now], rows["pole2"][now])
             assert place(page, "sky") == (rows["sky1"][now], rows["sky2"][now])
             left = part(page, "time").evaluate("(line) => parseFloat(line.style.left)")
-            assert left == pytest.approx(100 * rows["t"][now] / 10 ** data["digits"]["t"] / data["until"], abs=1e-3)
+            share = rows["t"][now] / 10 ** data["digits"]["t"] / data["until"]
+            assert left == pytest.approx(100 * (LEAD + (1 - LEAD) * share), abs=1e-3)
             assert text(page, "firing") == data["firings"][rows["firing"][now]]
             fired.add(text(page, "firing") == "none")
             on = part(page, "pole-curves").evaluate("(group) => group.classList.contains('on')")

@@ -20,8 +20,8 @@ from nutdamp.presentation.figures.motion import _together
 from nutdamp.presentation.page.document import Prose
 from nutdamp.presentation.page.html import block_html
 from nutdamp.presentation.page.pictures import dispersion_pictures_of
-from nutdamp.presentation.page.scales import strip_of
-from nutdamp.presentation.trade_tables import BELOW, apart, beats, front_parts
+from nutdamp.presentation.page.scales import LEAD, strip_of
+from nutdamp.presentation.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.spacecraft import Inertia, Limits, Requirement, Spacecraft, Steerable
 from nutdamp.tolerances import Dispersions, Tolerance
@@ -104,6 +104,13 @@ def fronts_of(body: Spacecraft, costs: tuple[float, ...]) -> tuple[Front, ...]:
     return (Front(math.inf, tuple(made)),)
 
 
+def half_of(fronts: tuple[Front, ...]) -> Front:
+    """A front of the first pulse alone of its first point, which leaves nutation and shifts H."""
+    (first, *_), point = fronts[0].points[0].plan.pulses, fronts[0].points[0]
+    half = replace(point.plan, schedule=replace(point.plan.pulses, pulses=(first,)))
+    return replace(fronts[0], points=(point._replace(plan=half),))
+
+
 def test_a_cheaper_schedule_that_ends_no_later_is_named_beside_the_recommended_one() -> None:
     body = replace(BODY, requirement=Requirement(nutation=math.radians(30.0)))
     chosen = compare(body, ["two-pulse"])["two-pulse"]
@@ -141,6 +148,29 @@ def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> 
     assert "it fires the steerable torquer, which the schedules of the trade do not" in said
     assert "deg of nutation, they at most" in said
     assert apart(dearer, dearer[0].points[0].plan) == ""
+    (point,) = half_of(dearer).points
+    little = replace(cheap.pulses.pulses[0], impulse=1e-3 * cheap.pulses.pulses[0].impulse)
+    cheaper = replace(cheap, schedule=replace(cheap.pulses, pulses=(little,)))
+    assert apart((replace(dearer[0], points=(point,)),), cheaper)
+    failing = point._replace(plan=replace(point.plan, spacecraft=replace(BODY, requirement=Requirement(nutation=1e-6))))
+    assert fails(failing)
+    assert apart((replace(dearer[0], points=(failing,)),), cheaper) == "", "it is not compared with what fails"
+
+
+def test_costs_that_count_as_equal_are_told_where_they_read_differently() -> None:
+    dearer = fronts_of(BODY, (1.0009,))
+    chosen = fronts_of(BODY, (1.0,))[0].points[0].plan
+    assert apart(dearer, chosen) == ALIKE
+    assert apart(fronts_of(BODY, (1.0,)), chosen) == ""
+
+
+def test_a_table_says_why_h_ends_beside_where_it_was() -> None:
+    """The first of two pulses alone shifts H: on a front where H is not to move that is explained."""
+    made = fronts_of(BODY, (1.0,))
+    shifted, still = (replace(front, shift=0.0) for front in (half_of(made), made[0]))
+    for front, told in ((shifted, True), (replace(shifted, shift=math.inf), False), (still, False)):
+        texts = [str(part) for part in front_parts(BODY, [front])]
+        assert (OFF in texts) == told
 
 
 @pytest.mark.parametrize(("torque", "model"), [(20.0, "real pulse widths"), (None, "exact motion, ideal impulses")])
@@ -158,7 +188,10 @@ def test_the_moving_view_has_the_times_without_firings() -> None:
     body = replace(BODY, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0))
     flown = flight.flown(body, Schedule(), 20.0)
     strip, _ = strip_of(flown, flown.sampled(200, 20.0), 20.0)
-    assert strip.closed == ((0.0, 200.0), (500.0, 200.0), (1900.0, 100.0))
+    places = [2000.0 * (LEAD + (1.0 - LEAD) * time / 20.0) for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)]
+    for (left, width), begins, ends in zip(strip.closed, places[::2], places[1::2], strict=True):
+        assert left == pytest.approx(begins, abs=0.06)
+        assert width == pytest.approx(ends - begins, abs=0.06)
 
 
 def test_pulses_in_one_place_of_a_path_have_one_number() -> None:

@@ -195,7 +195,7 @@ def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -
 def momentum_cases(results: Results) -> Vector:
     """(n, 2): H at the end of the first cases as angles in degrees, from the target or from where it was.
 
-    Directions are those of `geometry.sky_plane`; the distance from zero is the axis error or the shift of H.
+    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the shift of H.
     """
     model = results.study.model
     vectors = results.early[VECTORS[compliance.aim(model.spacecraft).value], : min(results.done, EARLY)].T

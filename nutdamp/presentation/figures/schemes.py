@@ -35,6 +35,9 @@ SPAN = 0.1
 FAILS: dict[str, Any] = {"color": PULSE, "markersize": 7, "markeredgewidth": 1.6}
 """Mark of what does not meet the requirement, or does not damp."""
 
+UNMET, UNDAMPED = "requirement NOT met", "does not damp"
+"""What is said of plans that fall short."""
+
 ABREAST = 3
 """Panels side by side at most."""
 
@@ -110,7 +113,7 @@ def _short(plan: Plan, decided: Decision | None) -> str:
         return ""
     if plan.standing is Standing.MISSES or plan.kept is False:
         required = compliance.required(plan.spacecraft) or plan.kept is False
-        return "requirement NOT met" if required else "does not damp"
+        return UNMET if required else UNDAMPED
     if decided is None or decided.cases is None:
         return ""
     few = decided.shares.get(plan.scheme, 1.0) < decided.cases.probability
@@ -197,7 +200,9 @@ def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) ->
     look: dict[str, Any] = {"color": MOTION, "markerfacecolor": MOTION if chosen else PAPER, "markersize": 6}
     mark, name = "o", "recommended" if chosen else "other schemes"
     if short:
-        look, mark, name = FAILS, "X" if chosen else "x", ("recommended, " if chosen else "") + short
+        # Why is written beside the row: one mark has one name.
+        said = UNDAMPED if short == UNDAMPED else UNMET
+        look, mark, name = FAILS, "X" if chosen else "x", ("recommended, " if chosen else "") + said
     axes.plot(*place, "<" if less else mark, clip_on=False, zorder=3, linestyle="", **look)
     axes.plot([], [], mark, label=name, linestyle="", **look)
     if less:

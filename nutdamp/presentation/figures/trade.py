@@ -15,7 +15,7 @@ from nutdamp.planning import Plan
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import INK, MOMENTUM, MOTION, PAPER, PULSE
-from nutdamp.presentation.trade_tables import fails, front_name, missing, schemes_of
+from nutdamp.presentation.trade_tables import FAILS, fails, front_name, missing, schemes_of
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
             axes.plot(*np.transpose(alone), mark, markersize=5, zorder=3.5, **on_top)
     failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(found) if fails(point)]
     if failing:
-        axes.plot(*np.transpose(failing), "x", label="does not meet the requirement", **style.CROSS)
+        axes.plot(*np.transpose(failing), "x", label=FAILS, **style.CROSS)
     if covered:
         ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)

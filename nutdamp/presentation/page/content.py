@@ -126,8 +126,8 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
     reason = verdicts.reason(compared)
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
-    whom = "Recommended" if decided.cases is None else "Recommended for nominal values"
-    said = f"{decisions.statement(decided)} {whom}: {decided.plan.scheme} – {reason}."
+    by = "" if decided.cases is None else "with nominal values, "
+    said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
     return " ".join((said, *verdicts.warnings(compared, beside_verdict=True)))
 
 
@@ -178,7 +178,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
-    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
+    hints = tuple(Prose(hint) for hint in verdicts.hints(compared, {} if decided is None else decided.shares))
     blocks: list[Block] = [comparison_sheet(compared, decided), *hints]
     if remarks:
         blocks.append(Remarks(remarks))

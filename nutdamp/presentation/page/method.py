@@ -104,7 +104,9 @@ def checks_sheet(plan: Plan, found: Verification) -> Sheet:
             quantity(value, "rad/s") if part is Part.SPIN else degrees(value) for value in (abs(first - second), most)
         )
         verdict = "pass" if abs(first - second) <= most else "differs: what is flown counts"
-        rows.append((f"impulse sum (17): {part.label}", "differs from real widths by at most", allowed, shown, verdict))
+        rows.append(
+            (f"impulse sum (17): {part.label}", "differs from what is flown by at most", allowed, shown, verdict)
+        )
     heads = ("check", "criterion", "threshold", "found", "verdict")
     return Sheet("Checks and their thresholds", tuple(Column(head, number=False) for head in heads), tuple(rows))
 

@@ -19,7 +19,7 @@ from nutdamp.physics import attitude
 from nutdamp.planning import Plan
 from nutdamp.presentation import geometry
 from nutdamp.presentation.end_tables import angle_names, angle_texts
-from nutdamp.presentation.page.scales import Panel, Strip, panel, placed, strip_of
+from nutdamp.presentation.page.scales import LEAD, Panel, Strip, panel, placed, strip_of
 from nutdamp.presentation.plan_tables import channel_text
 from nutdamp.presentation.text import MISSING, most
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -147,6 +147,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
     data: dict[str, Any] = {
         "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
         "until": until,
+        "lead": LEAD,
         "span": span,
         "columns": {name: _steps(values) for name, values in columns.items()},
         "none": NONE,

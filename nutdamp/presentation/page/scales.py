@@ -23,6 +23,9 @@ STRIP = (2000, 1000)
 EDGE = 0.03
 """Part of a scale at either end without a number: it would touch those of the other scale."""
 
+LEAD = 0.012
+"""Part of the axis of time that lies before t = 0: what happens then is seen beside the cursor."""
+
 PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
 """Prefixes of units with their factors, and the largest number of a scale that needs another one."""
 
@@ -120,11 +123,17 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     def rise(angle: float) -> float:
         return round(height * (high - angle) / (high - low), 1)
 
+    def across(time: float) -> float:
+        return LEAD + (1.0 - LEAD) * time / until
+
+    def spread(begins: float, ends: float) -> tuple[float, float]:
+        return round(width * across(begins), 1), round(width * (across(ends) - across(begins)), 1)
+
     required = None if body.requirement is None else body.requirement.nutation
     channels = tuple(geometry.channels_fired(flown))
     bars = [
-        Bar(channels.index(pulse.channel), round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
-        for pulse, (begins, ends) in zip(flown.schedule, flown.spans, strict=True)
+        Bar(channels.index(pulse.channel), *spread(*span))
+        for pulse, span in zip(flown.schedule, flown.spans, strict=True)
     ]
     prefix, factor = _prefix(high - low)
     level = None if required is None else math.degrees(required)
@@ -133,16 +142,13 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         (rise(angle) * 100.0 / height, _number(factor * angle)) for angle in ticks(low + edge, high - edge, 5)
     )
     strip = Strip(
-        times=Scale("time, s", tuple((100.0 * time / until, _number(time)) for time in ticks(0.0, until, 6))),
+        times=Scale("time, s", tuple((100.0 * across(time), _number(time)) for time in ticks(0.0, until, 6))),
         angles=Scale(f"{prefix}deg", scale),
         zero=rise(0.0),
         required=rise(level) if level is not None and low < level < high else None,
         outside=most(math.radians(level)) if level is not None and not low < level < high else "",
         channels=channels,
         bars=tuple(bars),
-        closed=tuple(
-            (round(width * begins / until, 1), round(width * (ends - begins) / until, 1))
-            for begins, ends in geometry.closed(body, until)
-        ),
+        closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
     )
     return strip, [low, high]

@@ -66,6 +66,7 @@ for (const view of document.querySelectorAll(".moving")) {
   };
   const CROSS = "M-55 0H55M0 -55V55";
   const DIAMOND = "M0 -55L45 0L0 55L-45 0Z";
+  const SMALL = "M0 -26L21 0L0 26L-21 0Z"; // on the globe, where a circle of few degrees is around it
   const place = (mark, x, y) => mark.setAttribute("transform", `translate(${x} ${y})`);
 
   const pole = part("pole-curves");
@@ -83,7 +84,8 @@ for (const view of document.querySelectorAll(".moving")) {
 
   const WIDE = 2000, HIGH = 1000;
   const [low, high] = data.span;
-  const tAll = rows.t.map((t) => (WIDE * t) / 10 ** data.digits.t / data.until);
+  const shares = rows.t.map((t) => data.lead + ((1 - data.lead) * t) / 10 ** data.digits.t / data.until);
+  const tAll = shares.map((share) => WIDE * share);
   for (const name of ["lambda", "mu", "theta"]) {
     const rises = rows[name].map((v) => ((high - v / 10 ** data.digits.cone) / (high - low)) * HIGH);
     const d = line(tAll.map((x) => x.toFixed(1)), rises.map((y) => y.toFixed(1)));
@@ -148,7 +150,7 @@ for (const view of document.querySelectorAll(".moving")) {
   const signs = data.named.map((one) => ({
     name: one.name,
     axis: one.axis,
-    mark: make(globe, "path", { class: one.kind, d: DIAMOND }),
+    mark: make(globe, "path", { class: one.kind, d: one.circles.length ? SMALL : DIAMOND }),
     text: make(globe, "text", {}),
   }));
   const places = [[0, 90, "+z"], [0, -90, "−z"], ...count(4, 90).map((lon) => [lon, 0, `${lon}°`])];
@@ -230,7 +232,7 @@ for (const view of document.querySelectorAll(".moving")) {
     put(momentumAtGlobe, momenta[current]);
     put(atGlobe, axes[current]);
     for (const svg of [pole, sky, globe]) svg.classList.toggle("on", fires(current));
-    part("time").style.left = `${(tAll[current] / WIDE) * 100}%`;
+    part("time").style.left = `${shares[current] * 100}%`;
   };
   // The last row not after a time, given in the units of the column.
   const rowAt = (t) => {
@@ -321,7 +323,7 @@ for (const view of document.querySelectorAll(".moving")) {
   follow(part("sky"), (event) => nearest(part("sky"), event, (row) => [rows.sky1[row], rows.sky2[row], 0]));
   follow(part("strip"), (event) => {
     const box = part("strip").getBoundingClientRect();
-    return rowAt(((event.clientX - box.left) / box.width) * rows.t[last]);
+    return rowAt((((event.clientX - box.left) / box.width - data.lead) / (1 - data.lead)) * rows.t[last]);
   });
   let held = null;
   const turn = (lon, lat) => {
