@@ -68,8 +68,10 @@ def mass(value: float | None) -> str:
 
 
 def cost(value: float | None, unit: str) -> str:
-    """Propellant in kg as `mass` has it, an impulse with its ``unit``."""
-    return mass(value) if unit == "kg" else quantity(value, unit)
+    """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
+    shown = mass(value) if unit == "kg" else quantity(value, unit)
+    number, _, name = shown.partition(" ")
+    return shown if not value or not math.isfinite(value) else f"{digits(float(number), 4)} {name}"
 
 
 def duration(value: float | None) -> str:

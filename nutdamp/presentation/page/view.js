@@ -88,8 +88,10 @@ for (const view of document.querySelectorAll(".moving")) {
   const tAll = shares.map((share) => WIDE * share);
   for (const name of ["lambda", "mu", "theta"]) {
     const rises = rows[name].map((v) => ((high - v / 10 ** data.digits.cone) / (high - low)) * HIGH);
-    const d = line(tAll.map((x) => x.toFixed(1)), rises.map((y) => y.toFixed(1)));
-    make(part("angles"), "path", { class: name, d });
+    // What an impulse at t = 0 changes was there before.
+    const early = rows.t[1] === rows.t[0] ? 1 : 0;
+    const [xs, ys] = [[...tAll.slice(0, early).map(() => 0), ...tAll], [...rises.slice(0, early), ...rises]];
+    make(part("angles"), "path", { class: name, d: line(xs.map((x) => x.toFixed(1)), ys.map((y) => y.toFixed(1))) });
   }
 
   // ---- the globe: orthographic, seen from longitude and latitude of `look`, north up
