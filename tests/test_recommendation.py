@@ -314,6 +314,7 @@ def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
     shares = {"many": 0.352, "few": 0.67}
     (hint,) = verdicts.hints(found, shares)
     assert hint.endswith("(4.9 %); 67.0 % instead of 35.2 % of cases comply.")
+    assert verdicts.hints(found, {"many": 1.0, "few": 1.0}) == verdicts.hints(found), "what is equal is no reason"
     for pulses, propellant in ((6, 0.1049), (5, 0.1051)):
         other = judged("few", 0.0, propellant=propellant, pulses=pulses)
         assert recommend([many, other]).simpler is None

@@ -264,7 +264,7 @@ def hints(compared: Comparison, shares: Mapping[str, float] = MappingProxyType({
             gains.append(f"takes {pulses} instead of {len(chosen.pulses)}")
         dearer = _dearer(other, chosen, found.by_propellant)
         complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
-        cases = f"; {' instead of '.join(complying)} of cases comply" * (len(complying) == 2)
+        cases = f"; {' instead of '.join(complying)} of cases comply" * (len(set(complying)) == 2)
         said.append(f"{other.scheme} {' and '.join(gains)}, for {dearer}{cases}.")
     return tuple(said)
 

@@ -140,6 +140,16 @@ def test_one_cursor_moves_in_every_picture(browse: Browse, written: Any) -> None
         assert fired == {True, False}
 
 
+def test_what_an_impulse_at_t_zero_changes_is_drawn_before_it(browse: Browse, written: Any) -> None:
+    """Its curve begins at the left edge, level to t = 0; that of other flights begins at t = 0."""
+    for text_, level in (((CONFIGS / "magnus-a03.yaml").read_text(encoding="utf-8"), True), (EXAMPLE, False)):
+        with browse(written(text_)) as page:
+            path = page.locator(".moving .angles path.theta").get_attribute("d")
+            (x, y), (x_next, y_next) = (map(float, place.split()) for place in path[1:].split("L")[:2])
+            assert x == (0.0 if level else 2000.0 * LEAD)
+            assert (x_next == 2000.0 * LEAD and y_next == y) == level
+
+
 def test_pointing_at_a_curve_moves_the_cursor_there(browse: Browse, written: Any) -> None:
     with browse(written(EXAMPLE)) as page:
         page.locator(".moving").scroll_into_view_if_needed()
@@ -158,7 +168,8 @@ def test_pointing_at_a_curve_moves_the_cursor_there(browse: Browse, written: Any
         box = strip.bounding_box()
         for fraction in (0.25, 0.5, 0.9):
             page.mouse.move(box["x"] + fraction * box["width"], box["y"] + 20)
-            assert rows["t"][row(page)] == pytest.approx(fraction * rows["t"][-1], abs=0.005 * rows["t"][-1])
+            expected = (fraction - LEAD) / (1 - LEAD) * rows["t"][-1]
+            assert rows["t"][row(page)] == pytest.approx(expected, abs=0.005 * rows["t"][-1])
 
 
 def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Browse, written: Any) -> None:
@@ -179,7 +190,7 @@ def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Br
         page.mouse.up()
         assert row(page) == moment
         assert math.dist(before, place(page, "globe")) > 20
-        mark = part(page, "globe").locator("path.target[d^='M0 -55']")
+        mark = part(page, "globe").locator("path.target[d^='M0 -26']")
         assert mark.count() == 1
         assert "target" in part(page, "globe").text_content()
 

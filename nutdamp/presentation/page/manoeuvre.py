@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nutdamp import compliance
+from nutdamp.compliance import Part
 from nutdamp.flight import Flight
 from nutdamp.outcome import spin_phases
 from nutdamp.physics import attitude, cones
@@ -21,6 +23,7 @@ from nutdamp.presentation.text import MISSING, digits, in_degrees, longitude
 from nutdamp.schedule import STEERABLE
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.words import listed
 
 if TYPE_CHECKING:  # few reports disperse
     from nutdamp.dispersion.study import Results
@@ -170,12 +173,14 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
         f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone; their number is "
         "not that of --disperse."
     )
-    if verdicts.required(body):
-        last = " After the last pulse the criterion of nutation is the requirement, which fewer cases meet."
+    if strict:
         yield Prose(
-            "The criteria tell a fault from what the dispersions do: a flight within them may still miss the "
-            f"requirement ({verdicts.required(body)}).{last * strict}"
+            "After the last pulse the criterion of nutation is the requirement, which fewer cases meet: on the way a "
+            "flight within the criteria may still come to miss it."
         )
+    others = [bound.part.label for bound in compliance.required(body) if bound.part is not Part.NUTATION]
+    if others:
+        yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")
     if len(counts) < len(flown.schedule):
         yield Prose(f"There are criteria after {CHECKED} pulses at most: the first, the last and some evenly between.")
 
