@@ -23,7 +23,7 @@ from nutdamp.flight import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import bounds_text, end_table
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees
+from nutdamp.presentation.text import MISSING, degrees, digits
 from nutdamp.presentation.tolerance_tables import SHOWN, budgeted_outputs, in_words, of_nominal, tolerance_budget
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.words import listed
@@ -79,7 +79,7 @@ def _percentiles(results: Results) -> Table:
             continue
         largest = scale * max(abs(found.minimum), abs(found.maximum))
         # The nominal value has digits of its own: other places show it alone.
-        own = "0" if abs(scale * plan) < NOTHING else f"{scale * plan:.4g}"
+        own = "0" if abs(scale * plan) < NOTHING else digits(scale * plan, 4)
         for sign, reached in _tails(found, shares):
             values = (beside(scale * value, largest) for value in reached)
             table.add_row(Text(name.replace(",", f"{sign},"), style="dim"), own, *values)
