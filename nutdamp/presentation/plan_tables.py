@@ -30,7 +30,7 @@ from nutdamp.presentation.end_tables import (
     spin_text,
 )
 from nutdamp.presentation.layout import columns, facts
-from nutdamp.presentation.text import MISSING, degrees, duration, in_degrees, mass, moment, quantity, steering
+from nutdamp.presentation.text import MISSING, degrees, digits, duration, in_degrees, mass, moment, quantity, steering
 from nutdamp.remarks import said
 from nutdamp.schedule import STEERABLE, Pulse
 from nutdamp.spacecraft import Spacecraft
@@ -286,7 +286,7 @@ def pulse_table(plan: Plan) -> Table:
         ("on-time\ns", ["ideal" if on_time == 0.0 else f"{on_time:.4f}" for _, on_time in loaded]),
         *([("effective\ns", [f"{pulse.on_time:.4f}" for pulse in pulses])] if pulses.through_valves else []),
         ("channel\n", [channel_text(pulse, body) for pulse in pulses]),
-        ("impulse\nN m s", [f"{pulse.magnitude:.4g}" for pulse in pulses]),
+        ("impulse\nN m s", [digits(pulse.magnitude, 4) for pulse in pulses]),
         ("nutation\ndeg", [in_degrees(angle) for angle in before.nutation.tolist()]),
         ("after\ndeg", [in_degrees(angle) for angle in after.nutation.tolist()]),
     ]

@@ -51,8 +51,9 @@ def degrees(angle: float | None) -> str:
 
 
 def in_degrees(angle: float | None) -> str:
-    """`degrees` without the unit, for columns that name it."""
-    return degrees(angle).removesuffix(" deg")
+    """`degrees` without the unit, for columns that name it: with final zeros, as `digits` has them."""
+    shown = 0.0 if angle is None or math.isnan(angle) else math.degrees(angle)
+    return digits(shown, 4) if abs(shown) >= 1e-9 else degrees(angle).removesuffix(" deg")
 
 
 def most(angle: float) -> str:

@@ -116,15 +116,15 @@ def _signature(flown: Flight) -> Sheet:
     moments = body.inertia
     inertial = [cones.inertial_period(moments.A, moments.C, *one) for one in zip(across, spins, strict=True)]
     in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
-    periods = [f"{time:.4g}" if math.isfinite(time) else MISSING for time in in_body]
+    periods = [digits(time, 4) if math.isfinite(time) else MISSING for time in in_body]
     columns: list[tuple[Column, list[str]]] = [
         (Column("coast", number=False), names),
         *_when(body, states("t")),
-        (Column("gyro, axis 3", "rpm"), [f"{spin * RPM:.5g}" for spin in spins.tolist()]),
+        (Column("gyro, axis 3", "rpm"), _rpm(spins)),
         (Column("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
         (Column("period of that rate", "s"), periods),
         (Column("nutation", "deg"), _plain(nutation)),
-        (Column("nutation period", "s"), [f"{time:.4g}" for time in inertial]),
+        (Column("nutation period", "s"), [digits(time, 4) for time in inertial]),
     ]
     if body.sun is not None:
         columns.append((Column("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
@@ -160,10 +160,9 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
             for index, side in enumerate(("below", "above"))
         ]
     spins = np.array([one.spin for one in found])
-    columns.append((Column("spin, nominal", "rpm"), [f"{spin * RPM:.5g}" for spin in after.rates[rows, 2].tolist()]))
+    columns.append((Column("spin, nominal", "rpm"), _rpm(after.rates[rows, 2])))
     columns += [
-        (Column(f"spin: abort {side}", "rpm"), [f"{spin * RPM:.5g}" for spin in spins[:, index].tolist()])
-        for index, side in enumerate(("below", "above"))
+        (Column(f"spin: abort {side}", "rpm"), _rpm(spins[:, index])) for index, side in enumerate(("below", "above"))
     ]
     yield _sheet("Abort criteria", columns, stacked=True)
     share = verdicts.exact_percent(probability)
@@ -201,8 +200,12 @@ def _plain(angles: Vector) -> list[str]:
     return [in_degrees(angle) for angle in angles.tolist()]
 
 
+def _rpm(spins: Vector) -> list[str]:
+    return [digits(spin * RPM, 5) for spin in spins.tolist()]
+
+
 def _small(value: float) -> str:
-    return f"{value:.4g}" if abs(value) >= 1e-9 else "0"
+    return digits(value, 4) if abs(value) >= 1e-9 else "0"
 
 
 def _sheet(title: str, columns: list[tuple[Column, list[str]]], *, stacked: bool = False) -> Sheet:
