@@ -284,7 +284,7 @@ def test_dots_stand_at_the_numbers_of_the_comparison() -> None:
             else:
                 assert place == pytest.approx(left)
             shown = [note.get_text() for note in axes.texts]
-            assert (f"{left:.4g}" if left >= 1e-9 else "< 1e-9") in shown
+            assert (f"{left:#.4g}" if left >= 1e-9 else "< 1e-9") in shown
 
 
 @pytest.mark.few(1)
