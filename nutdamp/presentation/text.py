@@ -10,6 +10,9 @@ from nutdamp.rounding import cleaned
 MISSING = "–"
 """Shown where a number is not known."""
 
+RPM = 30.0 / math.pi
+"""Turns a minute of one rad/s."""
+
 LONG = (
     ("s", 1.0, 3600.0),
     ("hours", 3600.0, 172_800.0),

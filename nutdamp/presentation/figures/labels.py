@@ -75,7 +75,7 @@ _AROUND = [
 ]
 _FAR = [
     (step * math.cos(turn), step * math.sin(turn))
-    for step in (24.0, 34.0, 46.0)
+    for step in (24.0, 34.0, 46.0, 60.0, 76.0)
     for turn in np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
 ]
 _OFFSETS = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
 
-from nutdamp import __version__
+from nutdamp import __version__, schemes
 from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, cases_of, decide
@@ -44,13 +44,14 @@ from nutdamp.presentation.page.pictures import (
     trade_picture_of,
 )
 from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
-from nutdamp.presentation.text import degrees
+from nutdamp.presentation.text import degrees, sentence
 from nutdamp.presentation.trade_tables import apart, beats, front_parts
 from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
+from nutdamp.words import listed
 
 if TYPE_CHECKING:  # few reports disperse
     from nutdamp.dispersion.study import Results
@@ -128,7 +129,8 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     by = "" if decided.cases is None else "with nominal values, "
     said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
-    return " ".join((said, *verdicts.warnings(compared, beside_verdict=True)))
+    more = filter(None, (sentence(decisions.better(decided).removesuffix(".")) if decided.better else "",))
+    return " ".join((said, *more, *verdicts.warnings(compared, beside_verdict=True)))
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
@@ -179,12 +181,32 @@ def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) 
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared, {} if decided is None else decided.shares))
-    blocks: list[Block] = [comparison_sheet(compared, decided), *hints]
+    blocks: list[Block] = [comparison_sheet(compared, decided), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
     if pictured and decided is not None and len(compared) > 1:
         blocks.append(schemes_picture_of(compared, decided))
     return Section("schemes", "Schemes compared", tuple(blocks))
+
+
+def _reading(compared: Comparison) -> Iterator[str]:
+    """What names and numbers of the comparison do not say by themselves."""
+    feasible = [plan for plan in compared.plans if plan.feasible]
+    if any(COUNTS.get(plan.scheme, len(plan.pulses)) != len(plan.pulses) for plan in feasible):
+        yield (
+            "A scheme fires more pulses than its name says where the thrusters cannot give its impulse in so many, "
+            "and fewer where fewer do."
+        )
+    commanded = [plan.scheme for plan in feasible if plan.scheme in schemes.COMMANDED]
+    if commanded and len(commanded) < len(feasible):
+        yield (
+            f"{listed(commanded)} alone fires by the commands of the file; the pulses of the other schemes are timed "
+            "by limits.tick and the on-times of the thrusters, and no command block fires them."
+        )
+
+
+COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
+"""Pulses by the names of schemes."""
 
 
 def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:

@@ -20,7 +20,7 @@ from nutdamp.presentation.check_tables import (
 from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
-from nutdamp.presentation.text import MISSING, degrees, digits, duration, mass, moment, quantity, vector
+from nutdamp.presentation.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, vector
 from nutdamp.spacecraft import Spacecraft, Thruster, Vector
 
 
@@ -122,7 +122,7 @@ def ends_sheet(flown: Flight) -> Sheet:
     sizes = (f"{digits(value, 4)} N m s" for value in (size, float(np.linalg.norm(end))))
     rows.append(("|H|", *sizes, MISSING))
     goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
-    rows.append(("spin", spin_text(body.spin), spin_text(final.spin), goal))
+    rows.append(("spin", *(f"{digits(spin * RPM, 6)} rpm" for spin in (body.spin, final.spin)), goal))
     largest = body.nutation, final.nutation
     if body.inertia.symmetric:
         rows.append(("nutation", *map(degrees, largest), MISSING))

@@ -19,7 +19,7 @@ from nutdamp.presentation.block_tables import blocks_table
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
 from nutdamp.presentation.page.sheets import on_times
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
-from nutdamp.presentation.text import MISSING, digits, in_degrees, longitude
+from nutdamp.presentation.text import MISSING, RPM, digits, in_degrees, longitude
 from nutdamp.schedule import STEERABLE
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
@@ -30,8 +30,6 @@ if TYPE_CHECKING:  # few reports disperse
 
 CHECKED = 12
 """Pulses after which there are abort criteria, at most."""
-
-RPM = 30.0 / math.pi
 
 
 def manoeuvre_section(plan: Plan, dispersed: Results | None) -> Section:
@@ -116,7 +114,10 @@ def _signature(flown: Flight) -> Sheet:
     moments = body.inertia
     inertial = [cones.inertial_period(moments.A, moments.C, *one) for one in zip(across, spins, strict=True)]
     in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
-    periods = [digits(time, 4) if math.isfinite(time) else MISSING for time in in_body]
+    periods = [
+        digits(time, 4) if math.isfinite(time) and _small(math.degrees(rate)) != "0" else MISSING
+        for time, rate in zip(in_body, across.tolist(), strict=True)
+    ]
     columns: list[tuple[Column, list[str]]] = [
         (Column("coast", number=False), names),
         *_when(body, states("t")),

@@ -75,7 +75,8 @@ class Named(NamedTuple):
 class Moving:
     """What does not move in the view, and what moves as the JSON ``data``.
 
-    ``how``: the model that is flown; ``command``: what writes the same rows.
+    ``longitude``: what the numbers of the globe are; ``how``: the model that is flown; ``command``: what writes the
+    same rows.
     """
 
     panels: tuple[Panel, ...]
@@ -85,6 +86,7 @@ class Moving:
     angles: tuple[str, str]
     named: tuple[Named, ...]
     dated: bool
+    longitude: str
     steep: bool
     how: str
     command: tuple[str, ...]
@@ -160,7 +162,8 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
     }
     speeds, speed = _speeds(until)
     return Moving(
-        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None, turns > STEEP,
+        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
+        "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
         flight.model_name([flown.schedule]),
         ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
          f"--samples {samples}", "--csv FILE"),

@@ -79,7 +79,8 @@ def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
     )
     return picture(
         wide,
-        "What an earlier end costs: each mark is a schedule, numbered along each front.",
+        "What an earlier end costs: each mark is a schedule for one of the end times tried, numbered along each front; "
+        "between them a schedule may cost less than the line.",
         "Cost of schedules over the end of the last pulse",
         narrow,
     )
