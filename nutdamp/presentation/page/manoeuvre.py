@@ -45,6 +45,10 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
     if plan.pulses.blocks:
         yield sheet_of("Command blocks to load", blocks_table(flown, named=True))
     yield _firing(flown)
+    if body.commands is not None and not plan.pulses.blocks:
+        yield Prose(
+            "These pulses cannot be fired by the command blocks of the file: --scheme command-block plans those."
+        )
     yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
         yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")
@@ -144,7 +148,7 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     limits = np.array([one.nutation for one in found])
     required = None if body.requirement is None else body.requirement.nutation
     strict = required is not None and required < found[-1].nutation
-    if strict:
+    if required is not None:
         limits[-1] = required
     columns: list[tuple[Column, list[str]]] = [
         (Column("after pulse"), list(map(str, counts))),
@@ -173,11 +177,9 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
         f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone; their number is "
         "not that of --disperse."
     )
-    if strict:
-        yield Prose(
-            "After the last pulse the criterion of nutation is the requirement, which fewer cases meet: on the way a "
-            "flight within the criteria may still come to miss it."
-        )
+    if required is not None:
+        fewer = ", which fewer cases meet: on the way a flight within the criteria may still come to miss it"
+        yield Prose(f"After the last pulse the criterion of nutation is the requirement{fewer * strict}.")
     others = [bound.part.label for bound in compliance.required(body) if bound.part is not Part.NUTATION]
     if others:
         yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")
