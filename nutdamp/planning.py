@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from nutdamp import arguments, aspect, compliance, flight, schemes, views, work
+from nutdamp import arguments, aspect, compliance, flight, schemes, velocity_change, views, work
 from nutdamp.aspect import Aspect
 from nutdamp.compliance import Bound, Held, Left
 from nutdamp.errors import Infeasible
@@ -166,7 +166,7 @@ class Plan(views.Data, views.Tabled):
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        return flight.momentum_gained(_lightening(self.flight)) / mass
+        return velocity_change.momentum_gained(_lightening(self.flight)) / mass
 
     @cached_property
     def left_if_symmetric(self) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from builders import channel, cross, spinner
 
-from nutdamp import flight, schemes
+from nutdamp import schemes, velocity_change
 from nutdamp.comparison import compare
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule
@@ -34,7 +34,7 @@ def test_a_bug_that_shows_when_the_plan_is_judged_counts_too(monkeypatch: pytest
     def broken(*_: object) -> object:
         raise IndexError("list index out of range")
 
-    monkeypatch.setattr(flight, "momentum_gained", broken)
+    monkeypatch.setattr(velocity_change, "momentum_gained", broken)
     jet = channel("T", 0.0, 8.0, 0.0, isp=220.0, thrust=10.0, force=(10.0, 0.0, 0.0))
     compared = compare(spinner(channels=(jet,), mass=100.0), ("one-pulse",))
     assert [infeasibility(one) for one in compared.failed] == ["internal error, please report: IndexError"]

@@ -17,6 +17,7 @@ from nutdamp.files.output import csv_text, number
 from nutdamp.flight import Flight
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.velocity_change import LEGENDRE
 
 HEADER = ("spin", "start_utc", "start_s", "period_s", "pulses", "channel", "phase_deg", "on_time_s")
 
@@ -33,7 +34,7 @@ SAME = 1e-9
 """Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
 
 PIECES = 16
-"""Pieces of each turn over which ω3 is integrated by `flight.LEGENDRE`."""
+"""Pieces of each turn over which ω3 is integrated by `velocity_change.LEGENDRE`."""
 
 NEWTON = 3
 """Steps by which the end of a turn is found within its piece: the second one is at rounding already."""
@@ -119,7 +120,7 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
     """∫ω3 dt over stretches (n,), rad, positive in the sense of the spin at t = 0; each within one leg."""
     sense, half = math.copysign(1.0, flown.spacecraft.spin), 0.5 * (ends - begins)
     turned = np.zeros(len(begins))
-    for node, weight in ((sign * node, weight) for node, weight in flight.LEGENDRE for sign in (1.0, -1.0)):
+    for node, weight in ((sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)):
         rates, _ = flown.motion(begins + half * (1.0 + node))
         turned += weight * half * sense * rates[:, 2]
     return turned

@@ -141,7 +141,7 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
         Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
         *requirement(decision),
         *[Text.assemble(("Warning: ", "bold red"), warning) for warning in missed],
-        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
+        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared, decision.shares)],
         *figures(decision),
     ]
 

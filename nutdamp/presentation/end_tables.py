@@ -12,7 +12,7 @@ from nutdamp.demands import Keep
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.presentation.layout import facts
-from nutdamp.presentation.text import degrees, longitude, moment, most, pointing, quantity
+from nutdamp.presentation.text import RPM, degrees, longitude, moment, most, pointing, quantity
 from nutdamp.spacecraft import Spacecraft, Vector
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
@@ -46,7 +46,7 @@ def target_text(body: Spacecraft, direction: Vector) -> str:
 
 def spin_text(spin: float) -> str:
     """A spin rate given in rad/s, in rpm too."""
-    return f"{spin * 30 / math.pi:.4g} rpm ({quantity(spin, 'rad/s')})"
+    return f"{spin * RPM:.4g} rpm ({quantity(spin, 'rad/s')})"
 
 
 def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:

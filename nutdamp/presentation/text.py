@@ -55,8 +55,9 @@ def degrees(angle: float | None) -> str:
 
 def in_degrees(angle: float | None) -> str:
     """`degrees` without the unit, for columns that name it: with final zeros, as `digits` has them."""
-    shown = 0.0 if angle is None or math.isnan(angle) else math.degrees(angle)
-    return digits(shown, 4) if abs(shown) >= 1e-9 else degrees(angle).removesuffix(" deg")
+    if angle is None or not abs(math.degrees(angle)) >= 1e-9:  # not known, or rounding
+        return degrees(angle).removesuffix(" deg")
+    return digits(math.degrees(angle), 4)
 
 
 def most(angle: float) -> str:
@@ -66,16 +67,20 @@ def most(angle: float) -> str:
 
 def mass(value: float | None) -> str:
     """Propellant given in kg, in g below a kilogram."""
-    if value is None:
-        return MISSING
-    return quantity(1e3 * value, "g") if value < 1.0 else quantity(value, "kg")
+    return MISSING if value is None else quantity(*_in_grams(value))
+
+
+def _in_grams(value: float) -> tuple[float, str]:
+    """A mass given in kg, and its unit: g below a kilogram."""
+    return (1e3 * value, "g") if value < 1.0 else (value, "kg")
 
 
 def cost(value: float | None, unit: str) -> str:
     """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
-    shown = mass(value) if unit == "kg" else quantity(value, unit)
-    number, _, name = shown.partition(" ")
-    return shown if not value or not math.isfinite(value) else f"{digits(float(number), 4)} {name}"
+    if value is None or value == 0.0 or not math.isfinite(value):
+        return mass(value) if unit == "kg" else quantity(value, unit)
+    size, name = _in_grams(value) if unit == "kg" else (value, unit)
+    return f"{digits(size, 4)} {name}"
 
 
 def duration(value: float | None) -> str:

@@ -57,7 +57,7 @@ def _off(front: Front, point: Point) -> bool:
     return front.shift == 0.0 and point.plan.flight.residual.axis_error > DAMPED_ANGLE
 
 
-OFF = "Where H is not to move, the shift of H is what real widths, ticks and the shortest and longest on-times leave."
+OFF = "Real widths, ticks and the shortest and longest on-times leave H a little beside where a front has it end."
 """Of points whose H ends a little beside where it is to end."""
 
 

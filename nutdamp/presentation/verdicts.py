@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import compliance, outcome, schemes
@@ -16,7 +15,7 @@ from nutdamp.compliance import Bound, Part
 from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Plan
-from nutdamp.presentation.text import MISSING, degrees, duration, mass, moment, most, quantity, sentence
+from nutdamp.presentation.text import MISSING, RPM, degrees, duration, mass, moment, most, quantity, sentence
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import obstacle, strays
 from nutdamp.schemes.registry import OPTIMAL
@@ -245,13 +244,13 @@ def _spent(plan: Plan) -> str:
     )
 
 
-def hints(compared: Comparison, shares: Mapping[str, float] = MappingProxyType({})) -> tuple[str, ...]:
+def hints(compared: Comparison, shares: Mapping[str, float] | None = None) -> tuple[str, ...]:
     """What the reader may prefer: a plan that keeps H much better, or takes far fewer pulses, for little more.
 
     ``shares``: of schemes that were dispersed, by name, the share of cases that comply.
     """
     found, said = compared.recommendation, []
-    chosen = found.plan
+    chosen, shares = found.plan, shares or {}
     for other in dict.fromkeys((found.steadier, found.simpler)):
         if chosen is None or other is None or chosen.flown is None or other.flown is None:
             continue
@@ -262,22 +261,18 @@ def hints(compared: Comparison, shares: Mapping[str, float] = MappingProxyType({
         if other is found.simpler:
             pulses = f"{len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)}"
             gains.append(f"takes {pulses} instead of {len(chosen.pulses)}")
-        dearer = _dearer(other, chosen, found.by_propellant)
         complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
         cases = f"; {' instead of '.join(complying)} of cases comply" * (len(set(complying)) == 2)
-        said.append(f"{other.scheme} {' and '.join(gains)}, for {dearer}{cases}.")
+        said.append(f"{other.scheme} {' and '.join(gains)}, for {_dearer(other, chosen, found.by_propellant)}{cases}.")
     return tuple(said)
 
 
 def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
     """How much more a plan costs than another, with the share of it."""
-    if by_propellant:
-        more, less = one.pulses.propellant or 0.0, other.pulses.propellant or 0.0
-        extra = f"{mass(more - less)} more propellant"
-    else:
-        more, less = one.pulses.total_impulse, other.pulses.total_impulse
-        extra = f"{quantity(more - less, 'N m s')} more impulse"
-    return f"{extra} ({100.0 * (more / less - 1.0):.2g} %)"
+    unit, what = ("kg", "propellant") if by_propellant else ("N m s", "impulse")
+    more, less = one.pulses.cost_in(unit), other.pulses.cost_in(unit)
+    extra = mass(more - less) if by_propellant else quantity(more - less, unit)
+    return f"{extra} more {what} ({100.0 * (more / less - 1.0):.2g} %)"
 
 
 def spoken(compared: Comparison) -> dict[str, Any]:
@@ -402,4 +397,4 @@ def exact_percent(share: float) -> str:
 
 
 def _rpm(spin: float) -> str:
-    return f"{spin * 30.0 / math.pi:.5g} rpm"
+    return f"{spin * RPM:.5g} rpm"

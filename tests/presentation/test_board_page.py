@@ -194,7 +194,7 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
     heads, *rows = table(tree, "What each scheme costs")
     shares = {row[0]: float(row[heads.index("cases that comply %")]) for row in rows}
     assert max(shares, key=lambda name: shares[name]) == "two-pulse"
-    assert f"more cases comply with two-pulse ({shares['two-pulse']:.1f} %)" in tree.text
+    assert f"More cases comply with two-pulse ({shares['two-pulse']:.1f} %)" in tree.text
     assert run("report", "--disperse", "2e3", "-o", "page.md").returncode == 4
     assert (tmp_path / "page.md").read_text("utf-8").count(said) == 3  # verdict, tile, dispersion
 

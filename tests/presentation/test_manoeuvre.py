@@ -134,7 +134,7 @@ def test_ideal_impulses_are_loaded_by_size_and_direction(run: Run, tmp_path: Pat
         towards = math.degrees(math.atan2(pulse.impulse[1], pulse.impulse[0])) % 360.0
         assert row["channel"] == f"steerable {towards:.2f}°"
     assert "the direction of its torque, from body axis +1 towards +2" in found.text
-    assert "two-pulse fires ideal impulses, which take no time: the file has no steerable.torque" in tree.text
+    assert "Two-pulse fires ideal impulses, which take no time: the file has no steerable.torque" in tree.text
 
 
 @pytest.mark.slow

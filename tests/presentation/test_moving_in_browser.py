@@ -140,6 +140,17 @@ def test_one_cursor_moves_in_every_picture(browse: Browse, written: Any) -> None
         assert fired == {True, False}
 
 
+def test_the_thumb_of_the_slider_stays_below_the_cursor(browse: Browse, written: Any) -> None:
+    """Half of the thumb, 8 px, is within the track on either side."""
+    with browse(written(EXAMPLE)) as page:
+        last = int(part(page, "slider").get_attribute("max"))
+        for now, side in ((0, 8.0), (last, -8.0)):
+            part(page, "slider").fill(str(now))
+            slider, line = part(page, "slider").bounding_box(), part(page, "time").bounding_box()
+            end = slider["x"] if now == 0 else slider["x"] + slider["width"]
+            assert end + side == pytest.approx(line["x"] + 0.5 * line["width"], abs=1.0)
+
+
 def test_what_an_impulse_at_t_zero_changes_is_drawn_before_it(browse: Browse, written: Any) -> None:
     """Its curve begins at the left edge, level to t = 0; that of other flights begins at t = 0."""
     for text_, level in (((CONFIGS / "magnus-a03.yaml").read_text(encoding="utf-8"), True), (EXAMPLE, False)):

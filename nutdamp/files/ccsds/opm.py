@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from nutdamp import flight
 from nutdamp.epoch import Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.apm import Values, header, identity, notes_on
@@ -21,6 +20,7 @@ from nutdamp.planning import Plan
 from nutdamp.rounding import cleaned
 from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Orbit, Vector
+from nutdamp.velocity_change import momentum_gained
 
 PART = (
     "Only the part with the manoeuvres: the spacecraft file has no orbit.",
@@ -65,7 +65,7 @@ def _velocity(pulse: Pulse, number: int, flown: Flight, mass: float) -> Vector:
     if pulse.force is None:
         cure = "give the thrusters position, direction and force"
         raise BadRequest(f"the velocity change by pulse {number} ({pulse.channel}) is not known; {cure}")
-    return cleaned(flight.momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
+    return cleaned(momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
 
 
 def _manoeuvre(pulse: Pulse, number: int, velocity: Vector, reference: Reference) -> Values:

@@ -129,12 +129,12 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     by = "" if decided.cases is None else "with nominal values, "
     said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
-    more = filter(None, (sentence(decisions.better(decided).removesuffix(".")) if decided.better else "",))
-    return " ".join((said, *more, *verdicts.warnings(compared, beside_verdict=True)))
+    notes = (sentence(note.removesuffix(".")) for note in decisions.notes(decided))
+    return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
-    """The parts of the requirement with their margins, and what else the reader must know to decide."""
+    """The parts of the requirement with their margins, and the directions that are watched."""
     cases = decided.cases
     how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
     when = lasting(decided.flight)
@@ -142,9 +142,6 @@ def _decision(decided: Decision) -> Iterator[Block]:
     yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
     if decided.aspects:
         yield aspects_sheet(decided)
-    notes = tuple(("Note", note) for note in decisions.notes(decided))
-    if notes:
-        yield Remarks(notes)
 
 
 def _figures(decided: Decision) -> Iterator[Figure]:
@@ -180,7 +177,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
-    hints = tuple(Prose(hint) for hint in verdicts.hints(compared, {} if decided is None else decided.shares))
+    hints = tuple(Prose(hint) for hint in verdicts.hints(compared, None if decided is None else decided.shares))
     blocks: list[Block] = [comparison_sheet(compared, decided), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
@@ -200,8 +197,8 @@ def _reading(compared: Comparison) -> Iterator[str]:
     commanded = [plan.scheme for plan in feasible if plan.scheme in schemes.COMMANDED]
     if commanded and len(commanded) < len(feasible):
         yield (
-            f"{listed(commanded)} alone fires by the commands of the file; the pulses of the other schemes are timed "
-            "by limits.tick and the on-times of the thrusters, and no command block fires them."
+            f"Of these plans command blocks fire that of {listed(commanded)} alone; the others need pulses that are "
+            "timed one by one."
         )
 
 

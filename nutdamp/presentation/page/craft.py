@@ -17,7 +17,7 @@ from nutdamp.presentation.check_tables import (
     thrust_changes,
     valve_table,
 )
-from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts, spin_text
+from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
 from nutdamp.presentation.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, vector
@@ -121,8 +121,8 @@ def ends_sheet(flown: Flight) -> Sheet:
             rows.append((f"{what}: {name}", *cells))
     sizes = (f"{digits(value, 4)} N m s" for value in (size, float(np.linalg.norm(end))))
     rows.append(("|H|", *sizes, MISSING))
-    goal = MISSING if body.goal.spin is None else spin_text(body.goal.spin)
-    rows.append(("spin", *(f"{digits(spin * RPM, 6)} rpm" for spin in (body.spin, final.spin)), goal))
+    spins = body.spin, final.spin, body.goal.spin
+    rows.append(("spin", *(MISSING if spin is None else f"{digits(spin * RPM, 6)} rpm" for spin in spins)))
     largest = body.nutation, final.nutation
     if body.inertia.symmetric:
         rows.append(("nutation", *map(degrees, largest), MISSING))

@@ -21,6 +21,7 @@ from nutdamp.presentation.page.sheets import on_times
 from nutdamp.presentation.plan_tables import MILLISECONDS, channel_text
 from nutdamp.presentation.text import MISSING, RPM, digits, in_degrees, longitude
 from nutdamp.schedule import STEERABLE
+from nutdamp.schemes.registry import COMMANDED
 from nutdamp.schemes.tools.sun_pulses import to_sun_pulse
 from nutdamp.spacecraft import Spacecraft, Vector
 from nutdamp.words import listed
@@ -30,6 +31,9 @@ if TYPE_CHECKING:  # few reports disperse
 
 CHECKED = 12
 """Pulses after which there are abort criteria, at most."""
+
+STILL = 1e-9
+"""deg/s of transverse rate, below which it is rounding."""
 
 
 def manoeuvre_section(plan: Plan, dispersed: Results | None) -> Section:
@@ -46,9 +50,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         yield sheet_of("Command blocks to load", blocks_table(flown, named=True))
     yield _firing(flown)
     if body.commands is not None and not plan.pulses.blocks:
-        yield Prose(
-            "These pulses cannot be fired by the command blocks of the file: --scheme command-block plans those."
-        )
+        yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
     yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
         yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")
@@ -118,10 +120,8 @@ def _signature(flown: Flight) -> Sheet:
     moments = body.inertia
     inertial = [cones.inertial_period(moments.A, moments.C, *one) for one in zip(across, spins, strict=True)]
     in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
-    periods = [
-        digits(time, 4) if math.isfinite(time) and _small(math.degrees(rate)) != "0" else MISSING
-        for time, rate in zip(in_body, across.tolist(), strict=True)
-    ]
+    turns = np.isfinite(in_body) & (np.degrees(across) >= STILL)
+    periods = [digits(time, 4) if there else MISSING for time, there in zip(in_body, turns, strict=True)]
     columns: list[tuple[Column, list[str]]] = [
         (Column("coast", number=False), names),
         *_when(body, states("t")),
@@ -147,7 +147,6 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     rows = np.array(counts) - 1
     limits = np.array([one.nutation for one in found])
     required = None if body.requirement is None else body.requirement.nutation
-    strict = required is not None and required < found[-1].nutation
     if required is not None:
         limits[-1] = required
     columns: list[tuple[Column, list[str]]] = [
@@ -179,7 +178,8 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     )
     if required is not None:
         fewer = ", which fewer cases meet: on the way a flight within the criteria may still come to miss it"
-        yield Prose(f"After the last pulse the criterion of nutation is the requirement{fewer * strict}.")
+        aside = fewer * (required < found[-1].nutation)
+        yield Prose(f"After the last pulse the criterion of nutation is the requirement{aside}.")
     others = [bound.part.label for bound in compliance.required(body) if bound.part is not Part.NUTATION]
     if others:
         yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")
@@ -208,7 +208,7 @@ def _rpm(spins: Vector) -> list[str]:
 
 
 def _small(value: float) -> str:
-    return digits(value, 4) if abs(value) >= 1e-9 else "0"
+    return digits(value, 4) if abs(value) >= STILL else "0"
 
 
 def _sheet(title: str, columns: list[tuple[Column, list[str]]], *, stacked: bool = False) -> Sheet:

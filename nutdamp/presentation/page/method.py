@@ -28,8 +28,8 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
         f"Planned on the nominal values of the input file: {names}. Each schedule is then flown: Euler's equations "
         "with the true principal moments are integrated through the real pulse widths by Taylor series, coasts of "
         "symmetric bodies as exact arcs. Recommendation, requirement and verdict go by that flight. By (17), Magnus' "
-        "impulse sum, each pulse acts at its centre with its effective impulse. Schemes aim at no nutation at the end, "
-        "whatever is allowed there; only command blocks, which come in steps, are chosen within the requirement."
+        "impulse sum, each pulse acts at its centre with its effective impulse. one-pulse, two-pulse, four-pulse "
+        "and optimal aim at no nutation at the end, however much the requirement allows."
     )
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]

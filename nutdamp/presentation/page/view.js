@@ -89,8 +89,7 @@ for (const view of document.querySelectorAll(".moving")) {
   for (const name of ["lambda", "mu", "theta"]) {
     const rises = rows[name].map((v) => ((high - v / 10 ** data.digits.cone) / (high - low)) * HIGH);
     // What an impulse at t = 0 changes was there before.
-    const early = rows.t[1] === rows.t[0] ? 1 : 0;
-    const [xs, ys] = [[...tAll.slice(0, early).map(() => 0), ...tAll], [...rises.slice(0, early), ...rises]];
+    const [xs, ys] = rows.t[1] === rows.t[0] ? [[0, ...tAll], [rises[0], ...rises]] : [tAll, rises];
     make(part("angles"), "path", { class: name, d: line(xs.map((x) => x.toFixed(1)), ys.map((y) => y.toFixed(1))) });
   }
 
@@ -282,6 +281,7 @@ for (const view of document.querySelectorAll(".moving")) {
   };
   button.addEventListener("click", () => play(!playing));
   slider.max = last;
+  slider.style.setProperty("--lead", data.lead); // its thumb stays below the cursor
   slider.addEventListener("input", () => stop(Number(slider.value)));
   const begins = rows.firing.flatMap((text, row) => (text > 0 && text !== rows.firing[row - 1] ? [row] : []));
   part("back")?.addEventListener("click", () => stop(begins.filter((row) => row < current).pop() ?? 0));
