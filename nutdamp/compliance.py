@@ -145,6 +145,31 @@ def unaided(spacecraft: Spacecraft) -> bool:
     return all(one.met for left in ends for one in held(spacecraft, left))
 
 
+def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
+    """When a nutation (rad) is reached without firing, s: ln(tan θ/tan θ0)/κ; 0 where it is, infinite where never.
+
+    Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that at t = 0.
+    """
+    growth = spacecraft.growth
+    now = spacecraft.nutation if now is None else now
+    if (nutation <= now) if growth > 0.0 else (nutation >= now):
+        return 0.0
+    if growth == 0.0 or now == 0.0 or nutation == 0.0:
+        return math.inf
+    return math.log(math.tan(nutation) / math.tan(now)) / growth
+
+
+def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
+    """When the ``nutation`` (rad) of a prolate body, with nothing done, exceeds the one that is required, s from then.
+
+    None where it does not grow, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    """
+    required = spacecraft.requirement
+    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return None
+    return reached(spacecraft, required.nutation, nutation) if spacecraft.growth > 0.0 else None
+
+
 def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
     """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more.
 

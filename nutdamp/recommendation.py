@@ -5,8 +5,8 @@ It gives data; `nutdamp.presentation.verdicts` has the words.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
@@ -24,12 +24,21 @@ STEADIER_SHIFT = 0.2
 STEADIER_COST = 1.1
 """... that it is worth a remark, if it costs at most so many times as much."""
 
-
 FEWER_PULSES = 0.5
 """Share of the recommended plan's pulses up to which another one is so much simpler..."""
 
 FEWER_COST = 1.05
 """... that it is worth a remark, if it costs at most so many times as much."""
+
+SOONER_END = 0.5
+"""Share of the recommended plan's end up to which another one, a nutation period earlier at least, is so much sooner...
+"""
+
+SOONER_COST = 1.05
+"""... that it is worth a remark, if it costs at most so many times as much."""
+
+REAL_COST = 1.1
+"""So many times as much a plan may cost that fires real pulse widths beside one of ideal impulses, for a remark."""
 
 
 class Standing(Enum):
@@ -53,6 +62,19 @@ class Ground(Enum):
     NOMINAL = "nominal"
     SHIFT = "shift"
     END = "end"
+
+
+class Gain(Enum):
+    """In what another plan is much better than the recommended one, for little more."""
+
+    STEADIER = "steadier"
+    """It keeps H."""
+    SIMPLER = "simpler"
+    """It takes far fewer pulses."""
+    SOONER = "sooner"
+    """It ends far sooner."""
+    REAL = "real"
+    """It fires real pulse widths, where the recommended one fires ideal impulses."""
 
 
 class Judged(Protocol):
@@ -97,7 +119,7 @@ class Recommendation(Generic[Plan]):
     """The plan to fly; None, as ``standing`` and ``ground``, where none is feasible.
 
     It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
-    ``steadier`` would keep H much better for little more, ``simpler`` takes far fewer pulses for little more.
+    ``alternatives``: the cheapest plan that gains so much for little more.
     """
 
     plan: Plan | None = None
@@ -105,8 +127,7 @@ class Recommendation(Generic[Plan]):
     ground: Ground | None = None
     count: int = 0
     by_propellant: bool = True
-    steadier: Plan | None = None
-    simpler: Plan | None = None
+    alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
 
 
 def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
@@ -124,8 +145,7 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
     those = [one for one in those if one.kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
-        notable = _steadier(best, those), _simpler(best, those)
-        return Recommendation(best, standing, ground, len(those), by_propellant(those), *notable)
+        return Recommendation(best, standing, ground, len(those), by_propellant(those), _alternatives(best, those))
     best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
@@ -168,22 +188,26 @@ def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
-def _steadier(best: Plan, plans: Sequence[Plan]) -> Plan | None:
-    """The cheapest plan that shifts H by less than a fifth for at most a tenth more; none where H has a target."""
-    if best.spacecraft.goal.axis is not None or _off(best) <= DAMPED_ANGLE:
-        return None
-    known = by_propellant(plans)
-    most = STEADIER_COST * _cost(best, known)
-    steadier = [one for one in plans if _off(one) < STEADIER_SHIFT * _off(best) and _cost(one, known) <= most]
-    return min(steadier, key=lambda one: _cost(one, known), default=None)
-
-
-def _simpler(best: Plan, plans: Sequence[Plan]) -> Plan | None:
-    """The cheapest plan of half the pulses or fewer for at most a twentieth more."""
-    known = by_propellant(plans)
-    most, fewer = FEWER_COST * _cost(best, known), FEWER_PULSES * len(best.pulses)
-    simpler = [one for one in plans if 0 < len(one.pulses) <= fewer and _cost(one, known) <= most]
-    return min(simpler, key=lambda one: _cost(one, known), default=None)
+def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
+    """The cheapest of the ``plans`` that gains so much on the ``best`` for little more, by what it gains."""
+    known, body = by_propellant(plans), best.spacecraft
+    few, soon = FEWER_PULSES * len(best.pulses), SOONER_END * best.pulses.end
+    found: dict[Gain, Plan] = {}
+    for gain, times, gains in (
+        (Gain.STEADIER, STEADIER_COST, lambda one: _off(one) < STEADIER_SHIFT * _off(best)),
+        (Gain.SIMPLER, FEWER_COST, lambda one: len(one.pulses) <= few),
+        (Gain.SOONER, SOONER_COST, lambda one: one.pulses.end <= min(soon, best.pulses.end - body.inertial_period)),
+        (Gain.REAL, REAL_COST, lambda one: not one.pulses.idealised),
+    ):
+        if gain is Gain.STEADIER and (body.goal.axis is not None or _off(best) <= DAMPED_ANGLE):
+            continue
+        if gain is Gain.REAL and not best.pulses.idealised:
+            continue
+        most = times * _cost(best, known)
+        those = [one for one in plans if len(one.pulses) and gains(one) and _cost(one, known) <= most]
+        if those:
+            found[gain] = min(those, key=lambda one: _cost(one, known))
+    return found
 
 
 def by_propellant(plans: Sequence[Plan]) -> bool:

@@ -9,6 +9,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,10 +22,13 @@ from nutdamp.decision import Cases, Decision, cases_of, decide
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results
 from nutdamp.dispersion.study import run as fly
+from nutdamp.flight import by_impulses
+from nutdamp.outcome import seen_at
 from nutdamp.presentation import decisions, verdicts
 from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Goal, Keep, Requirement, Spacecraft
+from nutdamp.spacecraft import Goal, Inertia, Keep, Requirement, Spacecraft
 
 
 @cache
@@ -119,6 +123,48 @@ def test_schemes_that_comply_more_often_are_named() -> None:
     said = "more cases comply with two-pulse (85.6 %) than with four-pulse (71.4 %)."
     assert decisions.better(decided) == said
     assert decisions.better(Decision(example()["two-pulse"], counted(0.856, 0.9, 0.1), shares)) == ""
+
+
+def test_nutation_that_grows_is_said_to_keep_the_requirement_for_a_while() -> None:
+    """Before any pulse and again after the last one; the times end where a flight without pulses says."""
+    stage = nutdamp.example("upper-stage")
+    decided = decide(compare(stage, CLASSIC))
+    assert decided is not None
+    before, loop = decisions.notes(decided)
+    assert before == (
+        "Without a pulse the requirement is met up to 62.41 s: by then the nutation of 1 deg at t = 0 has grown to "
+        "2 deg."
+    )
+    idle = Schedule(())
+    assert math.degrees(seen_at(by_impulses(stage, idle, 62.41), 62.41).final.nutation) == pytest.approx(2.0, rel=1e-4)
+    assert loop == "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
+    wide = replace(decided, cases=replace(counted(1.0, 0.54, 0.1), probability=0.99))
+    *_, after, _ = decisions.notes(wide)
+    grown = "from 0.54 deg (not exceeded in 99 % of cases) to 2 deg in 117.9 s"
+    assert after == f"After the last pulse what is left grows again: {grown}."
+    slope = math.tan(math.radians(0.54)) / math.tan(stage.nutation)
+    left = replace(stage, omega0=np.array([*(slope * stage.omega0[:2]), stage.omega0[2]]))
+    assert math.degrees(seen_at(by_impulses(left, idle, 117.87), 117.87).final.nutation) == pytest.approx(2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"dissipation": None, "loop": None},
+        {"inertia": Inertia((4200.0, 4200.0, 5000.0)), "loop": None},  # oblate: it decays
+        {
+            "requirement": Requirement(nutation=math.radians(5.0)),
+            "loop": None,
+        },  # kept up to the horizon
+        {"requirement": Requirement(nutation=math.radians(0.5)), "loop": None},  # not kept at t = 0
+        {"requirement": None, "loop": None},
+        {"keep": (Keep("star", np.array([1.0, 0.0, 0.0]), 0.1),), "loop": None},
+    ],
+)
+def test_where_nothing_grows_beyond_what_is_required_nothing_is_said(change: dict[str, Any]) -> None:
+    decided = decide(compare(replace(nutdamp.example("upper-stage"), **change), CLASSIC))
+    assert decided is not None
+    assert list(decisions.notes(decided)) == []
 
 
 def watched(least: float, body: Spacecraft | None = None) -> Spacecraft:

@@ -22,12 +22,13 @@ from builders import (
 )
 from cases_dir import case
 
+import nutdamp
 from nutdamp import planning, schemes
 from nutdamp.comparison import Comparison, compare, usual
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Ground, Standing, cheapest, recommend
+from nutdamp.recommendation import Gain, Ground, Standing, cheapest, recommend
 from nutdamp.remarks import infeasibility
 from nutdamp.spacecraft import Goal, Requirement
 
@@ -289,9 +290,12 @@ def test_without_nutation_a_spin_to_set_is_something_to_do() -> None:
 
 def test_a_plan_that_keeps_h_for_little_more_is_mentioned() -> None:
     cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
-    assert recommend([cheap, judged("still", 0.0, shift=0.35, propellant=13.1)]).steadier is not None
+    assert recommend([cheap, judged("still", 0.0, shift=0.35, propellant=13.1)]).alternatives
     for shift, propellant in ((0.37, 13.1), (0.35, 13.3)):
-        assert recommend([cheap, judged("still", 0.0, shift=shift, propellant=propellant)]).steadier is None
+        assert (
+            Gain.STEADIER
+            not in recommend([cheap, judged("still", 0.0, shift=shift, propellant=propellant)]).alternatives
+        )
     compared = Comparison(cheap.spacecraft, (cheap, judged("still", 0.0, shift=0.01, propellant=12.8)))
     assert verdicts.hints(compared) == (
         "still shifts H by 0.01 deg instead of 1.8 deg, for 800 g more propellant (6.7 %).",
@@ -302,7 +306,7 @@ def test_of_plans_that_keep_h_for_little_more_the_cheapest_is_mentioned() -> Non
     best = judged("best", 0.0, shift=1.0, propellant=0.1)
     dear, cheap = (judged(name, 0.0, shift=0.1, propellant=cost) for name, cost in (("dear", 0.108), ("cheap", 0.105)))
     for plans in ((best, dear, cheap), (best, cheap, dear)):
-        assert recommend(plans).steadier is cheap
+        assert recommend(plans).alternatives[Gain.STEADIER] is cheap
 
 
 def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
@@ -317,24 +321,58 @@ def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
     assert verdicts.hints(found, {"many": 1.0, "few": 1.0}) == verdicts.hints(found), "what is equal is no reason"
     for pulses, propellant in ((6, 0.1049), (5, 0.1051)):
         other = judged("few", 0.0, propellant=propellant, pulses=pulses)
-        assert recommend([many, other]).simpler is None
+        assert Gain.SIMPLER not in recommend([many, other]).alternatives
     single = judged("single", 0.0, propellant=0.101, pulses=1)
-    assert recommend([many, few, single]).simpler is single
+    assert recommend([many, few, single]).alternatives[Gain.SIMPLER] is single
     both = judged("both", 0.0, shift=0.01, propellant=0.104, pulses=1)
     (hint,) = verdicts.hints(
         Comparison(many.spacecraft, (judged("many", 0.0, shift=1.0, propellant=0.1, pulses=2), both))
     )
     assert hint.startswith("both shifts H by 0.01 deg instead of 1 deg and takes 1 pulse instead of 2, for 4 g more")
+    (hint,) = verdicts.hints(
+        Comparison(many.spacecraft, (many, judged("few", 0.0, shift=0.65, propellant=0.104, pulses=2)))
+    )
+    assert hint.endswith("(4 %); but it shifts H by 0.65 deg instead of 0 deg."), "what it is worse in"
     nothing = judged("a", 0.0, pulses=0), judged("b", 0.0, pulses=0)
-    assert recommend(nothing).simpler is None
+    assert Gain.SIMPLER not in recommend(nothing).alternatives
+
+
+def test_a_plan_that_ends_far_sooner_for_little_more_is_mentioned() -> None:
+    """Half the time at most, and a nutation period at least."""
+    late = judged("late", 0.0, propellant=0.1, end=100.0)
+    period = late.spacecraft.inertial_period
+    soon = judged("soon", 0.0, shift=0.2, propellant=0.1045, end=50.0)
+    (hint,) = verdicts.hints(Comparison(late.spacecraft, (late, soon)))
+    assert hint == (
+        "soon ends at 50.000 s instead of 100.000 s, for 4.5 g more propellant (4.5 %); but it shifts H by 0.2 deg "
+        "instead of 0 deg."
+    )
+    for end, propellant in ((51.0, 0.1045), (50.0, 0.1055)):
+        assert not recommend([late, judged("soon", 0.0, propellant=propellant, end=end)]).alternatives
+    early = judged("early", 0.0, propellant=0.1, end=period)
+    assert not recommend([early, judged("soon", 0.0, propellant=0.1045, end=0.4 * period)]).alternatives
+
+
+def test_beside_ideal_impulses_a_plan_of_real_widths_is_mentioned() -> None:
+    """They cost the same within 0.1 %, and the one that ends first is recommended: it cannot be fired as it stands."""
+    body = nutdamp.example("magnus-a03")
+    found = compare(body, usual(body))
+    assert found.recommended is not None
+    assert found.recommended.pulses.idealised
+    real = found.recommendation.alternatives[Gain.REAL]
+    assert not real.pulses.idealised
+    (hint,) = [one for one in verdicts.hints(found) if "real pulse widths" in one]
+    assert hint.startswith(f"{real.scheme} fires real pulse widths")
+    without = recommend([one for one in found.plans if not one.pulses.idealised])
+    assert Gain.REAL not in without.alternatives
 
 
 def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:
     cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
-    assert recommend([cheap, judged("idle", 4.0, shift=0.0, propellant=12.5)]).steadier is None
+    assert Gain.STEADIER not in recommend([cheap, judged("idle", 4.0, shift=0.0, propellant=12.5)]).alternatives
     wandering = judged("cheap", 0.0, shift=0.11, propellant=12.0, goal=POINTING)
     pointing = judged("still", 0.0, shift=0.0, propellant=12.5, goal=POINTING)
-    assert recommend([wandering, pointing]).steadier is None  # with a target H shall not stay
+    assert Gain.STEADIER not in recommend([wandering, pointing]).alternatives  # with a target H shall not stay
 
 
 # --- rounding does not decide ---------------------------------------------------------------------------------------

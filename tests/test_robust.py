@@ -20,7 +20,7 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.presentation import verdicts
+from nutdamp.presentation import robust_verdicts
 from nutdamp.schemes import CLASSIC, four_pulse
 from nutdamp.screening import Candidate
 from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
@@ -266,7 +266,7 @@ def test_nothing_feasible() -> None:
     found = planned(replace(body, channels=weak, limits=replace(body.limits, horizon=1e-3)))
     assert found.chosen is None
     assert found.cost is None
-    assert verdicts.robust_reason(found) == "no scheme is feasible"
+    assert robust_verdicts.robust_reason(found) == "no scheme is feasible"
     assert found.meets_requirement is None
 
 

@@ -23,7 +23,7 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import plan
-from nutdamp.presentation import verdicts
+from nutdamp.presentation import robust_verdicts
 from nutdamp.presentation.tolerance_tables import stated_text
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes.optimal.columns import Columns
@@ -132,7 +132,7 @@ def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme(
     assert found.chosen is not None
     assert found.meets_requirement
     assert "against dispersions" in found.chosen.variant
-    assert verdicts.robust_reason(found).startswith("at least 99.7 % of cases comply with it")
+    assert robust_verdicts.robust_reason(found).startswith("at least 99.7 % of cases comply with it")
     assert violations(body, found.chosen.plan.pulses) == []
     usual = plan(body, "two-pulse").pulses
     assert found.chosen.plan.pulses.propellant is not None
@@ -188,7 +188,7 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes() -> None
     again = replace(body, dispersions=scaled(body.dispersions, needed.tolerances, needed.factor))
     checked = run(Results(study_of(again, found.chosen.plan.pulses, seed=needed.seed), needed.cases))
     assert (checked.met_fraction, checked.interval[0]) == (needed.complied, needed.least)
-    said = verdicts.tightened(found)
+    said = robust_verdicts.tightened(found)
     assert said.startswith("99.7 % of cases would comply with it, given ")
     shown = re.search(r"A \{normal: ([0-9.]+) %\} instead of 0.5 %", said)
     assert shown is not None
@@ -217,7 +217,7 @@ def test_where_enough_cases_comply_nothing_has_to_shrink() -> None:
     compared = compare(body, ("optimal",))
     found = robust.compare(compared, robust.attempts(compared)[:1], samples=SAMPLES)
     assert found.tightening is None
-    assert verdicts.tightened(found) == ""
+    assert robust_verdicts.tightened(found) == ""
 
 
 @pytest.mark.slow

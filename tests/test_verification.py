@@ -345,4 +345,7 @@ def test_ideal_impulses_that_leave_more_than_the_flown_pulses_are_explained(
     rows = (Imperfection(IDEAL, 0.0, ideal, ideal), Imperfection(AS_FLOWN, 0.0, flown, flown))
     kept = Conservation("|H|", 0.0, ())
     note = budget_note(Verification((), kept, kept, rows))
-    assert note.startswith("As ideal impulses the pulses leave more than as flown") == said
+    rounded = (*rows[1:], Imperfection(IDEAL, 0.0, 0.0, 0.0), Imperfection("command resolution", ideal, 0.0, 0.0))
+    alone = budget_note(Verification((), kept, kept, rounded))
+    assert alone.startswith("With command resolution alone the pulses leave more nutation than as flown")
+    assert note.startswith("As ideal impulses the pulses leave H farther off than as flown") == said

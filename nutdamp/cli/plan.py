@@ -240,9 +240,9 @@ def _data(compared: Comparison, decided: Decision | None, dispersed: RobustCompa
     if dispersed is None:
         return made
     from nutdamp.files.robust_json import robust_json
-    from nutdamp.presentation import verdicts
+    from nutdamp.presentation import robust_verdicts
 
-    return {**made, "robust": robust_json(dispersed, verdicts.robust_reason(dispersed))}
+    return {**made, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
 
 
 def _picture(chosen: Plan, figure: str) -> Figure:

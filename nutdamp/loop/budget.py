@@ -5,11 +5,11 @@ tan θ = tan θ0 e^{κt} says when damping must begin; the limit cycle of a clos
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from nutdamp import compliance
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.loop.chains import Cycle
 from nutdamp.loop.cycles import Map
@@ -89,8 +89,8 @@ class Budget:
 
     @property
     def until_largest(self) -> float | None:
-        """Time, s, after which damping must have begun; see `reached`."""
-        return None if self.largest is None else reached(self.spacecraft, self.largest)
+        """Time, s, after which damping must have begun; see `compliance.reached`."""
+        return None if self.largest is None else compliance.reached(self.spacecraft, self.largest)
 
     @property
     def feasible(self) -> bool:
@@ -102,19 +102,6 @@ class Budget:
         """Whether some pair of thresholds meets it; None where nothing is required of a loop."""
         found = [one.meets_requirement for one in self.held]
         return None if not found or None in found else any(found)
-
-
-def reached(spacecraft: Spacecraft, nutation: float) -> float:
-    """When a nutation (rad) is reached without firing, s: ln(tan θ/tan θ0)/κ; 0 where it is, infinite where never.
-
-    Growing nutation reaches it from below, decaying nutation from above.
-    """
-    now, growth = spacecraft.nutation, spacecraft.growth
-    if (nutation <= now) if growth > 0.0 else (nutation >= now):
-        return 0.0
-    if growth == 0.0 or now == 0.0 or nutation == 0.0:
-        return math.inf
-    return math.log(math.tan(nutation) / math.tan(now)) / growth
 
 
 def expect_dissipation(spacecraft: Spacecraft) -> None:
@@ -156,7 +143,7 @@ def budget(
 def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
     body = replace(spacecraft, loop=loop)
     pair = Thresholds(loop.start, loop.stop)
-    found = Held(body, pair, reached(body, loop.start))
+    found = Held(body, pair, compliance.reached(body, loop.start))
     try:
         found = replace(found, band=dead_band(body, loop))
         _expect_damping(body, loop)

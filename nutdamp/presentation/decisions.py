@@ -8,6 +8,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp import compliance
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
 from nutdamp.decision import Decision, Line
@@ -15,8 +16,8 @@ from nutdamp.demands import SLACK
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.end_tables import cone_margins, end_table
 from nutdamp.presentation.layout import columns
-from nutdamp.presentation.text import MISSING, degrees, mass, moment, most, quantity
-from nutdamp.remarks import strays
+from nutdamp.presentation.text import MISSING, degrees, lasting, mass, moment, most, quantity
+from nutdamp.remarks import TELLING, strays
 from nutdamp.words import listed
 
 KEPT = {True: "kept", False: "NOT kept"}
@@ -66,6 +67,30 @@ def better(decision: Decision) -> str:
 def notes(decision: Decision) -> Iterator[str]:
     """What must be known beside the verdict: which other schemes comply more often, and what was idealised."""
     yield from filter(None, (better(decision), verdicts.idealised(decision.plan)))
+    yield from _growing(decision)
+    if decision.plan.spacecraft.loop is not None:
+        yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
+
+
+def _growing(decision: Decision) -> Iterator[str]:
+    """How long nutation that grows keeps the requirement: without a pulse, and again from what is left."""
+    body = decision.plan.spacecraft
+    now, idle = body.nutation, compliance.outgrown(body, body.nutation)
+    most_of = {bound.part: most(bound.most) for bound in compliance.required(body)}
+    there = compliance.aim(body) is Part.SHIFT or compliance.aim(body) not in most_of
+    if idle and there and body.goal.spin is None and not body.keep and not compliance.unaided(body):
+        grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {most_of[Part.NUTATION]}"
+        yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
+    if not len(decision.plan.pulses):
+        return
+    left, whose, until = decision.final.nutation, "", decision.flight.until
+    if decision.cases is not None:
+        left = decision.cases.levels[Part.NUTATION]
+        whose = f" (not exceeded in {verdicts.exact_percent(decision.cases.probability)} of cases)"
+    again = compliance.outgrown(body, left)
+    if again and left > TELLING:
+        grows = f"from {degrees(left)}{whose} to {most_of[Part.NUTATION]} in {lasting(again)}"
+        yield f"After {'the last pulse' if until is None else moment(until)} what is left grows again: {grows}."
 
 
 def decision_table(decision: Decision, values: str = "nominal") -> Table:
@@ -86,7 +111,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
             table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
-        margin = f"{100.0 * (cases.complying - cases.probability):.3g} % of cases"
+        margin = f"{100.0 * (cases.complying - cases.probability):.3g} percentage points"
         said = coloured(verdicts.VERDICT[cases.met], cases.met)
         table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
     return table

@@ -204,6 +204,19 @@ def momentum_inset(flight: Flight, track: Track) -> Vector | None:
     return small if len(flight.schedule) and INSET_FROM < share < INSET_BELOW else None
 
 
+def once(points: Vector) -> Vector:
+    """A path (n, 2), broken by NaN where it goes straight back: dashes drawn both ways would fill each other's gaps."""
+    grain = 1e-6 * max(float(np.ptp(points, axis=0).max()), 1e-9)
+    places = [tuple(place) for place in np.round(points / grain).astype(np.int64).tolist()]
+    drawn: set[tuple[tuple[int, ...], tuple[int, ...]]] = set()
+    kept = [points[0]]
+    for first, second, point in zip(places, places[1:], points[1:], strict=False):
+        back = first != second and (second, first) in drawn
+        kept += [np.full(2, math.nan), point] if back else [point]
+        drawn.add((first, second))
+    return np.array(kept)
+
+
 def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
     """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
     low, high = points.min(axis=0), points.max(axis=0)

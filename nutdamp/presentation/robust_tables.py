@@ -8,7 +8,7 @@ from rich.text import Text
 from nutdamp import compliance
 from nutdamp.certificate import Certificate, SureCertificate
 from nutdamp.planning import Plan
-from nutdamp.presentation import verdicts
+from nutdamp.presentation import robust_verdicts, verdicts
 from nutdamp.presentation.decisions import KEPT, figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
@@ -23,7 +23,7 @@ MOST_ROWS = 12
 
 def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> RenderableType:
     """Everything that ``plan --robust`` shows, and what a certificate proves."""
-    body, decided, reason = found.comparison.spacecraft, found.decision, verdicts.robust_reason(found)
+    body, decided, reason = found.comparison.spacecraft, found.decision, robust_verdicts.robust_reason(found)
     infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
     if decided is None or found.chosen is None:
@@ -36,8 +36,8 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
         *(Text(one) for one in filter(None, [_fresh(found)])),
-        Text(verdicts.robust_cost(found)),
-        *(Text(one) for one in filter(None, [verdicts.tightened(found), proved(proof)])),
+        Text(robust_verdicts.robust_cost(found)),
+        *(Text(one) for one in filter(None, [robust_verdicts.tightened(found), proved(proof)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(
@@ -135,7 +135,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
             *[KEPT[plan.kept is not False]] * cones,
             *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * counted,
         )
-    what = verdicts.left_name(found.comparison.spacecraft)
+    what = robust_verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
     more = f"{rest} more plan{'s rank' if rest > 1 else ' ranks'} below these. " if rest else ""
     fewer = [f"{count:,}" for count in _fewer(found)]

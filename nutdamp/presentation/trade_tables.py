@@ -157,8 +157,10 @@ SOONER = 0.05
 
 def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
     """A row for each point; ``by_others``: with its scheme."""
-    names = ("ends at", "cost", "first-order least", "pulses", "shift of H", "against first")
-    table = columns("point", *names, *("scheme",) * by_others, text=("scheme",))
+    names = ("ends at", "cost", "first-order least", "pulses", "shift of H")
+    first = next(index for index, owner, _ in numbered(found) if owner is front)
+    schemes = ("scheme",) * by_others
+    table = columns("point", *names, f"against point {first}", *schemes, text=("scheme",))
     dearest = front.points[0].cost
     for index, owner, point in numbered(found):
         if owner is front:

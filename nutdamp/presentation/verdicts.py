@@ -5,9 +5,8 @@ The floors below give data; all sentences about them are here, so that every scr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nutdamp import compliance, outcome, schemes
 from nutdamp.comparison import Comparison
@@ -16,14 +15,11 @@ from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Plan
 from nutdamp.presentation.text import MISSING, RPM, degrees, duration, mass, moment, most, quantity, sentence
-from nutdamp.recommendation import Ground, Standing
+from nutdamp.recommendation import Gain, Ground, Standing
 from nutdamp.remarks import obstacle, strays
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.words import listed
-
-if TYPE_CHECKING:  # few runs look for a robust plan
-    from nutdamp.robust import RobustComparison
 
 VERDICT = {True: "met", False: "NOT met", None: MISSING}
 """What `Plan.meets_requirement` says of the requirement."""
@@ -245,34 +241,69 @@ def _spent(plan: Plan) -> str:
 
 
 def hints(compared: Comparison, shares: Mapping[str, float] | None = None) -> tuple[str, ...]:
-    """What the reader may prefer: a plan that keeps H much better, or takes far fewer pulses, for little more.
+    """What the reader may prefer: a plan that is much better in some way for little more, and what it is worse in.
 
     ``shares``: of schemes that were dispersed, by name, the share of cases that comply.
     """
-    found, said = compared.recommendation, []
-    chosen, shares = found.plan, shares or {}
-    for other in dict.fromkeys((found.steadier, found.simpler)):
-        if chosen is None or other is None or chosen.flown is None or other.flown is None:
-            continue
-        gains = []
-        if other is found.steadier:
-            shift, instead = degrees(other.flown.momentum_shift), degrees(chosen.flown.momentum_shift)
-            gains.append(f"shifts H by {shift} instead of {instead}")
-        if other is found.simpler:
-            pulses = f"{len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)}"
-            gains.append(f"takes {pulses} instead of {len(chosen.pulses)}")
-        complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
-        cases = f"; {' instead of '.join(complying)} of cases comply" * (len(set(complying)) == 2)
-        said.append(f"{other.scheme} {' and '.join(gains)}, for {_dearer(other, chosen, found.by_propellant)}{cases}.")
+    found = compared.recommendation
+    chosen, said = found.plan, []
+    for other in dict.fromkeys(found.alternatives.values()):
+        assert chosen is not None
+        gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
+        better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
+        clauses = better, _drawback(other, chosen), _complying(other, chosen, shares or {})
+        said.append(f"{'; '.join(filter(None, clauses))}.")
     return tuple(said)
+
+
+def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
+    """In what a plan is better than the ``chosen`` one."""
+    if gain is Gain.REAL:
+        return "fires real pulse widths"
+    if gain is Gain.STEADIER:
+        return f"shifts H by {_shift(other)} instead of {_shift(chosen)}"
+    if gain is Gain.SOONER:
+        return f"ends at {moment(other.pulses.end)} instead of {moment(chosen.pulses.end)}"
+    return f"takes {len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)} instead of {len(chosen.pulses)}"
+
+
+def _drawback(other: Plan, chosen: Plan) -> str:
+    """That a plan leaves H clearly farther off than the ``chosen`` one; empty where it does not."""
+    assert other.flown is not None
+    assert chosen.flown is not None
+    if other.flown.axis_error <= FARTHER * chosen.flown.axis_error + compliance.DAMPED_ANGLE:
+        return ""
+    if chosen.spacecraft.goal.axis is None:
+        return f"but it shifts H by {_shift(other)} instead of {_shift(chosen)}"
+    return f"but H ends {degrees(other.flown.axis_error)} instead of {degrees(chosen.flown.axis_error)} off the target"
+
+
+def _shift(plan: Plan) -> str:
+    assert plan.flown is not None
+    return degrees(plan.flown.momentum_shift)
+
+
+def _complying(other: Plan, chosen: Plan, shares: Mapping[str, float]) -> str:
+    """In how many cases two plans comply, where that differs."""
+    complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
+    return f"{' instead of '.join(complying)} of cases comply" * (len(set(complying)) == 2)
 
 
 def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
     """How much more a plan costs than another, with the share of it."""
     unit, what = ("kg", "propellant") if by_propellant else ("N m s", "impulse")
     more, less = one.pulses.cost_in(unit), other.pulses.cost_in(unit)
+    if more <= less * (1.0 + ROUNDING):
+        return f"no more {what}"
     extra = mass(more - less) if by_propellant else quantity(more - less, unit)
     return f"{extra} more {what} ({100.0 * (more / less - 1.0):.2g} %)"
+
+
+ROUNDING = 1e-9
+"""Share by which costs that are equal may differ."""
+
+FARTHER = 1.1
+"""So many times as far off H ends where a plan that is preferred for something else is said to be worse in it."""
 
 
 def spoken(compared: Comparison) -> dict[str, Any]:
@@ -283,84 +314,6 @@ def spoken(compared: Comparison) -> dict[str, Any]:
         "warnings": list(warnings(compared)),
         "hints": list(hints(compared)),
     }
-
-
-def robust_reason(found: RobustComparison) -> str:
-    """Why the robust plan, or none."""
-    chosen, count = found.chosen, len(found.candidates)
-    if chosen is None:
-        return "no scheme is feasible"
-    if chosen.met is None:
-        level = exact_percent(found.probability)
-        best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
-        as_good = f"{found.equals} leave about as little"
-    elif chosen.met >= found.probability:
-        best = f"at least {exact_percent(found.probability)} of cases comply with it, of {count} plans"
-        as_good = f"they do with {found.equals}"
-    else:
-        best = f"most cases comply, of {count} plans"
-        as_good = f"{found.equals} comply equally often within the sampling error"
-    if count == 1:
-        return "the scheme named" if len(found.comparison.plans) == 1 else "the only plan"
-    cost = "propellant" if found.by_propellant else "impulse"
-    then = {
-        Ground.COST: f"least {cost}",
-        Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended for nominal values",
-        Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
-        Ground.END: f"least {cost} within 0.1 %, and first to end",
-    }
-    return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
-
-
-def robust_cost(found: RobustComparison) -> str:
-    """The robust plan against the one that is recommended for nominal values."""
-    chosen, usual, cost = found.chosen, found.usual, found.cost
-    if chosen is None or usual is None or cost is None:
-        return "There is nothing to compare it with."
-    if chosen is usual:
-        return "It is the plan that is recommended for nominal values too."
-    if cost.propellant is None:
-        spent = _more(cost.impulse, quantity(abs(cost.impulse), "N m s"), "impulse")
-    else:
-        spent = _more(cost.propellant, mass(abs(cost.propellant)), "propellant")
-    when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
-    level = exact_percent(found.probability)
-    what = left_name(found.comparison.spacecraft)
-    gained = f"{degrees(chosen.left)} instead of {degrees(usual.left)} of {what} in {level} of the cases"
-    if chosen.met is not None and usual.met is not None:
-        shares = (percent(one.met or 0.0, found.probability) for one in (chosen, usual))
-        gained = f"{' instead of '.join(shares)} of cases comply"
-    return f"Against {usual.plan.scheme}, recommended for nominal values: {gained}; it takes {spent} and ends {when}."
-
-
-def tightened(found: RobustComparison) -> str:
-    """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
-    from nutdamp.dispersion.study import CONFIDENCE
-    from nutdamp.presentation.tolerance_tables import in_words, stated_text
-
-    needed, chosen = found.tightening, found.chosen
-    if needed is None or chosen is None:
-        return ""
-    sizes, tolerances = [], [one.tolerance for one, _ in needed.inputs]
-    for one, relative in needed.inputs:
-        less = stated_text(one._replace(size=needed.factor * one.size), relative, down=True)
-        named = in_words(one.tolerance if tolerances.count(one.tolerance) == 1 else one.name)
-        sizes.append(f"{named} {{{one.kind}: {less}}} instead of {stated_text(one, relative)}")
-    level, least = exact_percent(found.probability), 100.0 * math.floor(1e4 * needed.least) / 1e4
-    checked = f"{percent(needed.complied, found.probability)} of {needed.cases:,} other cases (seed {needed.seed}) do"
-    shown = f"which shows at least {least:.4g} % with {exact_percent(CONFIDENCE)} confidence"
-    return f"{level} of cases would comply with it, given {listed(sizes)}: {checked}, {shown}."
-
-
-def left_name(spacecraft: Spacecraft) -> str:
-    """What a plan is to leave least of."""
-    return "nutation" if spacecraft.goal.axis is None else "nutation or error of H"
-
-
-def _more(difference: float, shown: str, what: str) -> str:
-    if difference == 0.0:
-        return f"as much {what}"
-    return f"{shown} {'more' if difference > 0 else 'less'} {what}"
 
 
 def required(spacecraft: Spacecraft) -> str:

@@ -10,8 +10,9 @@ import pytest
 from builders import channel, spinner
 
 import nutdamp
+from nutdamp.compliance import reached
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.loop.budget import DAY, YEAR, Budget, Thresholds, budget, reached
+from nutdamp.loop.budget import DAY, YEAR, Budget, Thresholds, budget
 from nutdamp.loop.chains import Cycle
 from nutdamp.loop.cycles import Map
 from nutdamp.loop.diagnosis import Stop

@@ -312,6 +312,16 @@ def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
+def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
+    """Out, back, and aside: dashes both ways would look like a solid line."""
+    out = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    gap = [np.nan, np.nan]
+    np.testing.assert_array_equal(geometry.once(out), [[0, 0], [0, 0], [1, 0], gap, [0, 0], [0, 1]])
+    turn = np.linspace(0.0, 2 * np.pi, 50)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    np.testing.assert_array_equal(geometry.once(circle), circle)
+
+
 @pytest.mark.parametrize(
     ("path", "magic"), [("a.png", b"\x89PNG"), ("b.SVG", b"<?xml"), ("c.d.pdf", b"%PDF"), ("-", b"\x89PNG")]
 )

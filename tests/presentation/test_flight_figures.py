@@ -334,7 +334,8 @@ def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None
 def test_the_sphere_names_its_lines() -> None:
     (legend,) = drawn("sphere", "reversed").legends
     named = {text.get_text() for text in legend.get_texts()}
-    assert {"space cone", "body cone", "path", "pulse", "path of H"} <= named
+    assert {"space cone", "body cone", "path of the spin axis", "pulse", "path of H"} <= named
+    assert "plane of H, ω and spin axis" in named
 
 
 def test_a_long_title_takes_more_lines() -> None:

@@ -122,7 +122,7 @@ def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small:
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
     """The path of H, (n, 2) degrees, with its places at first and after each pulse, which are returned."""
-    axes.plot(momentum[:, 0], momentum[:, 1], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
+    axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
     stations = [momentum[:1]]
     numbered = style.thinned(len(flight.schedule), NUMBERED)
     for stretch in geometry.stretches(flight, track):

@@ -35,6 +35,9 @@ WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 SPACE, BODY = 0.28, 0.15
 """How dense the cones are filled: distinguished in grey print too."""
 
+RIM = 0.7
+"""Points: the width of rims and edges of cones, thinner than the path of the spin axis, which shares their colour."""
+
 MARKS = "+os"
 """Of H, ω and the spin axis in the plane picture."""
 
@@ -120,7 +123,7 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
             ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
             draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
     momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
-    axes.plot(*momentum.T, color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
 
 
 def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
@@ -151,10 +154,10 @@ def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
     if len(found.body):
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
         axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(found)}")
-    axes.plot([], [], color=MOTION, linewidth=1.0, label="path")
+    axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
     if pulses:
         axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
-    axes.plot([], [], color=MOMENTUM, linewidth=1.0, linestyle=(0, (3, 1.5)), label="path of H")
+    axes.plot([], [], label="path of H", **style.PATH_OF_H)
 
 
 def _hidden(found: Cones) -> str:
@@ -196,8 +199,8 @@ def _rims(found: Cones) -> tuple[tuple[Vector, Vector, str, float], ...]:
 def _cone(axes: Axes, looked: View, rim: Vector, within: Vector, filled: tuple[str, float]) -> None:
     """A cone from the centre to its rim: what it covers on paper filled and outlined, rim drawn."""
     covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
-    axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=0.8)
-    axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=1.0)
+    axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=RIM)
+    axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=RIM)
 
 
 def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
@@ -245,6 +248,6 @@ def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
             if within is not rim:  # a rim that does not close: what it fills has an outline of its own
                 axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
     places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
-    axes.plot(*places.T, color=GREY, linewidth=0.8)
+    axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
     for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
         axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

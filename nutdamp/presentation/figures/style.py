@@ -40,6 +40,9 @@ TARGET: dict[str, Any] = {
 }  # fmt: skip
 """Mark of the target axis: larger than the marks of what ends there, and over them."""
 
+PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
+"""Look of the path of H."""
+
 PAPER = "#fefefe"
 """What lies under a hollow mark; in a page, its background."""
 

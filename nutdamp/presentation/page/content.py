@@ -46,7 +46,7 @@ from nutdamp.presentation.page.pictures import (
 from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees, sentence
 from nutdamp.presentation.trade_tables import apart, beats, front_parts
-from nutdamp.presentation.verify_tables import budget_note, budget_table, conservation, methods_table, verdict
+from nutdamp.presentation.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
 from nutdamp.spacecraft import Spacecraft
@@ -129,7 +129,9 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     by = "" if decided.cases is None else "with nominal values, "
     said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
-    notes = (sentence(note.removesuffix(".")) for note in decisions.notes(decided))
+    needless = verdicts.needless(compared)
+    nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
+    notes = (sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided)))
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
 
@@ -236,10 +238,12 @@ def _verification(chosen: Plan) -> Section:
     blocks: list[Block] = [
         Prose(f"{verdict(verified)} {conservation(verified)}"),
         checks_sheet(chosen, verified),
-        sheet_of("The schedule flown by independent means", methods_table(verified)),
+        sheet_of(
+            "The schedule flown by independent means; differences are the largest on the way", methods_table(verified)
+        ),
         *([Remarks(missing)] if missing else []),
         sheet_of(
-            "Error budget: what each imperfection alone leaves, everything else ideal",
+            BUDGET,
             budget_table(chosen.spacecraft, verified),
         ),
         *[Prose(note) for note in (budget_note(verified),) if note],
@@ -276,8 +280,9 @@ def _versions() -> Iterator[tuple[str, str]]:
     """What the numbers and pictures depend on."""
     yield "nutdamp", __version__
     yield "Python", platform.python_version()
-    for package in ("numpy", "scipy", "highspy", "matplotlib"):
+    packages = {"numpy": "numpy", "scipy": "scipy", "highspy": "highspy", "matplotlib": "matplotlib", "bsk": "Basilisk"}
+    for package, name in packages.items():
         try:
-            yield package, version(package)
+            yield name, version(package)
         except PackageNotFoundError:
-            yield package, "not installed"
+            yield name, "not installed"
