@@ -54,6 +54,14 @@ class Front:
     points: tuple[Point, ...]
     why: str | None = None
 
+    def least(self, point: Point) -> float | None:
+        """The first-order least of a ``point`` of it; no more than those of points that have less time."""
+        found, within = point.bounds.first_order, point.bounds.within
+        known = [one.bounds for one in self.points if one.bounds.within <= within]
+        return (
+            None if found is None else min([found, *(one.first_order for one in known if one.first_order is not None)])
+        )
+
 
 def fronts(
     spacecraft: Spacecraft,

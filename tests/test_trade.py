@@ -107,6 +107,18 @@ class Made(NamedTuple):
         return self
 
 
+def test_the_first_order_least_of_a_front_never_rises_with_time(found: tuple[fronts.Front, ...]) -> None:
+    """A schedule that a stricter front found has the least of that one, which may be more than this front needs."""
+    strict, free = found[0], found[-1]
+    borrowed = replace(free, points=(free.points[0], *strict.points))
+    for front in (*found, borrowed):
+        leasts = [front.least(point) for point in sorted(front.points, key=lambda one: one.bounds.within)]
+        assert leasts
+        assert all(one is not None for one in leasts)
+        assert leasts == sorted(leasts, key=lambda one: -(one or 0.0))
+    assert all((free.least(point) or math.inf) <= (point.bounds.first_order or 0.0) for point in free.points)
+
+
 def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
     """Random clouds: what allows more is nowhere dearer, and no front has two points that cost the same."""
     draw = np.random.default_rng(5)

@@ -342,10 +342,16 @@ def test_what_is_conserved_is_no_number_of_noughts(
 def test_ideal_impulses_that_leave_more_than_the_flown_pulses_are_explained(
     ideal: float, flown: float, said: bool
 ) -> None:
-    rows = (Imperfection(IDEAL, 0.0, ideal, ideal), Imperfection(AS_FLOWN, 0.0, flown, flown))
+    rows = (
+        Imperfection(IDEAL, 0.0, ideal, ideal),
+        Imperfection("disturbances", 0.0, 0.0, 0.0),
+        Imperfection(AS_FLOWN, 0.0, flown, flown),
+    )
     kept = Conservation("|H|", 0.0, ())
     note = budget_note(Verification((), kept, kept, rows))
     rounded = (*rows[1:], Imperfection(IDEAL, 0.0, 0.0, 0.0), Imperfection("command resolution", ideal, 0.0, 0.0))
     alone = budget_note(Verification((), kept, kept, rounded))
     assert alone.startswith("With command resolution alone the pulses leave more nutation than as flown")
     assert note.startswith("As ideal impulses the pulses leave H farther off than as flown") == said
+    none = (Imperfection(IDEAL, 0.0, 0.0, 0.0), Imperfection(AS_FLOWN, 0.0, 0.0, 0.0))
+    assert budget_note(Verification((), kept, kept, none)).startswith("Nothing is imperfect here")

@@ -44,7 +44,7 @@ def _row(index: int, front: Front, point: Point) -> list[str]:
         str(len(plan.pulses)),
         number(plan.pulses.propellant),
         number(plan.pulses.total_impulse),
-        number(point.bounds.first_order),
+        number(front.least(point)),
         point.unit,
         *(number(math.degrees(angle)) for angle in (left.nutation, left.momentum_shift, left.axis_error)),
         plan.scheme,

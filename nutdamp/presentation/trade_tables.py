@@ -36,7 +36,7 @@ def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[Renderab
             parts.append(Text(_without_optimal(front)))
         if front.points:
             parts.append(_table(found, front, by_others=by_others))
-    if any(_below(point) for _, _, point in numbered(found)):
+    if any(_below(front, point) for _, front, point in numbered(found)):
         parts += [Text(), Text(BELOW, style="dim")]
     if any(_off(front, point) for front in found for point in front.points):
         parts += [Text(), Text(OFF, style="dim")]
@@ -61,9 +61,9 @@ OFF = "Real widths, ticks and the shortest and longest on-times leave H a little
 """Of points whose H ends a little beside where it is to end."""
 
 
-def _below(point: Point) -> bool:
+def _below(front: Front, point: Point) -> bool:
     """Whether it costs less than its first-order least, as the table writes both."""
-    least = point.bounds.first_order
+    least = front.least(point)
     return least is not None and point.cost < least and cost(point.cost, point.unit) != cost(least, point.unit)
 
 
@@ -164,7 +164,7 @@ def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> Renderab
     dearest = front.points[0].cost
     for index, owner, point in numbered(found):
         if owner is front:
-            spent, least = (cost(value, point.unit) for value in (point.cost, point.bounds.first_order))
+            spent, least = (cost(value, point.unit) for value in (point.cost, front.least(point)))
             plan, more = point.plan, round(100.0 * (point.cost / dearest - 1.0), 1) + 0.0  # no negative zero
             shift = degrees(plan.flight.residual.momentum_shift)
             cells = moment(plan.pulses.end), spent, least, str(len(plan.pulses)), shift, f"{more:.1f} %"

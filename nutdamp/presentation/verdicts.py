@@ -159,8 +159,11 @@ def idealised(plan: Plan) -> str:
     """That a plan fires impulses which take no time, and why; empty where it does not."""
     if not plan.pulses.idealised:
         return ""
-    torquer = plan.spacecraft.steerable
-    unknown = ": the file has no steerable.torque" if torquer is None or torquer.torque is None else ""
+    torquer, unknown = plan.spacecraft.torquer, ""
+    if torquer is not None and plan.spacecraft.steerable is None:
+        unknown = ": the file names no actuator, and an ideal steerable torquer is assumed"
+    elif torquer is not None and torquer.torque is None:
+        unknown = ": the file has no steerable.torque"
     return f"{plan.scheme} fires ideal impulses, which take no time{unknown}."
 
 

@@ -21,6 +21,7 @@ from nutdamp.presentation.text import digits, in_degrees
 from nutdamp.presentation.verdicts import percent
 from nutdamp.recommendation import Standing, by_propellant
 from nutdamp.spacecraft import Vector
+from nutdamp.words import listed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,8 +113,9 @@ def _short(plan: Plan, decided: Decision | None) -> str:
     if not plan.feasible:
         return ""
     if plan.standing is Standing.MISSES or plan.kept is False:
-        required = compliance.required(plan.spacecraft) or plan.kept is False
-        return UNMET if required else UNDAMPED
+        missed = [bound.part.label for bound in plan.shortfalls if bound.required]
+        missed += ["cones"] * (plan.kept is False)
+        return f"NOT met: {listed(missed)}" if missed else UNDAMPED
     if decided is None or decided.cases is None:
         return ""
     few = decided.shares.get(plan.scheme, 1.0) < decided.cases.probability

@@ -110,7 +110,9 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     name_lines(axes, found, pulses=pulses)
     frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
-    axes.set_title("Cones at t = 0" + (f" (angles × {much:g})" if much != 1.0 else ""))
+    first = flight.schedule.pulses[:1]
+    before = ", before pulse 1" * any(pulse.thrust[0] <= 0.0 for pulse in first)
+    axes.set_title(f"Cones at t = 0{before}" + (f" (angles × {much:g})" if much != 1.0 else ""))
 
 
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
@@ -132,9 +134,11 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
-        colour, width = (MOTION, thin) if stretch.pulse is None else (PULSE, 1.8 * thin)
-        draw_line(axes, looked, track.axis[rows], colour, width)
-        pulses |= stretch.pulse is not None and bool(np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE))
+        if stretch.pulse is None:
+            draw_line(axes, looked, track.axis[rows], MOTION, thin)
+        elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):
+            draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
+            pulses = True
     return pulses
 
 

@@ -80,7 +80,9 @@ def trade_figure(
             "linestyle": "",
             "zorder": 4,
         }
-        other = "" if chosen.scheme in schemes_of(found) else " (not traded)"
+        other = (
+            "" if chosen.scheme in schemes_of(found) else f" (not traded{', ideal impulses' * chosen.pulses.idealised})"
+        )
         axes.plot(*place, "*", label=f"recommended: {chosen.scheme}{other}", **look)
     axes.set_xlim(right=REACH * spacecraft.horizon)
     axes.margins(y=0.12)

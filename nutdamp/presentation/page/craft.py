@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nutdamp import survey
+from nutdamp import compliance, survey
+from nutdamp.demands import required_share
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.presentation.check_tables import (
@@ -21,6 +22,7 @@ from nutdamp.presentation.end_tables import FRAME_N, angle_names, angle_texts
 from nutdamp.presentation.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
 from nutdamp.presentation.plan_tables import derived_table
 from nutdamp.presentation.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, vector
+from nutdamp.presentation.verdicts import exact_percent
 from nutdamp.spacecraft import Spacecraft, Thruster, Vector
 
 
@@ -38,7 +40,9 @@ def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
         yield sheet_of("Disturbances, and what each does alone", disturbance_table(body))
 
 
-def spacecraft_facts(spacecraft: Spacecraft, title: str = "At t = 0, and what a plan must keep") -> Facts:
+def spacecraft_facts(
+    spacecraft: Spacecraft, title: str = "At t = 0, what is required of the end, and the limits of a plan"
+) -> Facts:
     """The spacecraft at t = 0, its requirement, and the limits of its plans."""
     return facts_of(
         title, derived_table(spacecraft, (*_body(spacecraft), *_limits(spacecraft), *sun_pulse_facts(spacecraft)))
@@ -63,7 +67,11 @@ def _body(body: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    limits = spacecraft.limits
+    limits, required = spacecraft.limits, spacecraft.requirement
+    if spacecraft.dispersions is not None and compliance.judged(spacecraft):
+        given = required is not None and required.probability is not None
+        default = "" if given else " (the default: the file has no requirement.probability)"
+        yield "dispersed cases", f"{exact_percent(required_share(required))} must comply{default}"
     yield "horizon", duration(spacecraft.horizon)
     kept = []
     if limits.earliest > 0.0:

@@ -51,6 +51,10 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
     yield _firing(flown)
     if body.commands is not None and not plan.pulses.blocks:
         yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
+    if plan.pulses.idealised:
+        yield Prose(
+            "On-time “ideal”: an impulse that takes no time. A thruster fires it as a pulse centred on its time."
+        )
     yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
         yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")

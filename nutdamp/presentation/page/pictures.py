@@ -34,7 +34,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         ),
         (
             "sphere",
-            "The cones in space: the body cone rolls on the space cone about H.",
+            f"The cones in space: {'the inside of ' * (plan.spacecraft.inertia.a < 0.0)}the body cone rolls on the "
+            "space cone about H.",
             "Spherical view of body cone, space cone, angular momentum and spin axis",
         ),
         (
@@ -46,7 +47,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     if len(plan.pulses):
         through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
         how = "by which impulse" if plan.pulses.idealised else "for how long"
-        said = f"Which channel fires, when and {how}." + through * plan.pulses.through_valves
+        said = f"Which channel fires, when and {how}: written beside the bars where there is room, and in the schedule."
+        said += through * plan.pulses.through_valves
         if any(pulse.channel == STEERABLE for pulse in plan.pulses):
             said += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
         drawn.append(("timeline", said, "Timeline of the firings"))
@@ -90,6 +92,7 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
     """How the cases of a study are distributed, where H ends, which tolerance counts; raises MissingExtra."""
     body = dispersed.study.model.spacecraft
     bounded = any(bound.part is compliance.aim(body) for bound in compliance.required(body))
+    limited = bool(compliance.required(body))
     biased = any(row.bias for row in budget_rows(dispersed.study))
     drawn = (
         (
@@ -108,7 +111,7 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         (
             "budget",
             f"One sigma of each input{', or its bias (hatched),' * biased} alone: what it does to the nutation, and to "
-            "where H ends.",
+            "where H ends." + " The line of what is required holds for all inputs together." * limited,
             "Tornado of the tolerance budget",
         ),
     )
