@@ -69,7 +69,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if not inertia.symmetric:
         first, second, _ = inertia.moments
         table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
-    table.add_row("spin", spin_text(spacecraft.spin))
+    table.add_row("spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0))
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
     table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -76,39 +77,67 @@ def fails(point: Point) -> bool:
     return point.plan.meets_requirement is False or point.plan.kept is False
 
 
-def beats(found: Sequence[Front], chosen: Plan) -> str:
-    """Which schedule of the fronts is better than the ``chosen`` one, with the command that plans it; or nothing.
+class _Better(NamedTuple):
+    """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier."""
 
-    It meets the requirement, and costs less and ends no later, or costs as much, leaves as little shift of H and ends
-    sooner. The cheapest is named, of those that cost as much the one that ends first.
+    saved: float
+    earlier: float
+    number: int
+    front: Front
+    point: Point
+
+    @property
+    def how(self) -> str:
+        """What it is better in."""
+        if self.saved:
+            return f"costs {100.0 * self.saved:.2g} % less than the recommended plan and ends no later"
+        return f"costs as much as the recommended plan and ends {duration(self.earlier)} earlier"
+
+
+def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
+    """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
+
+    The cheapest, of those that cost as much the one that ends first.
     """
     until = chosen.pulses.end
     better = [
-        (saved if saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point)
+        _Better(saved if saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point)
         for index, front, point in numbered(found)
         if point.plan.meets_requirement and point.plan.kept is not False
         for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
         if (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]
-    if not better:
+    return max(better, key=lambda one: one[:2], default=None)
+
+
+def outdone(found: Sequence[Front], chosen: Plan) -> str:
+    """That a schedule of the fronts is better than the ``chosen`` one, for a headline; or nothing."""
+    better = _better(found, chosen)
+    return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
+
+
+def beats(found: Sequence[Front], chosen: Plan) -> str:
+    """Which schedule of the fronts is better than the ``chosen`` one, with the command that plans it; or nothing."""
+    better = _better(found, chosen)
+    if better is None:
         return ""
-    saved, earlier, index, front, point = max(better, key=lambda one: one[:2])
+    front, point = better.front, better.point
     off = [one.flight.residual.axis_error for one in (point.plan, chosen)]
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     within = f'--set "limits.horizon={point.horizon:.6g} s"'
     pointing = chosen.spacecraft.goal.axis is not None
-    name = front_name(front, pointing=pointing)
     where = "leaves H {} off the target" if pointing else "shifts H by {}"
-    instead = f"; it {where.format(degrees(off[0]))} instead of {degrees(off[1])}"
-    aside = instead * (abs(off[0] - off[1]) > SAME_ANGLE)
-    how = (
-        f"costs {100.0 * saved:.2g} % less than the recommended plan and ends no later"
-        if saved
-        else f"costs as much as the recommended plan and ends {duration(earlier)} earlier"
-    )
+    asides = []
+    if abs(off[0] - off[1]) > SAME_ANGLE:
+        asides.append(f"{where.format(degrees(off[0]))} instead of {degrees(off[1])}")
+    counts = [len(one.pulses) for one in (point.plan, chosen)]
+    if counts[0] != counts[1]:
+        asides.append(f"takes {counts[0]} pulse{'s' * (counts[0] != 1)} instead of {counts[1]}")
+    aside = f"; it {listed(asides)}" * bool(asides)
     return (
-        f"point {index} meets the requirement with nominal values too, {how} ({name}){aside}: "
-        f"plan --scheme {point.plan.scheme} {options}{within}."
+        f"point {better.number} meets the requirement with nominal values too, {better.how} "
+        f"({front_name(front, pointing=pointing)}){aside}: "
+        f"nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}{within}."
     )
 
 

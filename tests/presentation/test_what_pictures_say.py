@@ -21,7 +21,7 @@ from nutdamp.presentation.page.document import Prose
 from nutdamp.presentation.page.html import block_html
 from nutdamp.presentation.page.pictures import dispersion_pictures_of
 from nutdamp.presentation.page.scales import LEAD, strip_of
-from nutdamp.presentation.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts
+from nutdamp.presentation.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.spacecraft import Inertia, Limits, Requirement, Spacecraft, Steerable
 from nutdamp.tolerances import Dispersions, Tolerance
@@ -118,6 +118,7 @@ def test_a_cheaper_schedule_that_ends_no_later_is_named_beside_the_recommended_o
     assert said.startswith(
         "point 3 meets the requirement with nominal values too, costs 10 % less than the recommended plan"
     )
+    assert "pulses instead of" not in said, "both take two"
     assert said.endswith('--free-axis --set "limits.horizon=42 s".')
     assert beats(fronts_of(body, (1.0, 1.1)), chosen) == ""
 
@@ -130,6 +131,9 @@ def test_a_schedule_as_cheap_that_ends_sooner_is_named_beside_the_recommended_on
     said = beats(fronts_of(body, (1.0,)), chosen)
     assert said.startswith("point 1 meets the requirement with nominal values too, costs as much as")
     assert "and ends 6.283 s earlier" in said
+    headline = "“Time against cost” has a schedule that costs as much as the recommended plan and ends 6.283 s earlier."
+    assert outdone(fronts_of(body, (1.0,)), chosen) == headline
+    assert outdone((), chosen) == ""
     assert beats(fronts_of(body, (1.0,)), compare(body, ["two-pulse"])["two-pulse"]) == ""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -134,7 +134,8 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
     places = np.vstack(stations)
     marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
     name = "H at t = 0 and after each pulse"
-    axes.plot(*places[marked].T, "+", color=MOMENTUM, markersize=8, markeredgewidth=1.4, label=name)
+    look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under pulses
+    axes.plot(*places[marked].T, "+", label=name, **look)
     return places
 
 

@@ -239,7 +239,7 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
     style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
     sky = geometry.sky_names(flight)
-    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"The same, seen along H\n{sky.view}")
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H, true angles\n{sky.view}")
 
 
 def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:

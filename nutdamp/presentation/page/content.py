@@ -45,7 +45,7 @@ from nutdamp.presentation.page.pictures import (
 )
 from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
 from nutdamp.presentation.text import degrees, sentence
-from nutdamp.presentation.trade_tables import apart, beats, front_parts
+from nutdamp.presentation.trade_tables import apart, beats, front_parts, outdone
 from nutdamp.presentation.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Standing
 from nutdamp.remarks import said
@@ -107,7 +107,7 @@ def report_page(
     return Page(
         title=control.title or _title(body),
         control=control,
-        verdict=_verdict(compared, decided),
+        verdict=_verdict(compared, decided, traded),
         met=None if decided is None else decided.met,
         good=decided is not None and decided.met is not False and decided.plan.standing is Standing.COMPLIES,
         decision=() if decided is None else tuple(_decision(decided)),
@@ -123,7 +123,7 @@ def _title(body: Spacecraft) -> str:
     return f"{body.name}: damping {degrees(body.tilt)} of nutation{turn}"
 
 
-def _verdict(compared: Comparison, decided: Decision | None) -> str:
+def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Front]) -> str:
     reason = verdicts.reason(compared)
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
@@ -131,7 +131,8 @@ def _verdict(compared: Comparison, decided: Decision | None) -> str:
     said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
-    notes = (sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided)))
+    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided))]
+    notes += filter(None, [outdone(traded, decided.plan)])
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
 

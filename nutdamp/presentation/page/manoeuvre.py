@@ -74,6 +74,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
 def _phases(plan: Plan) -> str:
     """What the phases of pulses and the delays of blocks are counted from."""
     spin = "Spin phase: the angle by which the body has turned about axis 3 since t = 0"
+    spin += ", positive about +3, so that it falls with this spin" * (plan.spacecraft.spin < 0.0)
     if not _senses(plan.spacecraft):
         return f"{spin}, at the commanded start, modulo 360 deg."
     delays = " A delay in deg is the delay times the spin: nutation near the Sun makes the Sun phase another angle."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from nutdamp import flight, guide
+from nutdamp import compliance, flight, guide
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Part, left_of
 from nutdamp.guide.topic import Formula, Rows, Topic
@@ -99,6 +99,7 @@ def checks_sheet(plan: Plan, found: Verification) -> Sheet:
             f"not judged: changed by {' and '.join(course.changed)}" if course.kept is None else PASSED[course.kept]
         )
         rows.append((f"{course.name} on coasts", "keeps to", f"{AGREE:g} of itself", _size(course.drift), verdict))
+    required = {bound.part for bound in compliance.required(body)}
     one, other = (left_by(flown) for flown in (flight.by_impulses(body, plan.pulses), plan.flight))
     for part, most in tolerated(body).items():
         first, second = (end.spin if part is Part.SPIN else left_of(part, end, body) for end in (one, other))
@@ -106,9 +107,9 @@ def checks_sheet(plan: Plan, found: Verification) -> Sheet:
             quantity(value, "rad/s") if part is Part.SPIN else degrees(value) for value in (abs(first - second), most)
         )
         verdict = "pass" if abs(first - second) <= most else "differs: what is flown counts"
-        rows.append(
-            (f"impulse sum (17): {part.label}", "differs from what is flown by at most", allowed, shown, verdict)
-        )
+        share = " (a tenth of what is required)" * (part in required)
+        differs = f"differs from what is flown by at most{share}"
+        rows.append((f"impulse sum (17): {part.label}", differs, allowed, shown, verdict))
     heads = ("check", "criterion", "threshold", "found", "verdict")
     return Sheet("Checks and their thresholds", tuple(Column(head, number=False) for head in heads), tuple(rows))
 

@@ -7,18 +7,22 @@ from typing import TYPE_CHECKING
 
 from nutdamp import compliance
 from nutdamp.comparison import Comparison
+from nutdamp.compliance import Part
 from nutdamp.decision import Decision
 from nutdamp.fronts import Front
+from nutdamp.physics import attitude
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures, geometry
 from nutdamp.presentation.figures.overview import NARROW
 from nutdamp.presentation.page.document import Picture
 from nutdamp.presentation.page.panels import picture
+from nutdamp.presentation.text import degrees
 from nutdamp.presentation.tolerance_tables import budget_rows
 from nutdamp.schedule import STEERABLE
 
 if TYPE_CHECKING:
     from nutdamp.dispersion.study import Results
+    from nutdamp.track import Track
 
 
 def pictures_of(plan: Plan) -> tuple[Picture, ...]:
@@ -29,7 +33,8 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
             "motion",
             "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
             "Axis track: the direction of the spin axis in space, with the places of the angular momentum H"
-            + (", enlarged in a panel of their own." if geometry.momentum_inset(flown, track) is not None else "."),
+            + (", enlarged in a panel of their own." if geometry.momentum_inset(flown, track) is not None else ".")
+            + _wanders(plan, track),
             "Pole curve in the body and track of the spin axis in space",
         ),
         (
@@ -46,8 +51,9 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     ]
     if len(plan.pulses):
         through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
-        how = "by which impulse" if plan.pulses.idealised else "for how long"
-        said = f"Which channel fires, when and {how}: written beside the bars where there is room, and in the schedule."
+        how, unit = ("by which impulse", "impulse") if plan.pulses.idealised else ("for how long", "on-time")
+        said = f"Which channel fires, when and {how}: “pulse: {unit}” beside the bars where there is room, and in the "
+        said += "schedule."
         said += through * plan.pulses.through_valves
         if any(pulse.channel == STEERABLE for pulse in plan.pulses):
             said += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
@@ -61,6 +67,18 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         )
         for name, caption, described in drawn
     )
+
+
+def _wanders(plan: Plan, track: Track) -> str:
+    """How far H goes between the pulses, where the end of it is bounded by less; empty elsewhere."""
+    body = plan.spacecraft
+    most_of = {bound.part: bound.most for bound in compliance.required(body)}
+    if compliance.aim(body) is not Part.SHIFT or Part.SHIFT not in most_of:
+        return ""
+    farthest = float(attitude.angle_between(track.momentum[:1], track.momentum).max())
+    if farthest <= most_of[Part.SHIFT]:
+        return ""
+    return f" Between the pulses H is up to {degrees(farthest)} from where it was: what is required is for the end."
 
 
 def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
