@@ -137,6 +137,7 @@ def test_nutation_that_grows_is_said_to_keep_the_requirement_for_a_while() -> No
     )
     idle = Schedule(())
     assert math.degrees(seen_at(by_impulses(stage, idle, 62.41), 62.41).final.nutation) == pytest.approx(2.0, rel=1e-4)
+    assert list(decisions.notes(decided, looped=True)) == []
     assert loop == "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
     wide = replace(decided, cases=replace(counted(1.0, 0.54, 0.1), probability=0.99))
     *_, after, _ = decisions.notes(wide)

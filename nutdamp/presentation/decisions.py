@@ -64,9 +64,14 @@ def better(decision: Decision) -> str:
     return f"more cases comply with {shares} than with {decision.plan.scheme} ({verdicts.percent(own, probability)})."
 
 
-def notes(decision: Decision) -> Iterator[str]:
-    """What must be known beside the verdict: which other schemes comply more often, and what was idealised."""
+def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
+    """What must be known beside the verdict: which other schemes comply more often, what was idealised, what grows.
+
+    ``looped``: it is the flight of a closed loop, which goes on firing.
+    """
     yield from filter(None, (better(decision), verdicts.idealised(decision.plan)))
+    if looped:
+        return
     yield from _growing(decision)
     if decision.plan.spacecraft.loop is not None:
         yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
@@ -171,10 +176,10 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
     ]
 
 
-def requirement(decision: Decision) -> Iterator[Text]:
-    """The verdict as a line of a screen, and what must be known beside it."""
+def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
+    """The verdict as a line of a screen, and what must be known beside it; ``looped`` as in `notes`."""
     yield statement(decision)
-    for note in notes(decision):
+    for note in notes(decision, looped=looped):
         yield Text.assemble(("Note: ", "bold"), note)
 
 

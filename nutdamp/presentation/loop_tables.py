@@ -43,7 +43,7 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
         )
         parts.append(Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), "."))
     else:
-        parts += list(requirement(decision))
+        parts += list(requirement(decision, looped=True))
     parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
     parts += [Text(), decision_table(decision, "nominal" if run.case is None else "this case"), Text(), _outcome(plan)]
     if run.fired:

@@ -104,8 +104,8 @@ def test_pulses_that_no_command_block_fires_are_called_so() -> None:
     body = body.replace(goal=Goal(body.direction_in_n(math.radians(3.0), math.radians(82.0))))
     both = compare(body, ["command-block", "rhumb-line"])
     (said,) = _reading(both)
-    assert said.startswith("command-block alone fires by the commands of the file")
-    assert "cannot be fired by the command blocks of the file" in sheet(FILE, "rhumb-line", 3.0).text
+    assert said.startswith("Of these plans command blocks fire that of command-block alone")
+    assert "No command block fires these pulses" in sheet(FILE, "rhumb-line", 3.0).text
     assert list(_reading(compare(body, ["rhumb-line"]))) == []
 
 
