@@ -139,7 +139,7 @@ def _bounds(plan: Plan) -> Iterator[str]:
             f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
         )
     if bounds.rigorous is not None and bounds.rigorous > 0.0:
-        least = f"{_down(scale * bounds.rigorous):.4g} {unit}"
+        least = f"{down(scale * bounds.rigorous):.4g} {unit}"
         parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
     if len(parts) > 1:
         yield "; ".join(parts)
@@ -201,7 +201,7 @@ def _given_length(plan: Plan) -> Iterator[str]:
         )
 
 
-def _down(value: float) -> float:
+def down(value: float) -> float:
     """The largest number of four digits that is not above ``value``: a bound must not be rounded up."""
     if value <= 0.0 or not math.isfinite(value):
         return value

@@ -333,6 +333,9 @@ def test_a_plan_of_half_the_pulses_for_little_more_is_mentioned() -> None:
         Comparison(many.spacecraft, (many, judged("few", 0.0, shift=0.65, propellant=0.104, pulses=2)))
     )
     assert hint.endswith("(4 %); but it shifts H by 0.65 deg instead of 0 deg."), "what it is worse in"
+    slow = judged("few", 0.0, shift=0.65, propellant=0.104, pulses=2, end=1.0 + 1.01 * many.spacecraft.inertial_period)
+    (hint,) = verdicts.hints(Comparison(many.spacecraft, (many, slow)))
+    assert hint.endswith(f"instead of 0 deg and ends at {slow.pulses.end:.3f} s instead of 1.000 s.")
     nothing = judged("a", 0.0, pulses=0), judged("b", 0.0, pulses=0)
     assert Gain.SIMPLER not in recommend(nothing).alternatives
 

@@ -254,7 +254,8 @@ def hints(compared: Comparison, shares: Mapping[str, float] | None = None) -> tu
         assert chosen is not None
         gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
         better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
-        clauses = better, _drawback(other, chosen), _complying(other, chosen, shares or {})
+        worse = listed([*_drawbacks(other, chosen)])
+        clauses = better, f"but it {worse}" * bool(worse), _complying(other, chosen, shares or {})
         said.append(f"{'; '.join(filter(None, clauses))}.")
     return tuple(said)
 
@@ -270,15 +271,18 @@ def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
     return f"takes {len(other.pulses)} pulse{'s' * (len(other.pulses) != 1)} instead of {len(chosen.pulses)}"
 
 
-def _drawback(other: Plan, chosen: Plan) -> str:
-    """That a plan leaves H clearly farther off than the ``chosen`` one; empty where it does not."""
+def _drawbacks(other: Plan, chosen: Plan) -> Iterator[str]:
+    """In what a plan is clearly worse than the ``chosen`` one: it leaves H farther off, or ends later."""
     assert other.flown is not None
     assert chosen.flown is not None
-    if other.flown.axis_error <= FARTHER * chosen.flown.axis_error + compliance.DAMPED_ANGLE:
-        return ""
-    if chosen.spacecraft.goal.axis is None:
-        return f"but it shifts H by {_shift(other)} instead of {_shift(chosen)}"
-    return f"but H ends {degrees(other.flown.axis_error)} instead of {degrees(chosen.flown.axis_error)} off the target"
+    if other.flown.axis_error > FARTHER * chosen.flown.axis_error + compliance.DAMPED_ANGLE:
+        if chosen.spacecraft.goal.axis is None:
+            yield f"shifts H by {_shift(other)} instead of {_shift(chosen)}"
+        else:
+            off = degrees(other.flown.axis_error), degrees(chosen.flown.axis_error)
+            yield f"leaves H {off[0]} instead of {off[1]} off the target"
+    if other.pulses.end > chosen.pulses.end + chosen.spacecraft.inertial_period:
+        yield f"ends at {moment(other.pulses.end)} instead of {moment(chosen.pulses.end)}"
 
 
 def _shift(plan: Plan) -> str:

@@ -17,6 +17,7 @@ from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.presentation.text import cost as written
 from nutdamp.presentation.trade_tables import FAILS, fails, front_name, missing, schemes_of
+from nutdamp.remarks import down
 from nutdamp.spacecraft import Spacecraft
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def trade_figure(
     proved = [point.bounds.rigorous for point in points]
     if None not in proved:
         least = min(scale * value for value in proved if value is not None)
-        name = f"least to leave as little as any of these: {written(least / scale, points[0].unit)}"
+        name = f"least to leave as little as any of these: {written(down(least) / scale, points[0].unit)}"
         axes.axhline(least, color=INK, linewidth=1.0, linestyle=":", label=name)
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)

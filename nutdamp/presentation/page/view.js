@@ -77,7 +77,15 @@ for (const view of document.querySelectorAll(".moving")) {
   const sky = part("sky-curves");
   make(sky, "path", { class: "axis", d: curve(rows.sky1, rows.sky2) });
   make(sky, "path", { class: "fires", d: curve(rows.sky1, rows.sky2, fires) });
-  make(sky, "path", { class: "momentum", d: curve(rows.momentum1, rows.momentum2) });
+  // Dashes of a way back over the way out would fill each other's gaps.
+  const ways = new Set();
+  const spot = (row) => `${rows.momentum1[row].toFixed(1)} ${rows.momentum2[row].toFixed(1)}`;
+  const once = (row) => {
+    const [from, to] = [spot(Math.max(row - 1, 0)), spot(row)];
+    ways.add(`${from} ${to}`);
+    return from === to || !ways.has(`${to} ${from}`);
+  };
+  make(sky, "path", { class: "momentum", d: curve(rows.momentum1, rows.momentum2, once) });
   if (data.target) place(make(sky, "path", { class: data.named[0].kind, d: DIAMOND }), ...data.target);
   const momentumAtSky = make(sky, "path", { class: "cursor", d: CROSS });
   const atSky = make(sky, "circle", { class: "cursor", r: 42 });
