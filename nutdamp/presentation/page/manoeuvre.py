@@ -53,7 +53,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
     if plan.pulses.idealised:
         yield Prose(
-            "On-time “ideal”: an impulse that takes no time. A thruster fires it as a pulse centred on its time."
+            "On-time “ideal”: an impulse that takes no time, which no thruster gives: name its torque for on-times."
         )
     yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
