@@ -170,6 +170,17 @@ def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
     return reached(spacecraft, required.nutation, nutation) if spacecraft.growth > 0.0 else None
 
 
+def subsides(spacecraft: Spacecraft) -> float | None:
+    """When the nutation of an oblate body has decayed to the one that is required, s, with nothing done.
+
+    None where it does not decay, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    """
+    required = spacecraft.requirement
+    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return None
+    return reached(spacecraft, required.nutation) if spacecraft.growth < 0.0 else None
+
+
 def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
     """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more.
 

@@ -148,6 +148,23 @@ def test_nutation_that_grows_is_said_to_keep_the_requirement_for_a_while() -> No
     assert math.degrees(seen_at(by_impulses(left, idle, 117.87), 117.87).final.nutation) == pytest.approx(2.0, rel=1e-3)
 
 
+def test_nutation_that_decays_is_said_to_meet_the_requirement_by_itself_from_then_on() -> None:
+    """An oblate body damps itself; the time is where a flight without pulses leaves just what is required."""
+    stage = nutdamp.example("upper-stage")
+    required = Requirement(nutation=math.radians(0.5))
+    fast = np.array([5.0, 5.0, 1.0]) * stage.omega0
+    body = replace(stage, inertia=Inertia((4200.0, 4200.0, 5000.0)), omega0=fast, requirement=required, loop=None)
+    decided = decide(compare(body, CLASSIC))
+    assert decided is not None
+    (said,) = decisions.notes(decided)
+    start, end = "Without a pulse the requirement is met from ", " s on: by then the nutation of "
+    assert said.startswith(start)
+    assert end in said
+    after = float(said.removeprefix(start).partition(end)[0])
+    left = seen_at(by_impulses(body, Schedule(()), after), after).final.nutation
+    assert math.degrees(left) == pytest.approx(0.5, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -78,12 +78,17 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
 
 
 def _growing(decision: Decision) -> Iterator[str]:
-    """How long nutation that grows keeps the requirement: without a pulse, and again from what is left."""
+    """How long nutation that grows keeps the requirement, or from when that which decays does."""
     body = decision.plan.spacecraft
     now, idle = body.nutation, compliance.outgrown(body, body.nutation)
     most_of = {bound.part: most(bound.most) for bound in compliance.required(body)}
     there = compliance.aim(body) is Part.SHIFT or compliance.aim(body) not in most_of
-    if idle and there and body.goal.spin is None and not body.keep and not compliance.unaided(body):
+    alone = there and body.goal.spin is None and not body.keep and not compliance.unaided(body)
+    damped = compliance.subsides(body)
+    if alone and damped is not None and damped < body.horizon:
+        fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {most_of[Part.NUTATION]}"
+        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on: {fallen}."
+    if idle and alone:
         grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {most_of[Part.NUTATION]}"
         yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
     if not len(decision.plan.pulses):
