@@ -1,7 +1,8 @@
 """Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
 
 Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
-and, where `optimal` is among the schemes, those that `surest` makes for the dispersions.
+and, where `optimal` is among the schemes, its earliest ends, for errors of the rates grow with time, and those that
+`surest` makes for the dispersions.
 All of them fly the same draws through real widths, so that what is compared is the plans and not their luck.
 """
 
@@ -33,6 +34,9 @@ from nutdamp.tightening import Tightening, tightening
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
+
+WITHIN = (1.5, 2.0)
+"""Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
 WIDEST = 1.3
 """Largest margin of a front, over the sigmas of the probability required."""
@@ -129,6 +133,7 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         found.append(partial(_alignments, body, base.scheme, options))
         found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == surest.SCHEME:
+            found.append(partial(_early, body, options))
             found.append(partial(surest.plans, body, options))
     return found
 
@@ -143,6 +148,7 @@ def trials_of_front(comparison: Comparison, points: int) -> list[Attempt]:
     for number in range(points):
         margin = WIDEST * (number + 1) / points
         found.append(partial(surest.plans, body, None, [margin]))
+    found.append(partial(_early, body, Options()))
     found.append(partial(surest.plans, body))
     return found
 
@@ -264,6 +270,19 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
         left = tuple(channel for channel in body.channels if channel.name != name)
         if left and len(left) < len(body.channels):
             yield f"without {name}", replace(body, channels=left)
+
+
+def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
+    """The earliest end that `optimal` finds, and its cheapest plans that end little later."""
+    first = attempt(body, surest.SCHEME, Options(**{**options.chosen, "least": "time"}))
+    if not first.feasible:
+        return
+    yield "earliest end", first
+    for times in WITHIN:
+        horizon = times * first.end
+        if horizon < body.horizon:
+            soon = replace(body, limits=replace(body.limits, horizon=horizon))
+            yield f"by {horizon:.4g} s", attempt(soon, surest.SCHEME, options)
 
 
 def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:

@@ -31,6 +31,9 @@ from nutdamp.spacecraft import Limits, Requirement, Spacecraft
 from nutdamp.tightening import scaled
 from nutdamp.tolerances import Dispersions, Tolerance
 
+EARLY = ("earliest end", "by ")
+"""How variants begin that end as early as they can, or little later."""
+
 SAMPLES = 4_096
 
 
@@ -124,7 +127,7 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
 
 @pytest.mark.slow
 def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme() -> None:
-    """85.6 % of cases comply with two-pulse, and with less of any other scheme or variant."""
+    """85.6 % of cases comply with two-pulse, more only with plans that end as early as possible, which cost more."""
     body = read_spacecraft(example_text(), "example.yaml")
     compared = compare(body, ("two-pulse", "optimal"))
     trials = robust.attempts(compared)
@@ -141,7 +144,10 @@ def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme(
     fresh = run(Results(study_of(body, found.chosen.plan.pulses, seed=77), 20_000))
     assert fresh.interval[1] > 0.997
     without = [one for one in found.candidates if "against dispersions" not in one.variant]
-    assert max(one.met or 0.0 for one in without) < 0.87
+    assert any(one.variant == "earliest end" for one in without)
+    enough = [one.plan.pulses.cost for one in without if (one.met or 0.0) >= found.probability]
+    assert min(enough) > 1.03 * found.chosen.plan.pulses.cost
+    assert max(one.met or 0.0 for one in without if not one.variant.startswith(EARLY)) < 0.87
 
 
 def test_limits_and_windows_are_kept() -> None:
@@ -270,7 +276,10 @@ def random_body(seed: int) -> Spacecraft:
 
 
 def gained(seed: int) -> float:
-    """How many more cases comply than with the best of schemes and variants, as far as they must; checks the rest."""
+    """How many more cases comply than with the best of schemes, late starts and channels, as far as they must.
+
+    Of all plans, those that end early too, it is checked that none complies more often, or as often for less.
+    """
     body = random_body(seed)
     compared = compare(body, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
     found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
@@ -282,7 +291,8 @@ def gained(seed: int) -> float:
     assert chosen >= min(best, found.probability) - error
     as_good = [one.plan.pulses.cost for one in others if (one.met or 0.0) >= max(chosen - error, found.probability)]
     assert not as_good or found.chosen.plan.pulses.cost <= 1.001 * min(as_good)
-    return min(chosen, found.probability) - min(best, found.probability)
+    late = max(one.met or 0.0 for one in others if not one.variant.startswith(EARLY))
+    return min(chosen, found.probability) - min(late, found.probability)
 
 
 @pytest.mark.slow

@@ -71,12 +71,15 @@ def front_screen(found: RobustComparison) -> RenderableType:
         table.add_row(Text(str(number), style=enough), *cells, str(len(pulses)), f"{one.plan.scheme}, {one.variant}")
     level, cases = verdicts.exact_percent(found.probability), f"{found.samples:,} dispersed cases of each plan"
     heading = Text(f"What it costs that more cases comply ({level} required)", style="bold")
+    most = max((one.met or 0.0 for one in rows), default=0.0)
+    short = f"No point meets the requirement: {verdicts.percent(most, found.probability)} of cases comply at most"
+    warning = [Text(f"{short}, {level} required.", style="yellow")] if rows and most < found.probability else []
     note = Text(
         f"{cases}, flown through real widths, seed {found.seed}; plans that cost more with no more cases that "
         f"comply are left out.",
         style="dim",
     )
-    return Group(Text(body.name, style="bold"), Text(), heading, table, note)
+    return Group(Text(body.name, style="bold"), Text(), heading, table, *warning, note)
 
 
 def proved(found: Certificate | None) -> str:

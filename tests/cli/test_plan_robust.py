@@ -88,7 +88,7 @@ def test_nothing_feasible(run: Run, sat: Path) -> None:
 
 @pytest.mark.slow
 def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
-    """85.6 % of cases comply with the best of the schemes and their variants, two-pulse."""
+    """85.6 % of cases comply with two-pulse, the best of the plans that do not end as early as they can."""
     done = run("plan", "--robust", "--json", "plan.json")
     assert done.returncode == 0
     words = " ".join(done.stdout.split())
@@ -101,7 +101,8 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     assert found["fresh"]["interval"][0] < found["fresh"]["met_fraction"] < found["fresh"]["interval"][1]
     assert f"Of 20,000 new cases (seed {found['fresh']['seed']}), not used for the choice, 99." in words
     shares = {(one["scheme"], one["variant"]): one["met_fraction"] for one in found["candidates"]}
-    assert max(share for (_, made), share in shares.items() if not made.startswith("against")) == pytest.approx(
+    others = ("against", "earliest end", "by ")
+    assert max(share for (_, made), share in shares.items() if not made.startswith(others)) == pytest.approx(
         0.8562, abs=0.025
     )  # three sigmas of the first 2,048 cases, after which these plans cannot be chosen any more
     enough = [one["propellant_kg"] for one in found["candidates"] if one["met_fraction"] >= 0.997]
