@@ -135,14 +135,27 @@ def unaided(spacecraft: Spacecraft) -> bool:
     varying = spacecraft.growth != 0.0 or spacecraft.goal.spin is not None
     if spacecraft.disturbances or (varying and not spacecraft.inertia.symmetric):
         return False
-    change = min(spacecraft.growth * spacecraft.horizon, 700.0)
-    nutation = math.atan(math.tan(spacecraft.nutation) * math.exp(change))
+    nutation = _idle(spacecraft, spacecraft.horizon)
     aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
     # H stays, and C ω3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
     faster = math.cos(nutation) / math.cos(spacecraft.nutation)
     most = max(nutation, spacecraft.nutation)
     ends = [Left(most, aim, spin) for spin in (spacecraft.spin, spacecraft.spin * faster)]
     return all(one.met for left in ends for one in held(spacecraft, left))
+
+
+def decayed(spacecraft: Spacecraft, t: float) -> float:
+    """To what nutation, rad, an oblate body damps itself by ``t`` s with nothing done; θ0 where it does not.
+
+    Also θ0 where it is not known: with disturbances or I1 ≠ I2.
+    """
+    if spacecraft.growth >= 0.0 or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return spacecraft.nutation
+    return _idle(spacecraft, t)
+
+
+def _idle(spacecraft: Spacecraft, t: float) -> float:
+    return math.atan(math.tan(spacecraft.nutation) * math.exp(min(spacecraft.growth * t, 700.0)))
 
 
 def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
@@ -157,6 +170,15 @@ def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -
     if growth == 0.0 or now == 0.0 or nutation == 0.0:
         return math.inf
     return math.log(math.tan(nutation) / math.tan(now)) / growth
+
+
+def only_nutation(spacecraft: Spacecraft) -> bool:
+    """Whether nutation is all that can keep a body on which no pulse is fired from its requirement.
+
+    H stays where it is and there is no final spin, no cone to keep; False where no pulse is needed anyway (`unaided`).
+    """
+    there = aim(spacecraft) is Part.SHIFT or all(bound.part is not Part.DISTANCE for bound in required(spacecraft))
+    return there and spacecraft.goal.spin is None and not spacecraft.keep and not unaided(spacecraft)
 
 
 def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:

@@ -29,7 +29,7 @@ class Plan(views.Data, views.Tabled):
 
     Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
-    that is ``worse`` than without pulses. `nutdamp.remarks` has the words of all four.
+    that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.remarks` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
     ``cut``: its search ended at its budget of `work`. ``margin``: sigmas of the dispersions with which `surest` made
     it, None for plans for nominal values.
@@ -44,6 +44,7 @@ class Plan(views.Data, views.Tabled):
     breach: Breach | None = None
     astray: Aspect | None = None
     worse: float | None = None
+    worse_at: float = 0.0
     from_file: bool = False
     cut: bool = False
     margin: float | None = None
@@ -294,18 +295,21 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: schemes
         if astray is not None:
             return Plan(spacecraft, scheme, None, astray=astray)
     if scheme in schemes.PLANNED and left is not None and not _helps(flown, left):
-        return Plan(spacecraft, scheme, None, worse=left.nutation)
+        return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
     return flown
 
 
 def _helps(judged: Plan, left: Residual) -> bool:
-    """Whether nutation, distance from the target axis or from the final spin requested is less than without pulses."""
+    """Whether nutation, distance from the target axis or from the final spin requested is less than without pulses.
+
+    Nutation that decays by itself must be less than what it has decayed to by the last pulse.
+    """
     body = judged.spacecraft
     if body.goal.spin is not None and abs(judged.flight.settled.spin - body.goal.spin) < abs(
         body.spin - body.goal.spin
     ):
         return True
-    return left.nutation < body.nutation or left.axis_error < body.to_turn
+    return left.nutation < compliance.decayed(body, judged.end) or left.axis_error < body.to_turn
 
 
 def unrounded(plan_: Plan) -> Schedule | None:

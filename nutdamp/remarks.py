@@ -61,8 +61,15 @@ def _infeasibility(plan: Plan) -> str:
     if plan.astray is not None:
         return f"{strays(plan.astray)}; no way round it was found within the limits"
     if plan.worse is not None:
-        return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
+        return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation{_by_itself(plan)}"
     return plan.refusal or ""
+
+
+def _by_itself(plan: Plan) -> str:
+    decayed = compliance.decayed(plan.spacecraft, plan.worse_at)
+    if decayed >= plan.spacecraft.nutation:
+        return ""
+    return f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
 
 
 def strays(found: Aspect) -> str:

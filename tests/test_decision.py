@@ -157,7 +157,10 @@ def test_nutation_that_decays_is_said_to_meet_the_requirement_by_itself_from_the
     decided = decide(compare(body, CLASSIC))
     assert decided is not None
     (said,) = decisions.notes(decided)
-    start, end = "Without a pulse the requirement is met from ", " s on: by then the nutation of "
+    start, end = (
+        "Without a pulse the requirement is met from ",
+        " s on, before this plan ends: by then the nutation of ",
+    )
     assert said.startswith(start)
     assert end in said
     after = float(said.removeprefix(start).partition(end)[0])

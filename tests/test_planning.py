@@ -17,8 +17,11 @@ from scipy.integrate import simpson
 from nutdamp import schemes
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.comparison import compare
+from nutdamp.flight import by_impulses
 from nutdamp.limits import Limit, Windows, breaches, keeps_limits
+from nutdamp.outcome import seen_at
 from nutdamp.planning import Plan, plan
+from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import broken_limits, infeasibility, remarks
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
@@ -136,6 +139,51 @@ def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
     made = plan(body, "one-pulse")
     assert made.feasible or "would leave" in infeasibility(made)
     assert made.flown is None or made.flown.nutation < body.nutation
+
+
+WEAK = (channel("A1", 0.0, -0.5, 0.0, min_on_time=0.01), channel("A2", 0.0, 0.5, 0.0, min_on_time=0.01))
+
+SELF_DAMPING = replace(
+    spinner(100.0, 150.0, math.tau / 6.0, 3.0, channels=WEAK),
+    dissipation=20.0,
+    requirement=Requirement(nutation=math.radians(0.05)),
+)
+"""Oblate: its nutation decays e-fold in 20 s."""
+
+
+def idle(body: Spacecraft, t: float) -> float:
+    """Nutation, rad, of a flight without pulses."""
+    return seen_at(by_impulses(body, Schedule(), t), t).final.nutation
+
+
+def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_says_so() -> None:
+    body = SELF_DAMPING
+    compared = compare(body, ("two-pulse",))
+    (made,) = compared.plans
+    assert made.worse is not None
+    assert made.worse < 0.01 * body.nutation  # it does damp
+    assert idle(body, made.worse_at) < made.worse
+    said = infeasibility(made)
+    assert said.startswith("the best schedule found would leave ")
+    alone = float(said.partition("it decays to ")[2].partition("°")[0])
+    assert math.degrees(idle(body, made.worse_at)) == pytest.approx(alone, rel=0.05)
+    assert verdicts.reason(compared).endswith("; without a pulse the requirement is met from 81.91 s on")
+    assert math.degrees(idle(body, 81.91)) == pytest.approx(0.05, rel=1e-3)
+
+
+@given(
+    st.floats(5.0, 100.0), st.floats(1e-3, 0.5), st.floats(0.5, 20.0), st.sampled_from(CLASSIC), st.floats(0.0, 60.0)
+)
+def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
+    time_constant: float, least: float, degrees: float, scheme: str, earliest: float
+) -> None:
+    channels = (channel("A1", 0.0, -0.5, 0.0, min_on_time=least), channel("A2", 0.0, 0.5, 0.0, min_on_time=least))
+    limits = Limits(earliest=earliest, horizon=240.0)
+    body = spinner(100.0, 150.0, math.tau / 6.0, degrees, channels=channels, limits=limits)
+    body = replace(body, dissipation=time_constant)
+    made = plan(body, scheme)
+    if made.flown is not None:
+        assert made.flown.nutation < idle(body, made.end)
 
 
 # --- limits ----------------------------------------------------------------------------------------------------------

@@ -82,12 +82,12 @@ def _growing(decision: Decision) -> Iterator[str]:
     body = decision.plan.spacecraft
     now, idle = body.nutation, compliance.outgrown(body, body.nutation)
     most_of = {bound.part: most(bound.most) for bound in compliance.required(body)}
-    there = compliance.aim(body) is Part.SHIFT or compliance.aim(body) not in most_of
-    alone = there and body.goal.spin is None and not body.keep and not compliance.unaided(body)
+    alone = compliance.only_nutation(body)
     damped = compliance.subsides(body)
     if alone and damped is not None and damped < body.horizon:
         fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {most_of[Part.NUTATION]}"
-        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on: {fallen}."
+        sooner = ", before this plan ends" if decision.plan.end > damped else ""
+        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on{sooner}: {fallen}."
     if idle and alone:
         grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {most_of[Part.NUTATION]}"
         yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."

@@ -59,7 +59,9 @@ def reason(compared: Comparison) -> str:
     found, body = compared.recommendation, compared.spacecraft
     if found.plan is None:
         untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
-        return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}"
+        damped = compliance.subsides(body) if compliance.only_nutation(body) else None
+        idle = "" if damped is None else f"; without a pulse the requirement is met from {quantity(damped, 's')} on"
+        return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}{idle}"
     if found.ground is Ground.ONLY:
         return _only(compared)
     cones = " and keep the cones" * bool(found.plan.kept)
