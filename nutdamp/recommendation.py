@@ -5,6 +5,7 @@ It gives data; `nutdamp.presentation.verdicts` has the words.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -65,7 +66,7 @@ class Ground(Enum):
 
 
 class Gain(Enum):
-    """In what another plan is much better than the recommended one, for little more."""
+    """In what another plan is much better than the recommended one."""
 
     STEADIER = "steadier"
     """It keeps H."""
@@ -75,6 +76,8 @@ class Gain(Enum):
     """It ends far sooner."""
     REAL = "real"
     """It fires real pulse widths, where the recommended one fires ideal impulses."""
+    COMMANDED = "commanded"
+    """It can be sent as command blocks, where the recommended one is fired pulse by pulse."""
 
 
 class Judged(Protocol):
@@ -119,7 +122,7 @@ class Recommendation(Generic[Plan]):
     """The plan to fly; None, as ``standing`` and ``ground``, where none is feasible.
 
     It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
-    ``alternatives``: the cheapest plan that gains so much for little more.
+    ``alternatives``: the cheapest plan that gains so much.
     """
 
     plan: Plan | None = None
@@ -189,7 +192,10 @@ def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
 
 
 def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
-    """The cheapest of the ``plans`` that gains so much on the ``best`` for little more, by what it gains."""
+    """The cheapest of the ``plans`` that gains so much on the ``best``, by what it gains.
+
+    For little more; one of command blocks for whatever it costs, since the spacecraft may fire nothing else.
+    """
     known, body = by_propellant(plans), best.spacecraft
     few, soon = FEWER_PULSES * len(best.pulses), SOONER_END * best.pulses.end
     found: dict[Gain, Plan] = {}
@@ -198,10 +204,11 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
         (Gain.SIMPLER, FEWER_COST, lambda one: len(one.pulses) <= few),
         (Gain.SOONER, SOONER_COST, lambda one: one.pulses.end <= min(soon, best.pulses.end - body.inertial_period)),
         (Gain.REAL, REAL_COST, lambda one: not one.pulses.idealised),
+        (Gain.COMMANDED, math.inf, lambda one: bool(one.pulses.blocks)),
     ):
         if gain is Gain.STEADIER and (body.goal.axis is not None or _off(best) <= DAMPED_ANGLE):
             continue
-        if gain is Gain.REAL and not best.pulses.idealised:
+        if (gain is Gain.REAL and not best.pulses.idealised) or (gain is Gain.COMMANDED and best.pulses.blocks):
             continue
         most = times * _cost(best, known)
         those = [one for one in plans if len(one.pulses) and gains(one) and _cost(one, known) <= most]

@@ -136,8 +136,8 @@ def _bounds(plan: Plan) -> Iterator[str]:
     spent = plan.pulses.cost_in(bounds.unit)
     scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
     parts = [f"{scale * spent:.4g} {unit}"]
-    # A bound of nothing, where the nutation damps itself, says nothing.
-    if bounds.first_order is not None and bounds.first_order > 0.0:
+    # Where the nutation damps itself, waiting makes any cost small: the least of ideal pulses says nothing.
+    if bounds.first_order is not None and bounds.first_order > 0.0 and plan.spacecraft.growth >= 0.0:
         gap = 100.0 * (spent / bounds.first_order - 1.0)
         rest = plan.flight.residual.nutation > TELLING
         holds = "that leaves no nutation" if rest else "that holds for small angles"

@@ -370,6 +370,17 @@ def test_beside_ideal_impulses_a_plan_of_real_widths_is_mentioned() -> None:
     assert Gain.REAL not in without.alternatives
 
 
+def test_where_the_file_has_commands_the_plan_of_command_blocks_is_mentioned_whatever_it_costs() -> None:
+    body = nutdamp.example("lunar-prospector")
+    found = compare(body, usual(body))
+    assert found.recommended is not None
+    assert not found.recommended.pulses.blocks
+    (hint,) = [one for one in verdicts.hints(found) if "blocks" in one]
+    assert hint.startswith("command-block can be sent as command blocks, for 0.9662 g more propellant (7.7 %); but it ")
+    only = recommend([one for one in found.plans if one.scheme == "command-block"])
+    assert Gain.COMMANDED not in only.alternatives
+
+
 def test_only_a_plan_that_damps_as_well_is_mentioned() -> None:
     cheap = judged("cheap", 0.0, shift=1.8, propellant=12.0)
     assert Gain.STEADIER not in recommend([cheap, judged("idle", 4.0, shift=0.0, propellant=12.5)]).alternatives

@@ -266,6 +266,8 @@ def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
     """In what a plan is better than the ``chosen`` one."""
     if gain is Gain.REAL:
         return "fires real pulse widths"
+    if gain is Gain.COMMANDED:
+        return "can be sent as command blocks"
     if gain is Gain.STEADIER:
         return f"shifts H by {_shift(other)} instead of {_shift(chosen)}"
     if gain is Gain.SOONER:
