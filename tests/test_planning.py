@@ -25,6 +25,7 @@ from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Ground, Standing
 from nutdamp.remarks import broken_limits, infeasibility, remarks
 from nutdamp.schedule import Bounds, Schedule, channel_pulse
+from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft, Steerable, Vector
 
 CLASSIC = schemes.CLASSIC
@@ -184,6 +185,37 @@ def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
     made = plan(body, scheme)
     if made.flown is not None:
         assert made.flown.nutation < idle(body, made.end)
+
+
+def test_optimal_looks_within_the_time_that_there_is_where_it_begins_late() -> None:
+    """Half the horizon ends before the first pulse may begin."""
+    made = plan(replace(SELF_DAMPING, limits=Limits(earliest=130.0, horizon=240.0)), "optimal")
+    assert made.feasible, infeasibility(made)
+    assert made.pulses.pulses[0].start >= 130.0
+
+
+@pytest.mark.parametrize(
+    ("channels", "horizon", "freed"),
+    [
+        (cross(2.0), 2.0, False),
+        (cross(2.0), 6.0, False),
+        (cross(2.0)[:1], 2.0, False),
+        (cross(15.0)[:2], 2.0, False),
+        (cross(15.0), 1.4, False),
+        (cross(15.0), 1.6, True),
+    ],
+)
+def test_the_horizon_that_is_named_as_long_enough_is(
+    channels: tuple[Channel, ...], horizon: float, freed: bool
+) -> None:
+    body = spinner(channels=channels, limits=Limits(horizon=horizon))
+    short = plan(body, "optimal")
+    said = infeasibility(short)
+    named = said.partition("; limits.horizon = ")[2].partition(" s is long enough")[0]
+    enough = replace(body, limits=Limits(horizon=float(named)))
+    assert plan(enough, "optimal").feasible, said
+    assert ("or use --free-axis" in said) is freed
+    assert plan(body, "optimal", OptimalOptions(free_axis=True)).feasible is freed
 
 
 # --- limits ----------------------------------------------------------------------------------------------------------

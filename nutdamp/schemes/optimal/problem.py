@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -161,8 +162,8 @@ class Problem:
             f"motion none was found with {', '.join(named)}; another horizon may help"
         )
 
-    def cure(self) -> str:
-        """Why the program has no solution, and which limit to relax."""
+    def cure(self, long_enough: Callable[[float], float | None]) -> str:
+        """Why the program has no solution, and which limit to relax; ``long_enough``: see `relaxed`."""
         body = self.spacecraft
         names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
         nutation = Equations(shift=False)
@@ -178,10 +179,14 @@ class Problem:
                 f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
                 f"{100.0 * min(left, 1.0):.3g} % of it stays"
             )
-        return f"{what}; {self.relaxed()}"
+        return f"{what}; {self.relaxed(long_enough)}"
 
-    def relaxed(self) -> str:
-        """The limit that has to be relaxed, and how far."""
+    def relaxed(self, long_enough: Callable[[float], float | None]) -> str:
+        """The limit that has to be relaxed, and how far.
+
+        ``long_enough`` gives a horizon in which a schedule was found, s, no shorter than the one with which the program
+        has a solution; None where it found none.
+        """
         body = self.spacecraft
         horizon = later = body.horizon
         while later < LATEST * horizon:
@@ -190,11 +195,12 @@ class Problem:
             later *= 2.0
             if self.feasible(later):
                 needed = self.least_horizon(0.5 * later, later, NAMED)
-                shifts = self.equations.shift and body.transverse_rate > 0.0
-                more = ", or use --free-axis" if shifts else ""
+                enough = long_enough(needed)
+                if enough is not None:
+                    return f"limits.horizon = {enough:.4g} s is long enough"
                 return (
                     f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
-                    f"without other limits){more}"
+                    f"without other limits)"
                 )
         if body.limits.blackout:
             free = replace(body, limits=replace(body.limits, blackout=()))

@@ -20,7 +20,7 @@ from nutdamp import work
 from nutdamp.compliance import DAMPED_ANGLE
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
-from nutdamp.limits import keeps_limits
+from nutdamp.limits import keeps_limits, shortest_on_time
 from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
 from nutdamp.schemes.optimal.columns import Burn
@@ -80,6 +80,13 @@ SHARP = 0.02
 
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """By how much more than the program's least time a schedule may need, tried in turn."""
+
+
+TRIED = 6
+"""So many of them, to name a horizon that is long enough..."""
+
+LATER = 4.0
+"""... where it is at most so many times the default one: longer ones take long to look through."""
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -159,6 +166,26 @@ class _Search(Problem):
         least = self.program().solve()
         return least.unmet <= UNMET and self.settled(least.cost) is not None
 
+    def cured(self) -> str:
+        """Why the program has no solution, and what would do: each cure that is named was tried, or says that not."""
+        goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
+        bound = self.equations.shift and goal.axis is None and goal.spin is None
+        freed = bound and not work.exhausted() and _Search(self.spacecraft, free).found()
+        return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
+
+    def long_enough(self, needed: float) -> float | None:
+        """A horizon in which a schedule is found, s, four digits: ``needed`` s by small angles, or a little more."""
+        usual = replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=None)).horizon
+        if needed > LATER * usual:
+            return None
+        for margin in MARGINS[:TRIED]:
+            if work.exhausted():
+                return None
+            end = float(f"{needed * (1.0 + margin):.4g}")
+            if _Search(self.within(end), self.options).found():
+                return end
+        return None
+
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
@@ -168,7 +195,7 @@ class _Search(Problem):
             kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             best = self.cheaper(best, kept.cheapest(kept.program().solve()))
         if best is None:
-            raise Infeasible(self.cure() if UNMET < first.unmet < math.inf else self.not_found())
+            raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
 
     def within_shorter(self, horizon: float) -> Schedule | None:
@@ -230,12 +257,10 @@ class _Search(Problem):
     def programmed(self, first: Solution) -> Schedule | None:
         """The cheapest schedule that the linear program leads to, over the whole horizon or less."""
         best, horizon = self.settled(first.cost), self.spacecraft.horizon
+        shortest = max(shortest_on_time(self.spacecraft, channel) for channel in self.channels)
+        least = self.spacecraft.limits.earliest + max(self.spacecraft.inertial_period, shortest)
         halvings = 0
-        while (
-            not work.exhausted()
-            and self.dear(best, first.cost)
-            and (horizon := 0.5 * horizon) > self.spacecraft.inertial_period
-        ):
+        while not work.exhausted() and self.dear(best, first.cost) and (horizon := 0.5 * horizon) > least:
             halvings += 1
             if best is not None and halvings > HALVINGS:
                 break
