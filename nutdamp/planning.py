@@ -22,6 +22,9 @@ from nutdamp.spacecraft import Spacecraft, Vector
 NO_NUTATION = 1e-12
 """Nutation angle in rad below which there is nothing to plan."""
 
+ROUNDING = 1e-9
+"""Share by which the nutation that is left may be less for rounding alone."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(views.Data, views.Tabled):
@@ -309,7 +312,8 @@ def _helps(judged: Plan, left: Residual) -> bool:
         body.spin - body.goal.spin
     ):
         return True
-    return left.nutation < compliance.decayed(body, judged.end) or left.axis_error < body.to_turn
+    least = compliance.decayed(body, judged.end) * (1.0 - ROUNDING)
+    return left.nutation < least or left.axis_error < body.to_turn
 
 
 def unrounded(plan_: Plan) -> Schedule | None:

@@ -187,6 +187,11 @@ def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
         assert made.flown.nutation < idle(body, made.end)
 
 
+def test_an_earliest_time_beyond_the_horizon_is_named() -> None:
+    made = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
+    assert infeasibility(made) == "limits.earliest, or the pulses before, leave no time within limits.horizon"
+
+
 def test_optimal_looks_within_the_time_that_there_is_where_it_begins_late() -> None:
     """Half the horizon ends before the first pulse may begin."""
     made = plan(replace(SELF_DAMPING, limits=Limits(earliest=130.0, horizon=240.0)), "optimal")

@@ -135,4 +135,4 @@ def test_no_time_left_is_not_reported_as_a_negative_time() -> None:
         limits=Limits(horizon=8.41668748101266, gap=0.6011919629294757),
     )
     why = infeasibility(planning.plan(aimed(body, 0.05, 197.04), "half-cone"))
-    assert why == "the pulses before leave no time within limits.horizon"
+    assert why == "limits.earliest, or the pulses before, leave no time within limits.horizon"

@@ -21,8 +21,8 @@ def no_channels(spacecraft: Spacecraft) -> str:
     if any(channel.damps for channel in spacecraft.channels):
         ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
         time = spacecraft.horizon - spacecraft.limits.earliest
-        if time <= 0.0:  # where other pulses of the scheme come first
-            return "the pulses before leave no time within limits.horizon"
+        if time <= 0.0:  # by the file, or where other pulses of the scheme come first
+            return "limits.earliest, or the pulses before, leave no time within limits.horizon"
         return (
             f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
             f"the {time:.4g} s from limits.earliest to limits.horizon"
