@@ -22,7 +22,7 @@ from nutdamp.spacecraft import Spacecraft, Vector
 NO_NUTATION = 1e-12
 """Nutation angle in rad below which there is nothing to plan."""
 
-ROUNDING = 1e-9
+ROUNDING = 1e-11
 """Share by which the nutation that is left may be less for rounding alone."""
 
 
