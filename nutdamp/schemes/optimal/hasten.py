@@ -24,11 +24,14 @@ BISECTIONS = 3
 ROUNDS = 3
 """Earlier ends that are looked for one after the other."""
 
+PARTS = (0.2, 0.4, 0.6)
+"""Horizons that are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
+
 EARLIER = 300.0
 """Units of `work` after which no other one is looked for."""
 
-MOST = 600.0
-"""Units that may be spent on all of them."""
+MOST = 900.0
+"""Units that may be spent on all of them..."""
 
 
 def hastened(
@@ -37,23 +40,30 @@ def hastened(
     """``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
 
     ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest schedule found within a
-    horizon, s. By how much earlier an end may be small angles tell; the horizon that is tried lies halfway from there.
+    horizon, s. By how much earlier an end may be small angles tell; the horizons that are tried lie a little later.
     """
     if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
         return best
     begin, dearest = problem.spacecraft.limits.earliest, problem.price(best) * (1.0 + SAME_COST)
     small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
     left = problem.left(problem.flown(best)) + DAMPED_ANGLE
+
+    def better(made: Schedule) -> bool:
+        less = made.end < best.end and len(made) <= len(best)
+        return less and problem.price(made) <= dearest and problem.left(problem.flown(made)) <= left
+
     with work.budget("an earlier end", MOST) as spent:
+
+        def over() -> bool:
+            return not len(best) or work.exhausted() or spent.done > EARLIER
+
         for _ in range(ROUNDS):
             span = best.end - begin
-            if not len(best) or work.exhausted() or spent.done > EARLIER:
-                break
-            share = _least_share(problem, span, small_angles)
-            made = None if share is None else cheapest(begin + 0.5 * (share + 1.0) * span)
-            if made is None or made.end >= best.end or len(made) > len(best):
-                break
-            if problem.price(made) > dearest or problem.left(problem.flown(made)) > left:
+            share = None if over() else _least_share(problem, span, small_angles)
+            later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
+            found = (cheapest(begin + part * span) for part in later if not over())
+            made = next((one for one in found if one is not None and better(one)), None)
+            if made is None:
                 break
             best = made
     return best
