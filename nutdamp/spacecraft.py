@@ -82,6 +82,11 @@ class Inertia:
         return triaxial.body_nutation_rate(self.moments, 1.0)
 
     @property
+    def nutating(self) -> float:
+        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
+        return self.A if self.symmetric else self.C / (1.0 - self.body_rate)
+
+    @property
     def shape(self) -> str:
         """``prolate``, ``oblate`` or ``sphere``."""
         return inertia.shape(self.A, self.C)
@@ -386,8 +391,8 @@ class Spacecraft(views.Data, views.Shown):
 
     @property
     def inertial_period(self) -> float:
-        """Nutation period seen inertially, 2π A/|H|, s."""
-        return cones.inertial_period(self.inertia.A, self.inertia.C, self.transverse_rate, self.spin)
+        """Nutation period seen inertially, 2π A/|H|, s; with I1 ≠ I2 that of a small nutation."""
+        return cones.inertial_period(self.inertia.nutating, self.inertia.C, self.transverse_rate, self.spin)
 
     @property
     def nutation_period(self) -> float:

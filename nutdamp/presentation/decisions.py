@@ -108,7 +108,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
     cases = decision.cases
     heads = ["requirement", "limit", values]
     if cases is not None:
-        heads.append(f"dispersed ({verdicts.exact_percent(cases.probability)})")
+        heads.append(f"dispersed\n({verdicts.exact_percent(cases.probability)})")
     table = columns(*heads, "margin", "verdict", text=("verdict",))
     for line in decision.lines:
         dispersed = [] if cases is None else [size(line.bound, line.dispersed)]

@@ -181,7 +181,10 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         seen = () if found is None else bounded(study.model.spacecraft.keep, np.degrees(found).tolist())
         angles = [f"{angle:.4g}" for angle in seen]
         table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), *angles, drawn)
-    again = f"Each can be looked at alone, with all its inputs: --seed {study.seed} --case {cases[0] + 1}"
+    again = (
+        "Each can be looked at alone, with all its inputs: nutdamp disperse, as here, with "
+        f"--seed {study.seed} --case {cases[0] + 1}"
+    )
     return [Text("Worst cases", style="bold"), table, Text(again, style="dim")]
 
 

@@ -46,7 +46,7 @@ def target_text(body: Spacecraft, direction: Vector) -> str:
 
 def spin_text(spin: float) -> str:
     """A spin rate given in rad/s, in rpm too."""
-    return f"{spin * RPM:.4g} rpm ({quantity(spin, 'rad/s')})"
+    return f"{spin * RPM:.6g} rpm ({quantity(spin, 'rad/s')})"
 
 
 def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:

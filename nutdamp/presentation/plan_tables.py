@@ -64,7 +64,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     inertia = spacecraft.inertia
     found = spacecraft.widest
     table = facts()
-    moments = f"A = {quantity(inertia.A, 'kg m²')}, C = {quantity(inertia.C, 'kg m²')}"
+    moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
     if not inertia.symmetric:
         first, second, _ = inertia.moments

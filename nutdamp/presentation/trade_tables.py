@@ -15,6 +15,7 @@ from nutdamp.planning import Plan
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import NOT, header
 from nutdamp.presentation.text import cost, degrees, duration, moment
+from nutdamp.presentation.verdicts import FARTHER
 from nutdamp.recommendation import SAME_ANGLE
 from nutdamp.schedule import STEERABLE
 from nutdamp.schemes.registry import OPTIMAL
@@ -47,8 +48,8 @@ def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[Renderab
 
 
 BELOW = (
-    "The first-order least is that of small angles, and bounds no plan with large ones: where a cost is below it, the "
-    "flight through the real pulse widths needs less than first order says."
+    "The first-order least holds for small angles and for plans that leave no nutation: where a cost is below it, the "
+    "plan leaves a little, or its flight at larger angles needs less than first order says."
 )
 """Of points that cost less than their first-order least."""
 
@@ -58,7 +59,9 @@ def _off(front: Front, point: Point) -> bool:
     return front.shift == 0.0 and point.plan.flight.residual.axis_error > DAMPED_ANGLE
 
 
-OFF = "Real widths, ticks and the shortest and longest on-times leave H a little beside where a front has it end."
+OFF = (
+    "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
+)
 """Of points whose H ends a little beside where it is to end."""
 
 
@@ -77,6 +80,10 @@ def fails(point: Point) -> bool:
     return point.plan.meets_requirement is False or point.plan.kept is False
 
 
+TOGETHER = 1e-3
+"""s between ends that count as one."""
+
+
 class _Better(NamedTuple):
     """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier."""
 
@@ -90,7 +97,8 @@ class _Better(NamedTuple):
     def how(self) -> str:
         """What it is better in."""
         if self.saved:
-            return f"costs {100.0 * self.saved:.2g} % less than the recommended plan and ends no later"
+            ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
+            return f"costs {100.0 * self.saved:.2g} % less than the recommended plan and ends {ends}"
         return f"costs as much as the recommended plan and ends {duration(self.earlier)} earlier"
 
 
@@ -143,41 +151,45 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
 
 def apart(found: Sequence[Front], chosen: Plan) -> str:
     """Why the ``chosen`` plan may cost less than the schedules that are traded: it is of another scheme; or nothing."""
-    points = [
-        point for _, _, point in numbered(found) if point.plan.pulses.end <= chosen.pulses.end and not fails(point)
-    ]
+    points = {
+        number: point
+        for number, _, point in numbered(found)
+        if point.plan.pulses.end <= chosen.pulses.end and not fails(point)
+    }
     if not points:
         return ""
-    spent, cheapest = chosen.pulses.cost_in(points[0].unit), min(point.cost for point in points)
+    number, nearest = min(points.items(), key=lambda one: one[1].cost)
+    spent, cheapest = chosen.pulses.cost_in(nearest.unit), nearest.cost
     if spent >= cheapest * (1.0 - SAME_COST):
-        alike = spent < cheapest and cost(spent, points[0].unit) != cost(cheapest, points[0].unit)
+        alike = spent < cheapest and cost(spent, nearest.unit) != cost(cheapest, nearest.unit)
         return ALIKE * alike
     if chosen.scheme in schemes_of(found):
         return ""
     reasons = []
     if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
-        reasons.append("it fires the steerable torquer, which the schedules of the trade do not")
-    left = max(point.plan.flight.residual.nutation for point in points)
+        impulses = " with ideal impulses" * chosen.pulses.idealised
+        reasons.append(f"it fires the steerable torquer{impulses}, which the schedules of the trade do not")
+    left = max(point.plan.flight.residual.nutation for point in points.values())
     if chosen.flight.residual.nutation > left + SAME_ANGLE:
         reasons.append(
             f"it leaves {degrees(chosen.flight.residual.nutation)} of nutation, they at most {degrees(left)}"
         )
     because = f": {listed(reasons)}" if reasons else ""
     return (
-        f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than the "
-        f"schedules of the trade that meet the requirement and end no later, and is not among them{because}."
+        f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than "
+        f"point {number}, the cheapest of the trade that meets the requirement and ends no later{because}."
     )
 
 
-ALIKE = "costs within 0.1 % of each other count as equal: the recommended plan is no point of its own for so little."
+ALIKE = "the recommended plan costs less than the points that end no later, by less than the 0.1 % that count as equal."
 """Of a plan that costs as little less than the points as does not count."""
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """Whether a plan that saves that share of the cost, about none, ends clearly sooner and leaves H as near."""
+    """Whether a plan that saves that share of the cost, about none, ends clearly sooner and leaves H about as near."""
     shifts = [one.flight.residual.axis_error for one in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
-    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= shifts[1] + SAME_ANGLE
+    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
 SOONER = 0.05

@@ -69,8 +69,8 @@ def reason(compared: Comparison) -> str:
     if found.standing is Standing.COMPLIES:
         among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
         return {
-            Ground.SHIFT: f"least {cost} {among}, within 0.1 %; of these least shift of H",
-            Ground.END: f"least {cost} {among}, within 0.1 %; of these it ends first",
+            Ground.SHIFT: f"least {cost} {among}; of those that cost as much within 0.1 %, least shift of H",
+            Ground.END: f"least {cost} {among}; of those that cost as much within 0.1 %, it ends first",
         }.get(found.ground or Ground.COST, f"least {cost} {among}")
     meeting = found.standing is Standing.MEETS
     those = (
@@ -250,16 +250,20 @@ def hints(compared: Comparison, shares: Mapping[str, float] | None = None) -> tu
 
     ``shares``: of schemes that were dispersed, by name, the share of cases that comply.
     """
+    others = dict.fromkeys(compared.recommendation.alternatives.values())
+    return tuple(hint(compared, other, shares) for other in others)
+
+
+def hint(compared: Comparison, other: Plan, shares: Mapping[str, float] | None = None) -> str:
+    """In what one of the alternatives is better than the recommended plan, and in what it is worse."""
     found = compared.recommendation
-    chosen, said = found.plan, []
-    for other in dict.fromkeys(found.alternatives.values()):
-        assert chosen is not None
-        gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
-        better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
-        worse = listed([*_drawbacks(other, chosen)])
-        clauses = better, f"but it {worse}" * bool(worse), _complying(other, chosen, shares or {})
-        said.append(f"{'; '.join(filter(None, clauses))}.")
-    return tuple(said)
+    chosen = found.plan
+    assert chosen is not None
+    gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
+    better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
+    worse = listed([*_drawbacks(other, chosen)])
+    clauses = better, f"but it {worse}" * bool(worse), _complying(other, chosen, shares or {})
+    return f"{'; '.join(filter(None, clauses))}."
 
 
 def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
@@ -276,7 +280,7 @@ def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
 
 
 def _drawbacks(other: Plan, chosen: Plan) -> Iterator[str]:
-    """In what a plan is clearly worse than the ``chosen`` one: it leaves H farther off, or ends later."""
+    """In what a plan is clearly worse than the ``chosen`` one: farther off, more nutation, a later end."""
     assert other.flown is not None
     assert chosen.flown is not None
     if other.flown.axis_error > FARTHER * chosen.flown.axis_error + compliance.DAMPED_ANGLE:
@@ -285,7 +289,10 @@ def _drawbacks(other: Plan, chosen: Plan) -> Iterator[str]:
         else:
             off = degrees(other.flown.axis_error), degrees(chosen.flown.axis_error)
             yield f"leaves H {off[0]} instead of {off[1]} off the target"
-    if other.pulses.end > chosen.pulses.end + chosen.spacecraft.inertial_period:
+    if other.flown.nutation > FARTHER * chosen.flown.nutation + compliance.DAMPED_ANGLE:
+        yield f"leaves {degrees(other.flown.nutation)} of nutation instead of {degrees(chosen.flown.nutation)}"
+    end, later = chosen.pulses.end, other.pulses.end - chosen.pulses.end
+    if later > min(chosen.spacecraft.inertial_period, (FARTHER - 1.0) * end):
         yield f"ends at {moment(other.pulses.end)} instead of {moment(chosen.pulses.end)}"
 
 
@@ -314,7 +321,7 @@ ROUNDING = 1e-9
 """Share by which costs that are equal may differ."""
 
 FARTHER = 1.1
-"""So many times as far off H ends where a plan that is preferred for something else is said to be worse in it."""
+"""So many times as far off H ends, or as late, where a plan preferred for something else is said to be worse in it."""
 
 
 def spoken(compared: Comparison) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
         Text(BUDGET, style="bold"),
         Text(),
         budget_table(spacecraft, found),
-        *[Text(note, style="dim") for note in (budget_note(found),) if note],
+        *[Text(note, style="dim") for note in (budget_note(found, aimed=spacecraft.goal.axis is not None),) if note],
     )
 
 
@@ -98,16 +98,16 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
     return table
 
 
-def budget_note(found: Verification) -> str:
+def budget_note(found: Verification, *, aimed: bool) -> str:
     """What the rows that leave something out are, and why one thing may leave more than all; empty where neither is."""
     names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
     flown = next(row for row in found.budget if row.name == AS_FLOWN)
     single = [row for row in found.budget if row is not flown and not row.name.startswith(WITHOUT)]
-    notes = []
+    farther, notes = "H farther off the target" if aimed else "a larger shift of H", []
     if len(found.budget) == len({IDEAL, AS_FLOWN}):
         notes.append("Nothing is imperfect here: ideal impulses, no ticks, no disturbances.")
     for row in single:
-        left = [("more nutation", row.nutation - flown.nutation), ("H farther off", row.axis_error - flown.axis_error)]
+        left = [("more nutation", row.nutation - flown.nutation), (farther, row.axis_error - flown.axis_error)]
         more = [what for what, by in left if by > SHOWN]
         if more:
             how = "As ideal impulses" if row.name == IDEAL else f"With {row.name} alone"

@@ -240,7 +240,8 @@ def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tup
     first, second = made.pulses
     turns = (second.t - first.t) / halves.wait
     text = (
-        f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half nutation turns; "
+        f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half turns of the nutation "
+        f"seen inertially; "
         f"the second is {abs(math.degrees(candidate.miss)):.2g}° off the ideal direction, "
         f"ideal impulses would cost {candidate.factor:.3f} × A|ω0|"
     )

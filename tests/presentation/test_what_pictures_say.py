@@ -148,7 +148,7 @@ def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> 
         for one in chosen.pulses
     )))  # fmt: skip
     said = apart(dearer, cheap)
-    assert said.startswith("the recommended plan, by one-pulse, costs 10 % less than the schedules of the trade that")
+    assert said.startswith("the recommended plan, by one-pulse, costs 10 % less than point 1, the cheapest of the")
     assert "it fires the steerable torquer, which the schedules of the trade do not" in said
     assert "deg of nutation, they at most" in said
     assert apart(dearer, dearer[0].points[0].plan) == ""

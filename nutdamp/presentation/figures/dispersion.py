@@ -283,6 +283,8 @@ def _budget(figure: Figure | SubFigure, results: Results) -> None:
         effects = np.degrees([row.effects[index] for row in rows])
         most = float(effects.max(initial=0.0))
         limit, right = _limit(results, part), 1.3 * most
+        if limit is not None and NOTHING <= most < limit and limit > right:
+            axes.set_title(f"{axes.get_title()}\nrequired {limit:.4g}°, outside the view")
         if most < NOTHING:
             required = "" if limit is None else f"\nrequired {limit:.4g}°"
             style.words(axes, (f"each input: below {NEXT_TO_NOTHING}" if rows else "no input varies") + required)

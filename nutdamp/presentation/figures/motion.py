@@ -224,12 +224,12 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
     for group in groups:
         torque = group[0].transverse / abs(group[0].transverse)
         way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
-        axes.plot(*np.outer(way, [1.1, 1.28]), color=GREY, linewidth=1.2)
-        style.heads(axes, np.outer([1.1, 1.3], way), [1], GREY)
+        axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
+        style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
         names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
         labels.add(axes, names, 1.2 * way, INK, role="vital")
     if groups:
-        axes.plot([], [], color=GREY, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
+        axes.plot([], [], color=INK, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
     return bool(groups)
 
 

@@ -47,7 +47,7 @@ from nutdamp.presentation.page.sheets import aspects_sheet, comparison_sheet, pu
 from nutdamp.presentation.text import degrees, sentence
 from nutdamp.presentation.trade_tables import apart, beats, front_parts, outdone
 from nutdamp.presentation.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
-from nutdamp.recommendation import Standing
+from nutdamp.recommendation import Gain, Standing
 from nutdamp.remarks import said
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
@@ -131,9 +131,16 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
     said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
-    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided))]
+    others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
+    fired = [verdicts.hint(compared, one, decided.shares) for one in dict.fromkeys(others) if one is not None]
+    surer = [SURER] * (decided.cases is not None and decided.cases.met is False)
+    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *surer, *fired)]
     notes += filter(None, [outdone(traded, decided.plan)])
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
+
+
+SURER = "nutdamp plan --robust looks for a plan with which more cases comply"
+"""Beside a plan with which too few do."""
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
@@ -195,13 +202,13 @@ def _reading(compared: Comparison) -> Iterator[str]:
     if any(COUNTS.get(plan.scheme, len(plan.pulses)) != len(plan.pulses) for plan in feasible):
         yield (
             "A scheme fires more pulses than its name says where the thrusters cannot give its impulse in so many, "
-            "and fewer where fewer do."
+            "and fewer where fewer take out the nutation."
         )
     commanded = [plan.scheme for plan in feasible if plan.scheme in schemes.COMMANDED]
     if commanded and len(commanded) < len(feasible):
         yield (
-            f"Of these plans command blocks fire that of {listed(commanded)} alone; the others need pulses that are "
-            "timed one by one."
+            f"Command blocks can fire the plan of {listed(commanded)} only; the pulses of the others have to be timed "
+            "one by one."
         )
 
 
@@ -227,7 +234,8 @@ def _schedule(chosen: Plan) -> Section:
         return Section("schedule", title, (Prose("No pulse is needed."), *ends))
     note = Prose(
         "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
-        "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse."
+        "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse"
+        f"{', the largest of the free motion then' * (not chosen.spacecraft.inertia.symmetric)}."
     )
     return Section("schedule", title, (pulse_sheet(chosen), note, *ends))
 
@@ -247,7 +255,7 @@ def _verification(chosen: Plan) -> Section:
             BUDGET,
             budget_table(chosen.spacecraft, verified),
         ),
-        *[Prose(note) for note in (budget_note(verified),) if note],
+        *[Prose(note) for note in (budget_note(verified, aimed=chosen.spacecraft.goal.axis is not None),) if note],
     ]
     return Section("budget", "Verification and error budget", tuple(blocks))
 

@@ -60,10 +60,17 @@ def _body(body: Spacecraft) -> Iterator[tuple[str, str]]:
         strength = "ideal impulses" if steerable.torque is None else quantity(steerable.torque, "N m")
         yield "steerable", f"{strength}, isp {isp}, lever arm {arm}"
     if body.attitude is not None:
-        yield "epoch", body.attitude.epoch or MISSING
+        yield "epoch", _epoch(body.attitude.epoch, body.utc(0.0))
         yield "frame", body.attitude.frame or MISSING
     else:
         yield "epoch, frame", f"none in the file; {FRAME_N}"
+
+
+def _epoch(given: str | None, utc: str | None) -> str:
+    """The epoch as the file gives it, and in UTC, in which the tables are, where that is written otherwise."""
+    if given is None:
+        return MISSING
+    return given if utc is None or given.endswith("Z") else f"{given} = {utc}"
 
 
 def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
@@ -72,7 +79,8 @@ def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         given = required is not None and required.probability is not None
         default = "" if given else " (the default: the file has no requirement.probability)"
         yield "dispersed cases", f"{exact_percent(required_share(required))} must comply{default}"
-    yield "horizon", duration(spacecraft.horizon)
+    default = " (the default)" * (limits.horizon is None)
+    yield "horizon", f"{duration(spacecraft.horizon)}{default}"
     kept = []
     if limits.earliest > 0.0:
         kept.append(f"nothing before {duration(limits.earliest)}")

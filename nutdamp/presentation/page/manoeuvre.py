@@ -32,6 +32,9 @@ if TYPE_CHECKING:  # few reports disperse
 CHECKED = 12
 """Pulses after which there are abort criteria, at most."""
 
+FITTING = 5
+"""Columns of short values that a phone shows side by side."""
+
 STILL = 1e-9
 """deg/s of transverse rate, below which it is rounding."""
 
@@ -53,7 +56,8 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
     if plan.pulses.idealised:
         yield Prose(
-            "On-time “ideal”: an impulse that takes no time, which no thruster gives: name its torque for on-times."
+            "On-time “ideal”: an impulse that takes no time, which no thruster gives; with steerable.torque in the "
+            "file it has an on-time."
         )
     yield Prose(_phases(plan))
     if any(pulse.channel == STEERABLE for pulse in plan.pulses):
@@ -105,7 +109,8 @@ def _firing(flown: Flight) -> Sheet:
     ]
     if flown.schedule.idealised:
         columns.append((Column("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]))
-    return _sheet("Pulses to fire", columns)
+    wide = len(columns) > FITTING or any(pulse.channel == STEERABLE for pulse in pulses)
+    return _sheet("Pulses to fire", columns, stacked=wide)
 
 
 def _signature(flown: Flight) -> Sheet:
@@ -123,8 +128,9 @@ def _signature(flown: Flight) -> Sheet:
     spins, nutation = states("rates")[:, 2], states("nutation")
     across = np.abs(spins) * np.tan(states("body_cone"))
     moments = body.inertia
-    inertial = [cones.inertial_period(moments.A, moments.C, *one) for one in zip(across, spins, strict=True)]
-    in_body = [cones.body_period(moments.A, moments.C, spin) for spin in spins.tolist()]
+    shape = moments.nutating, moments.C
+    inertial = [cones.inertial_period(*shape, *one) for one in zip(across, spins, strict=True)]
+    in_body = [cones.body_period(*shape, spin) for spin in spins.tolist()]
     turns = np.isfinite(in_body) & (np.degrees(across) >= STILL)
     periods = [digits(time, 4) if there else MISSING for time, there in zip(in_body, turns, strict=True)]
     columns: list[tuple[Column, list[str]]] = [
@@ -152,7 +158,8 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     rows = np.array(counts) - 1
     limits = np.array([one.nutation for one in found])
     required = None if body.requirement is None else body.requirement.nutation
-    if required is not None:
+    stricter = required is not None and required < float(limits[-1])
+    if stricter:
         limits[-1] = required
     columns: list[tuple[Column, list[str]]] = [
         (Column("after pulse"), list(map(str, counts))),
@@ -177,14 +184,15 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     share = verdicts.exact_percent(probability)
     yield Prose(
         f"Abort, and plan anew from the measured attitude, where after a pulse one of these is exceeded: {share} of "
-        f"{CASES:,} cases stay within each, those without a fault of thruster, valve or sensor. They are drawn from "
-        f"the dispersions of the file (seed {dispersed.study.seed}) and flown for this table alone; their number is "
-        "not that of --disperse."
+        f"{CASES:,} cases stay within each{' but the last of nutation' * stricter}, those without a "
+        f"fault of thruster, valve or sensor. They are drawn from the dispersions of the file (seed "
+        f"{dispersed.study.seed}) and flown for this table alone; their number is not that of --disperse."
     )
-    if required is not None:
-        fewer = ", which fewer cases meet: on the way a flight within the criteria may still come to miss it"
-        aside = fewer * (required < found[-1].nutation)
-        yield Prose(f"After the last pulse the criterion of nutation is the requirement{aside}.")
+    if stricter:
+        yield Prose(
+            "After the last pulse the criterion of nutation is the requirement, which fewer cases meet: on the way a "
+            "flight within the criteria may still come to miss it."
+        )
     others = [bound.part.label for bound in compliance.required(body) if bound.part is not Part.NUTATION]
     if others:
         yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")

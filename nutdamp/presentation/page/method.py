@@ -24,13 +24,14 @@ EQUATIONS = ("1", "17", "18", "19")
 def method_blocks(compared: Comparison) -> Iterator[Block]:
     """A paragraph on the method, the equations used with their symbols, the sources."""
     names = ", ".join(plan.scheme for plan in compared.plans)
+    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (not compared.spacecraft.inertia.symmetric)
     yield Prose(
         f"Schemes tried, on the nominal values of the input file: {names}. Each schedule found is then flown: Euler's "
         "equations with the true principal moments are integrated through the real pulse widths (ideal impulses take "
         "no time) by Taylor series, coasts of symmetric bodies as exact arcs. Recommendation, requirement and verdict "
-        "go by that flight. By (17), Magnus' impulse sum, each pulse acts at its centre with its effective impulse. "
-        "one-pulse, two-pulse, four-pulse and optimal aim at no nutation at the end, however much the requirement "
-        "allows."
+        "go by that flight. By M(17), the impulse sum, also written (17), each pulse acts at its centre with its "
+        f"effective impulse{unequal}. one-pulse, two-pulse, four-pulse and optimal aim at no nutation at the end, "
+        "however much the requirement allows."
     )
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]

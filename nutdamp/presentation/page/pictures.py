@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from nutdamp.track import Track
 
 
+UNEQUAL = " With I1 ≠ I2 the space cone is what ω traces about H in free motion: not circular, nor closed."
+"""Of cones that are no circular ones."""
+
+
 def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     """Pole curve and axis track, cones in space, rates and angles over time, firings; raises MissingExtra."""
     flown, track = figures.shown(plan)
@@ -40,7 +44,7 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         (
             "sphere",
             f"The cones in space: {'the inside of ' * (plan.spacecraft.inertia.a < 0.0)}the body cone rolls on the "
-            "space cone about H.",
+            "space cone about H." + UNEQUAL * (not plan.spacecraft.inertia.symmetric),
             "Spherical view of body cone, space cone, angular momentum and spin axis",
         ),
         (
@@ -129,7 +133,7 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
         (
             "budget",
             f"One sigma of each input{', or its bias (hatched),' * biased} alone: what it does to the nutation, and to "
-            "where H ends." + " The line of what is required holds for all inputs together." * limited,
+            "where H ends." + " What is required holds for all inputs together." * limited,
             "Tornado of the tolerance budget",
         ),
     )
