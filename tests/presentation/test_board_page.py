@@ -195,8 +195,27 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
     shares = {row[0]: float(row[heads.index("cases that comply %")]) for row in rows}
     assert max(shares, key=lambda name: shares[name]) == "two-pulse"
     assert f"More cases comply with two-pulse ({shares['two-pulse']:.1f} %)" in tree.text
+    assert "To look for a plan with which more cases comply: nutdamp plan --robust." in tree.text
     assert run("report", "--disperse", "2e3", "-o", "page.md").returncode == 4
     assert (tmp_path / "page.md").read_text("utf-8").count(said) == 3  # verdict, tile, dispersion
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("lunar-prospector", "Command-block can be sent as command blocks, for "),
+        ("magnus-a03", "fires real pulse widths, for "),
+    ],
+)
+def test_the_headline_names_the_plan_that_can_be_sent_or_fired_as_it_stands(
+    run: Run, tmp_path: Path, name: str, said: str
+) -> None:
+    assert run("init", "--from", name, "craft.yaml").returncode == 0
+    assert run("report", "craft.yaml", "-o", "page.html").returncode == 0
+    tree = parsed((tmp_path / "page.html").read_text("utf-8").removeprefix("<!DOCTYPE html>"))
+    (headline,) = (one for one in tree.all("p") if "verdict" in one.attributes.get("class", ""))
+    assert said in headline.text
 
 
 @pytest.mark.slow

@@ -139,7 +139,7 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
 
-SURER = "nutdamp plan --robust looks for a plan with which more cases comply"
+SURER = "to look for a plan with which more cases comply: nutdamp plan --robust"
 """Beside a plan with which too few do."""
 
 
