@@ -376,7 +376,7 @@ def test_where_the_file_has_commands_the_plan_of_command_blocks_is_mentioned_wha
     assert found.recommended is not None
     assert not found.recommended.pulses.blocks
     (hint,) = [one for one in verdicts.hints(found) if "blocks" in one]
-    assert hint.startswith("command-block can be sent as command blocks, for ")
+    assert hint.startswith("command-block can be sent as command blocks, which optimal cannot, for ")
     assert " g more propellant (7.7 %); but it shifts H by " in hint
     assert ", leaves 0.1318 deg of nutation instead of < 1e-9 deg and ends at " in hint
     only = recommend([one for one in found.plans if one.scheme == "command-block"])

@@ -271,7 +271,7 @@ def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
     if gain is Gain.REAL:
         return "fires real pulse widths"
     if gain is Gain.COMMANDED:
-        return "can be sent as command blocks"
+        return f"can be sent as command blocks, which {chosen.scheme} cannot"
     if gain is Gain.STEADIER:
         return f"shifts H by {_shift(other)} instead of {_shift(chosen)}"
     if gain is Gain.SOONER:

@@ -204,7 +204,7 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("lunar-prospector", "Command-block can be sent as command blocks, for "),
+        ("lunar-prospector", "Command-block can be sent as command blocks, which optimal cannot, for "),
         ("magnus-a03", "fires real pulse widths, for "),
     ],
 )

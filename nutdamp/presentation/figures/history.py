@@ -69,7 +69,7 @@ def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
 def timeline(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
     """Which channel fires when and for how long; ``narrow``: for a phone."""
     rows = max(len(geometry.channels_fired(flight)), 1)
-    figure = style.sheet(style.PHONE if narrow else 7.4, 1.75 + 0.39 * rows)
+    figure = style.sheet(style.PHONE if narrow else 7.4, 1.85 + 0.39 * rows)
     axes = figure.subplots()
     firings(axes, flight, float(track.t[-1]))
     axes.set_xlabel(TIME)
@@ -148,7 +148,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
     names = geometry.channels_fired(flight)
     rows = {name: len(names) - 1 - index for index, name in enumerate(names)}
     axes.set_xlim(-EDGE * until, until)
-    axes.set_ylim(-0.5, max(len(names), 1) + 0.1)
+    axes.set_ylim(-0.5, max(len(names), 1) + 0.25)
     named = "must not fire"
     for begins, ends in geometry.closed(flight.spacecraft, until):
         for row in rows.values():
