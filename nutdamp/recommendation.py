@@ -63,6 +63,7 @@ class Ground(Enum):
     NOMINAL = "nominal"
     SHIFT = "shift"
     END = "end"
+    SHIFT_END = "shift, then end"
 
 
 class Gain(Enum):
@@ -170,7 +171,8 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
         return usual, Ground.NOMINAL
     least = min(map(_off, equal))
     still = [one for one in equal if _off(one) <= least + SAME_ANGLE]
-    return min(still, key=lambda one: one.pulses.end), Ground.SHIFT if len(still) == 1 else Ground.END
+    ground = Ground.SHIFT if len(still) == 1 else Ground.END if len(still) == len(equal) else Ground.SHIFT_END
+    return min(still, key=lambda one: one.pulses.end), ground
 
 
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
-from nutdamp.decision import Decision
+from nutdamp.decision import Cases, Decision, cases_of
 from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.agreement import check_impulses
@@ -45,14 +45,20 @@ WIDEST = 1.3
 FRESH = 211
 """Seed of cases that nothing was chosen by."""
 
+CHECKED = 6
+"""Plans with which just enough cases seem to comply that are tried in such cases, one after the other."""
+
 
 class Fresh(NamedTuple):
-    """Share ``met`` of ``samples`` cases of a ``seed`` of its own that comply, with its 95 % ``interval``."""
+    """How a plan fares in ``cases`` of a seed of their own, with the 95 % ``interval`` of the share that complies."""
 
-    met: float
+    cases: Cases
     interval: tuple[float, float]
-    samples: int
-    seed: int
+
+    @property
+    def met(self) -> float:
+        """The share of the cases that complies."""
+        return self.cases.complying or 0.0
 
 
 class Cost(NamedTuple):
@@ -71,7 +77,8 @@ class RobustComparison:
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``,
     in closed form. ``tightening``: with which tolerances enough cases would comply with it, where too few do.
-    ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
+    ``fresh``: how the robust plan fares in as many cases by which it was not chosen, which decide whether it meets the
+    requirement; None where nothing is required.
     """
 
     comparison: Comparison
@@ -115,7 +122,12 @@ class RobustComparison:
         flown = {_kind(one.plan): one.met for one in self.candidates}
         shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
         known = {scheme: share for scheme, share in shares.items() if share is not None}
-        return Decision(self.chosen.plan, self.chosen.cases, known)
+        return Decision(self.chosen.plan, self.chosen.cases if self.fresh is None else self.fresh.cases, known)
+
+    @property
+    def met(self) -> float | None:
+        """The share of cases that comply with the robust plan: of those it was not chosen by, where they were flown."""
+        return self.fresh.met if self.fresh is not None else None if self.chosen is None else self.chosen.met
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
@@ -200,11 +212,31 @@ def compare(
     always = [one for one in candidates if whole or one is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
     ranks = ranked(comparison, candidates, samples, probability, flown=not impulses)
-    return ranks if whole or ranks.chosen is None else replace(ranks, fresh=_fresh(ranks.chosen, samples, not impulses))
+    return ranks if whole or ranks.chosen is None else _checked(ranks, candidates)
+
+
+def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:
+    """The comparison with the chosen plan in cases that are new to the choice, which takes luck for merit now and then.
+
+    A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
+    comply all the same, with which tolerances enough would.
+    """
+    comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
+    refused: list[Candidate] = []
+    while (chosen := ranks.chosen) is not None:
+        ranks = replace(ranks, fresh=_fresh(chosen, samples, ranks.flown))
+        lucky = ranks.fresh is not None and ranks.fresh.met < required <= (chosen.met or 0.0)
+        if not lucky or chosen in refused or len(refused) == CHECKED:
+            break
+        refused.append(chosen)
+        ranks = ranked(comparison, candidates, samples, required, flown=ranks.flown, refused=refused)
+    if not ranks.flown or chosen is None or ranks.met is None or ranks.met >= required:
+        return ranks
+    return replace(ranks, tightening=tightening(chosen.plan, required))
 
 
 def _fresh(chosen: Candidate, samples: int, flown: bool) -> Fresh | None:
-    """The chosen plan in cases that are new to the choice, which takes luck for merit now and then."""
+    """The chosen plan in cases that are new to the choice; None where nothing is required of it."""
     if chosen.met is None:
         return None
     study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH, flown=flown)
@@ -212,24 +244,32 @@ def _fresh(chosen: Candidate, samples: int, flown: bool) -> Fresh | None:
         found = run(Results(study, samples), threads=threads_here())
     except Infeasible:  # a case among them takes too long to fly
         return None
-    return Fresh(found.met_fraction or 0.0, found.interval, samples, FRESH)
+    return Fresh(cases_of(found), found.interval)
 
 
 def ranked(
-    comparison: Comparison, candidates: Sequence[Candidate], samples: int, probability: float, *, flown: bool
+    comparison: Comparison,
+    candidates: Sequence[Candidate],
+    samples: int,
+    probability: float,
+    *,
+    flown: bool,
+    refused: Sequence[Candidate] = (),
 ) -> RobustComparison:
     """The comparison of candidates that have flown, and which of them to take.
 
     That is the cheapest of the equals; of those that cost the same the plan that is recommended for nominal values.
+    With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((one for one in candidates if _kind(one.plan) == recommended), None)
-    equals = _equals(candidates, samples, probability)
+    others = [one for one in candidates if one not in refused]
+    enough = any(one.met is not None and one.met >= probability for one in others)
+    equals = _equals(others if enough else candidates, samples, probability)
     chosen, ground = None, None
     if equals:
         best, ground = cheapest([one.plan for one in equals], None if usual is None else usual.plan)
         chosen = next(one for one in equals if one.plan is best)
-    short = chosen is not None and chosen.met is not None and chosen.met < probability and flown
     return RobustComparison(
         comparison,
         tuple(sorted(candidates, key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
@@ -242,7 +282,6 @@ def ranked(
         samples,
         SEED,
         flown,
-        tightening(chosen.plan, probability) if chosen is not None and short else None,
     )
 
 

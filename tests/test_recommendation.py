@@ -161,6 +161,9 @@ def test_costs_within_a_thousandth_are_equal() -> None:
     still = judged("still", 0.0, shift=0.5, propellant=12.6330, end=90.0)
     assert chosen(late, early, still) == "still"
     assert recommend([late, early, still]).ground is Ground.SHIFT
+    sooner = judged("sooner", 0.0, shift=0.5, propellant=12.6330, end=80.0)
+    assert chosen(late, early, still, sooner) == "sooner"
+    assert recommend([late, early, still, sooner]).ground is Ground.SHIFT_END  # early ends before it
     dearer = judged("dearer", 0.0, shift=0.0, propellant=12.6312 * 1.0011, end=1.0)
     assert chosen(late, dearer) == "late"
 

@@ -31,8 +31,8 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
         "fresh": None
         if found.fresh is None
         else {
-            "samples": found.fresh.samples,
-            "seed": found.fresh.seed,
+            "samples": found.fresh.cases.samples,
+            "seed": found.fresh.cases.seed,
             "met_fraction": found.fresh.met,
             "interval": list(found.fresh.interval),
         },

@@ -97,13 +97,14 @@ def proved(found: Certificate | None) -> str:
 
 
 def _fresh(found: RobustComparison) -> str:
-    """How the plan fares in new cases; nothing where none were flown."""
-    if found.fresh is None:
+    """Which cases decide, and how the plan fares in those it was chosen by; nothing where no new ones were flown."""
+    if found.fresh is None or found.chosen is None:
         return ""
-    met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
+    cases, own = found.fresh.cases, found.chosen.met or 0.0
+    low, high = (verdicts.percent(one, found.probability) for one in found.fresh.interval)
     return (
-        f"Of {found.fresh.samples:,} new cases (seed {found.fresh.seed}), not used for the choice, {met} comply; "
-        f"95 % interval {low} to {high}."
+        f"These are {cases.samples:,} new cases (seed {cases.seed}), not used for the choice; 95 % interval {low} to "
+        f"{high}. Of those that it was chosen by, {verdicts.percent(own, found.probability)} comply."
     )
 
 

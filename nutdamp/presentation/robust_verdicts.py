@@ -24,7 +24,7 @@ def robust_reason(found: RobustComparison) -> str:
         level = exact_percent(found.probability)
         best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
         as_good = f"{found.equals} leave about as little"
-    elif chosen.met >= found.probability:
+    elif (found.met or 0.0) >= found.probability:
         best = f"at least {exact_percent(found.probability)} of cases comply with it, of {count} plans"
         as_good = f"they do with {found.equals}"
     else:
@@ -38,6 +38,7 @@ def robust_reason(found: RobustComparison) -> str:
         Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended for nominal values",
         Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
+        Ground.SHIFT_END: f"least {cost} within 0.1 %, least shift of H, and first to end of these",
     }
     return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
 

@@ -85,17 +85,23 @@ TOGETHER = 1e-3
 
 
 class _Better(NamedTuple):
-    """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier."""
+    """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier.
+
+    ``only``: it meets the requirement, and the recommended plan does not.
+    """
 
     saved: float
     earlier: float
     number: int
     front: Front
     point: Point
+    only: bool
 
     @property
     def how(self) -> str:
         """What it is better in."""
+        if self.only:
+            return "meets the requirement with nominal values, which the recommended plan does not"
         if self.saved:
             ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
             return f"costs {100.0 * self.saved:.2g} % less than the recommended plan and ends {ends}"
@@ -105,15 +111,18 @@ class _Better(NamedTuple):
 def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
     """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
 
-    The cheapest, of those that cost as much the one that ends first.
+    Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
+    first.
     """
-    until = chosen.pulses.end
+    until, misses = chosen.pulses.end, chosen.meets_requirement is False or chosen.kept is False
     better = [
-        _Better(saved if saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point)
+        _Better(
+            saved if misses or saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point, misses
+        )
         for index, front, point in numbered(found)
         if point.plan.meets_requirement and point.plan.kept is not False
         for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
-        if (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
+        if misses or (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]
     return max(better, key=lambda one: one[:2], default=None)
 
@@ -143,7 +152,7 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
         asides.append(f"takes {counts[0]} pulse{'s' * (counts[0] != 1)} instead of {counts[1]}")
     aside = f"; it {listed(asides)}" * bool(asides)
     return (
-        f"point {better.number} meets the requirement with nominal values too, {better.how} "
+        f"point {better.number} {'meets the requirement with nominal values too, ' * (not better.only)}{better.how} "
         f"({front_name(front, pointing=pointing)}){aside}: "
         f"nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}{within}."
     )

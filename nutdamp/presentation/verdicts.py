@@ -46,7 +46,8 @@ def needless(compared: Comparison) -> str | None:
         there.append(f"the {degrees(body.to_turn)} between H and the target")
     count = "" if len(there) > 1 else "s"
     if compliance.required(body):
-        verdict = f"already meet{count} the requirement ({required(body)})"
+        nominal = " with nominal values" * (body.dispersions is not None)
+        verdict = f"already meet{count} the requirement ({required(body)}){nominal}"
     else:
         verdict = f"already count{count} as damped"
     lasting = f", up to the horizon of {duration(body.horizon)} too" if body.growth > 0.0 else ""
@@ -68,10 +69,13 @@ def reason(compared: Comparison) -> str:
     cost = "propellant" if found.by_propellant else "impulse"
     if found.standing is Standing.COMPLIES:
         among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
-        return {
-            Ground.SHIFT: f"least {cost} {among}; of those that cost as much within 0.1 %, least shift of H",
-            Ground.END: f"least {cost} {among}; of those that cost as much within 0.1 %, it ends first",
-        }.get(found.ground or Ground.COST, f"least {cost} {among}")
+        least, equal = f"least {cost} {among}", "; of those that cost as much within 0.1 %"
+        then = {
+            Ground.SHIFT: f"{equal}, least shift of H",
+            Ground.END: f"{equal}, it ends first",
+            Ground.SHIFT_END: f"{equal} and shift H least, it ends first",
+        }
+        return f"{least}{then.get(found.ground or Ground.COST, '')}"
     meeting = found.standing is Standing.MEETS
     those = (
         f"plans that {_meeting(found.plan, 'meet')}{cones}"
@@ -82,10 +86,12 @@ def reason(compared: Comparison) -> str:
     least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
     if found.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if compliance.required(body) else f"{least} {among}"
+    least_cost = f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}"
     then = {
-        Ground.COST: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}",
-        Ground.SHIFT: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then least shift of H",
-        Ground.END: f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}, then it ends first",
+        Ground.COST: least_cost,
+        Ground.SHIFT: f"{least_cost}, then least shift of H",
+        Ground.END: f"{least_cost}, then it ends first",
+        Ground.SHIFT_END: f"{least_cost}, then least shift of H, then it ends first",
     }
     return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
 
