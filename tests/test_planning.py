@@ -17,6 +17,7 @@ from scipy.integrate import simpson
 from nutdamp import schemes
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.comparison import compare
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import by_impulses
 from nutdamp.limits import Limit, Windows, breaches, keeps_limits
 from nutdamp.outcome import seen_at
@@ -190,6 +191,38 @@ def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
 def test_an_earliest_time_beyond_the_horizon_is_named() -> None:
     made = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
     assert infeasibility(made) == "limits.earliest, or the pulses before, leave no time within limits.horizon"
+
+
+def test_too_few_pulses_for_the_least_impulse_are_named_with_how_many_it_takes() -> None:
+    body = spinner(channels=cross(2.0, max_on_time=0.5), limits=Limits(horizon=120.0, max_pulses=3))
+    enough = math.ceil(body.least_impulse / 1.0)
+    said = infeasibility(plan(body, "optimal"))
+    assert said.startswith("limits.max_pulses = 3 is too few: so many pulses give at most 3 N m s, and taking out ")
+    assert said.endswith(f"takes {body.least_impulse:.4g} N m s, {enough} pulses or more")
+    more = replace(body, limits=replace(body.limits, max_pulses=2 * enough))
+    assert plan(more, "optimal").feasible
+
+
+THREE_MOMENTS = """
+name: three moments
+inertia: {tensor: [[100, 3, 1], [3, 80, -2], [1, -2, 45]]}
+omega0: [0.1, -0.15, 2.5]
+thrusters:
+  - {name: A1, position: [0, 0.5, 0.8], direction: [1, 0, 0.1], force: 12 N, isp: 220 s, max_on_time: 1 s}
+  - {name: A2, position: [0.5, 0, 0.8], direction: [0, -1, 0.2], force: 12 N, isp: 220 s, max_on_time: 1 s}
+requirement: {nutation: 0.3 deg, momentum_shift: 2 deg}
+limits: {horizon: 120 s, tick: 1 ms, max_pulses: 6}
+"""
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("horizon", [120.0, 90.0, 150.0])
+def test_a_longer_horizon_has_a_schedule_too_and_no_dearer_one(horizon: float) -> None:
+    """Within 90 s the search itself found one of 16.9 g, within 120 s none; one of 15.5 g ends at 64 s."""
+    body = read_spacecraft(THREE_MOMENTS, "f.yaml", ())
+    made = plan(replace(body, limits=replace(body.limits, horizon=horizon)), "optimal")
+    assert made.meets_requirement
+    assert made.pulses.cost_in("kg") < 0.016
 
 
 def test_optimal_looks_within_the_time_that_there_is_where_it_begins_late() -> None:

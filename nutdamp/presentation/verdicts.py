@@ -214,6 +214,8 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
     if _optimal_untried(compared) and parts != {Part.SPIN}:
         more = "can fire several pulses of a channel in each half turn" if plan.hindrance.full else "may reach more"
         yield f"--scheme optimal was not compared; it {more}."
+    elif any(channel.damps for channel in body.channels) and compliance.required(body) and parts != {Part.SPIN}:
+        yield "nutdamp trade tries other ends, with H free too; one of its schedules may meet the requirement."
 
 
 def _optimal_untried(compared: Comparison) -> bool:

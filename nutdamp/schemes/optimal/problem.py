@@ -36,6 +36,10 @@ NAMED = 5e-3
 """The same where it is only advice."""
 
 
+DEARER = 0.03
+"""Share above the program's least cost from which shorter horizons are looked at too."""
+
+
 class Problem:
     """What stays the same while a schedule is looked for."""
 
@@ -129,6 +133,19 @@ class Problem:
         price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
         return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
 
+    def worth(self, made: Schedule) -> float:
+        """What is to be least: the cost, or the number of pulses."""
+        return float(len(made)) if self.options.least == "pulses" else self.price(made)
+
+    def dear(self, made: Schedule | None, least: float, share: float = DEARER) -> bool:
+        """Whether there is no schedule, or one so dear that it is worth looking for another."""
+        return made is None or self.price(made) > least * (1.0 + share)
+
+    def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
+        """The cheaper of two schedules, of which there may be none; the one with fewer pulses where that counts."""
+        there = [made for made in (one, other) if made is not None]
+        return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
+
     def left(self, flown: Flight) -> float:
         """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
         nutation, off, spin = self.leaves(flown)
@@ -146,6 +163,8 @@ class Problem:
 
     def not_found(self) -> str:
         """Why no schedule was found although the program has solutions: the limits that it does not know of."""
+        if too_few := self._too_few():
+            return too_few
         limits = self.spacecraft.limits
         shortest = max(channel.min_on_time for channel in self.channels)
         longest = min(channel.max_on_time for channel in self.channels)
@@ -159,7 +178,21 @@ class Problem:
         named = [name for name, limited in kept.items() if limited] or ["one pulse after the other"]
         return (
             "not found: for small angles, without other limits than the horizon, there are schedules; on the true "
-            f"motion none was found with {', '.join(named)}; another horizon may help"
+            f"motion none was found with {', '.join(named)}; shorter horizons were tried too, a longer one may help"
+        )
+
+    def _too_few(self) -> str:
+        """That max_pulses pulses cannot give the impulse that it takes; empty where that is not known."""
+        body, most = self.spacecraft, self.spacecraft.limits.max_pulses
+        if most is None or not body.inertia.symmetric or body.growth != 0.0 or body.disturbances:
+            return ""
+        largest = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
+        if most * largest >= body.least_impulse:
+            return ""
+        return (
+            f"limits.max_pulses = {most} is too few: so many pulses give at most {most * largest:.4g} N m s, and "
+            f"taking out the nutation takes {body.least_impulse:.4g} N m s, "
+            f"{math.ceil(body.least_impulse / largest)} pulses or more"
         )
 
     def cure(self, long_enough: Callable[[float], float | None]) -> str:

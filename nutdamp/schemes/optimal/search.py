@@ -24,8 +24,8 @@ from nutdamp.limits import keeps_limits, shortest_on_time
 from nutdamp.schedule import TOUCHING, Schedule
 from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
 from nutdamp.schemes.optimal.columns import Burn
-from nutdamp.schemes.optimal.hasten import hastened
 from nutdamp.schemes.optimal.linear_program import Program, Solution
+from nutdamp.schemes.optimal.other_ends import elsewhere, hastened
 from nutdamp.schemes.optimal.problem import LEFT, Problem
 from nutdamp.schemes.optimal.refine import refine
 from nutdamp.schemes.optimal.repair import GAIN, UNMET, Unrepairable, as_pulses, repaired, thinned
@@ -44,9 +44,6 @@ LOST = 0.5
 
 DEAR = 0.01
 """Share above the program's least cost from which all channels and moments are looked at again."""
-
-DEARER = 0.03
-"""Share above it from which shorter horizons are looked at too."""
 
 FEW, SAVED = 2, 0.001
 """Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
@@ -68,6 +65,9 @@ EQUAL = 1e-6
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
+
+MOST_LOOSE = 5000.0
+"""Units that may be spent where H may move, so that some are left for schedules that keep it."""
 
 HASTE = 0.0008
 """How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
@@ -190,13 +190,24 @@ class _Search(Problem):
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
         self.check_number(first)
-        best = self.cheapest(first)
+        with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
+            best = self.whole_or_shorter(first)
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
             kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
-            best = self.cheaper(best, kept.cheapest(kept.program().solve()))
+            still = kept.whole_or_shorter(kept.program().solve())
+            best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+
+    def astray(self, made: Schedule | None) -> bool:
+        """Whether there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
+        most = math.inf if self.options.shift is None else self.options.shift
+        return made is None or self.flown(made).residual.axis_error > most
+
+    def whole_or_shorter(self, first: Solution) -> Schedule | None:
+        """The cheapest found over the whole horizon; where there is none, or a dear one, over less of it too."""
+        return elsewhere(self, self.cheapest(first), first, self.within_shorter)
 
     def within_shorter(self, horizon: float) -> Schedule | None:
         """The cheapest schedule found within ``horizon`` s."""
@@ -316,19 +327,6 @@ class _Search(Problem):
         off = missed[2:4] if self.options.shift is not None else np.zeros(2)
         aside = self.equations.beside(off)
         return refine(self.spacecraft, made, self.equations, aside, self.program().width, self.flown)
-
-    def worth(self, made: Schedule) -> float:
-        """What is to be least: the cost, or the number of pulses."""
-        return float(len(made)) if self.options.least == "pulses" else self.price(made)
-
-    def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none; the one with fewer pulses where that counts."""
-        there = [made for made in (one, other) if made is not None]
-        return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
-
-    def dear(self, made: Schedule | None, least: float, share: float = DEARER) -> bool:
-        """Whether there is no schedule, or one so dear that it is worth looking for another."""
-        return made is None or self.price(made) > least * (1.0 + share)
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""

@@ -10,8 +10,8 @@ from builders import cross, spinner
 
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import two_pulse
-from nutdamp.schemes.optimal.problem import Problem
-from nutdamp.schemes.optimal.search import DEARER, HALVINGS, _Search
+from nutdamp.schemes.optimal.problem import DEARER, Problem
+from nutdamp.schemes.optimal.search import HALVINGS, _Search
 from nutdamp.schemes.options import OptimalOptions, TwoPulseOptions
 from nutdamp.schemes.tools.reasons import bounded_by, no_channels
 from nutdamp.spacecraft import Limits

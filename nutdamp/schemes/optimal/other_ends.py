@@ -1,4 +1,8 @@
-"""An earlier end at the same cost: costs that are equal for a recommendation are so for the scheme optimal."""
+"""Other ends than those the search over the whole horizon comes to.
+
+Earlier ones at the same cost, for costs that are equal for a recommendation are so for the scheme optimal; and those of
+shorter horizons, where the whole one leads to no schedule or to a dear one.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +36,31 @@ EARLIER = 300.0
 
 MOST = 900.0
 """Units that may be spent on all of them..."""
+
+
+ELSEWHERE = (0.85, 0.7, 0.55, 0.4)
+"""Shares of the horizon that are tried in turn where a schedule is dear or was not found."""
+
+MOST_ELSEWHERE = 1500.0
+"""Units that may be spent on them."""
+
+
+def elsewhere(
+    problem: Problem, best: Schedule | None, first: Solution, cheapest: Callable[[float], Schedule | None]
+) -> Schedule | None:
+    """``best``; where there is none, or a dear one, the cheapest that is found with shorter horizons.
+
+    ``first`` and ``cheapest`` as in `hastened`.
+    """
+    if first.unmet > UNMET:
+        return best
+    begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
+    with work.budget("other ends", MOST_ELSEWHERE):
+        for share in ELSEWHERE:
+            if work.exhausted() or not problem.dear(best, first.cost):
+                break
+            best = problem.cheaper(best, cheapest(begin + share * (horizon - begin)))
+    return best
 
 
 def hastened(
