@@ -116,12 +116,16 @@ class RobustComparison:
 
     @property
     def decision(self) -> Decision | None:
-        """The decision on the robust plan; the shares are those of the plans compared, not of their variants."""
+        """The decision on the robust plan, with the plans compared, not their variants, with which more cases comply.
+
+        More of the cases that all of them flew.
+        """
         if self.chosen is None:
             return None
         flown = {_kind(one.plan): one.met for one in self.candidates}
         shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
-        known = {scheme: share for scheme, share in shares.items() if share is not None}
+        own = self.chosen.met or 0.0
+        known = {scheme: share for scheme, share in shares.items() if share is not None and share > own}
         return Decision(self.chosen.plan, self.chosen.cases if self.fresh is None else self.fresh.cases, known)
 
     @property
