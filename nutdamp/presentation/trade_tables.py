@@ -190,7 +190,7 @@ def apart(found: Sequence[Front], chosen: Plan) -> str:
     )
 
 
-ALIKE = "the recommended plan costs less than the points that end no later, by less than the 0.1 % that count as equal."
+ALIKE = "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
 """Of a plan that costs as little less than the points as does not count."""
 
 

@@ -95,6 +95,7 @@ def test_after_the_last_pulse_no_more_than_the_requirement_counts(required: floa
     assert last <= required
     assert strict == ("the criterion of nutation is the requirement, which fewer cases meet" in found.text)
     assert strict == ("stay within each but the last of nutation" in found.text)
+    assert strict != ("yet meets the requirement, needs no new plan" in found.text)
     assert max(before) > 0.05, "on the way the limits are those of the cases"
     assert "do not judge what is required of the error of H" in found.text
 

@@ -56,7 +56,7 @@ def _phrases(value: str) -> list[str]:
     return re.split(r"(?<=[→,]) ", re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", value))
 
 
-WHOLE = re.compile(r"((?<!\S)--[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
+WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
 """What no line may break in: an option of a command, a relation with its number and unit."""
 
 

@@ -193,6 +193,11 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
             "After the last pulse the criterion of nutation is the requirement, which fewer cases meet: on the way a "
             "flight within the criteria may still come to miss it."
         )
+    elif required is not None:
+        yield Prose(
+            "A flight that is beyond the criterion after the last pulse, yet meets the requirement, needs no new plan, "
+            "but its cause should be found."
+        )
     others = [bound.part.label for bound in compliance.required(body) if bound.part is not Part.NUTATION]
     if others:
         yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")
