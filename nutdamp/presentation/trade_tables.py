@@ -190,7 +190,9 @@ def apart(found: Sequence[Front], chosen: Plan) -> str:
     )
 
 
-ALIKE = "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
+ALIKE = (
+    "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
+)
 """Of a plan that costs as little less than the points as does not count."""
 
 
