@@ -77,8 +77,7 @@ class RobustComparison:
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``,
     in closed form. ``tightening``: with which tolerances enough cases would comply with it, where too few do.
-    ``fresh``: how the robust plan fares in as many cases by which it was not chosen, which decide whether it meets the
-    requirement; None where nothing is required.
+    ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
     """
 
     comparison: Comparison
@@ -126,12 +125,22 @@ class RobustComparison:
         shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
         own = self.chosen.met or 0.0
         known = {scheme: share for scheme, share in shares.items() if share is not None and share > own}
-        return Decision(self.chosen.plan, self.chosen.cases if self.fresh is None else self.fresh.cases, known)
+        fresh = self.fresh if self.lucky else None
+        return Decision(self.chosen.plan, self.chosen.cases if fresh is None else fresh.cases, known)
+
+    @property
+    def lucky(self) -> bool:
+        """Whether enough cases comply, but too few of those by which the plan was not chosen: then they decide."""
+        if self.fresh is None or self.chosen is None:
+            return False
+        return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
 
     @property
     def met(self) -> float | None:
-        """The share of cases that comply with the robust plan: of those it was not chosen by, where they were flown."""
-        return self.fresh.met if self.fresh is not None else None if self.chosen is None else self.chosen.met
+        """The share of cases that comply with the robust plan, by the cases that decide."""
+        if self.chosen is None:
+            return None
+        return self.fresh.met if self.fresh is not None and self.lucky else self.chosen.met
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
@@ -229,8 +238,7 @@ def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> Robust
     refused: list[Candidate] = []
     while (chosen := ranks.chosen) is not None:
         ranks = replace(ranks, fresh=_fresh(chosen, samples, ranks.flown))
-        lucky = ranks.fresh is not None and ranks.fresh.met < required <= (chosen.met or 0.0)
-        if not lucky or chosen in refused or len(refused) == CHECKED:
+        if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
             break
         refused.append(chosen)
         ranks = ranked(comparison, candidates, samples, required, flown=ranks.flown, refused=refused)

@@ -222,15 +222,25 @@ def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_ne
     assert found.chosen is not None
     assert found.fresh is not None
     assert found.decision is not None
-    assert found.decision.cases == found.fresh.cases
+    assert found.decision.cases == found.chosen.cases, "as disperse has it"
     assert found.meets_requirement
-    assert found.met == found.fresh.met >= found.probability
+    assert found.fresh.met >= found.probability
     spent = found.chosen.plan.pulses.cost
     seemed = [one for one in found.candidates if (one.met or 0.0) >= 0.95 and one.plan.pulses.cost < 0.999 * spent]
     assert seemed
     for one in seemed:
         again = run(Results(study_of(body, one.plan.pulses, seed=robust.FRESH), found.samples))
         assert (again.met_fraction or 0.0) < found.probability
+    # Where there is no other plan, the new cases decide.
+    lucky = seemed[0]
+    alone = robust._checked(replace(found, chosen=lucky, candidates=(lucky,)), [lucky])
+    assert alone.chosen is lucky
+    assert alone.lucky
+    assert alone.decision is not None
+    assert alone.fresh is not None
+    assert alone.decision.cases == alone.fresh.cases
+    assert not alone.meets_requirement
+    assert alone.tightening is not None
 
 
 @pytest.mark.slow

@@ -97,15 +97,16 @@ def proved(found: Certificate | None) -> str:
 
 
 def _fresh(found: RobustComparison) -> str:
-    """Which cases decide, and how the plan fares in those it was chosen by; nothing where no new ones were flown."""
+    """How the plan fares in new cases, which decide where too few of them comply; nothing where none were flown."""
     if found.fresh is None or found.chosen is None:
         return ""
     cases, own = found.fresh.cases, found.chosen.met or 0.0
-    low, high = (verdicts.percent(one, found.probability) for one in found.fresh.interval)
-    return (
-        f"These are {cases.samples:,} new cases (seed {cases.seed}), not used for the choice; 95 % interval {low} to "
-        f"{high}. Of those that it was chosen by, {verdicts.percent(own, found.probability)} comply."
-    )
+    met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
+    new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
+    if not found.lucky:
+        return f"Of {new}, {met} comply; 95 % interval {low} to {high}."
+    chosen_by = verdicts.percent(own, found.probability)
+    return f"These are {new}; 95 % interval {low} to {high}. Of those that it was chosen by, {chosen_by} comply."
 
 
 def _why(plan: Plan) -> str:

@@ -99,7 +99,7 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     found = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     assert found["flown"]
     assert found["fresh"]["interval"][0] < found["fresh"]["met_fraction"] < found["fresh"]["interval"][1]
-    assert f"These are 20,000 new cases (seed {found['fresh']['seed']}), not used for the choice; " in words
+    assert f"Of 20,000 new cases (seed {found['fresh']['seed']}), not used for the choice, 99." in words
     shares = {(one["scheme"], one["variant"]): one["met_fraction"] for one in found["candidates"]}
     others = ("against", "earliest end", "by ")
     assert max(share for (_, made), share in shares.items() if not made.startswith(others)) == pytest.approx(
