@@ -115,16 +115,12 @@ class RobustComparison:
 
     @property
     def decision(self) -> Decision | None:
-        """The decision on the robust plan, with the plans compared, not their variants, with which more cases comply.
-
-        More of the cases that all of them flew.
-        """
+        """The decision on the robust plan; the shares are those of the plans compared, not of their variants."""
         if self.chosen is None:
             return None
         flown = {_kind(one.plan): one.met for one in self.candidates}
         shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
-        own = self.chosen.met or 0.0
-        known = {scheme: share for scheme, share in shares.items() if share is not None and share > own}
+        known = {scheme: share for scheme, share in shares.items() if share is not None}
         fresh = self.fresh if self.lucky else None
         return Decision(self.chosen.plan, self.chosen.cases if fresh is None else fresh.cases, known)
 
