@@ -306,7 +306,7 @@ def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_
     assert [row[0].text for row in rows] == [str(n) for n in range(1, 1 + sum(len(front.points) for front in fronts))]
     words = {text.text for text in section.all("text")}
     assert found.recommended is not None
-    (bound,) = (word for word in words if word.startswith("lower bound for the nutation that these leave: "))
+    (bound,) = (word for word in words if word.startswith("lower bound of cost, same nutation left: "))
     other = "" if found.recommended.scheme == "optimal" else " (not traded)"
     assert {f"recommended: {found.recommended.scheme}{other}", "H ends where it was", bound} <= words
     plain = report_page(found, Repeat("", "", ""), pictured=False, traded=fronts)

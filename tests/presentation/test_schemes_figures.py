@@ -135,9 +135,7 @@ def test_floor_and_requirement_are_lines() -> None:
     bounds = compared()["optimal"].pulses.bounds
     assert bounds is not None
     assert bounds.rigorous is not None
-    assert line(column(figure, "impulse"), "lower bound for what optimal leaves")[0, 0] == pytest.approx(
-        bounds.rigorous
-    )
+    assert line(column(figure, "impulse"), "lower bound of cost, for optimal")[0, 0] == pytest.approx(bounds.rigorous)
     assert line(column(figure, "nutation"), "required")[0, 0] == pytest.approx(0.5)
     assert line(column(figure, "shift of H"), "required")[0, 0] == pytest.approx(0.2)
     assert not [axes for axes in figure.axes if "complying" in axes.get_xlabel()]
@@ -147,7 +145,7 @@ def test_the_floor_is_that_of_what_optimal_leaves() -> None:
     """A scheme that leaves more may take less: the line does not say that nothing does. No scale begins below zero."""
     figure = figures.schemes_figure(compared())
     words = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert "lower bound for what optimal leaves" in words
+    assert "lower bound of cost, for optimal" in words
     assert "no schedule that leaves as little takes less" not in words
     assert all(axes.get_xlim()[0] >= 0.0 for axes in figure.axes)
 

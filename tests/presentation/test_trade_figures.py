@@ -48,7 +48,7 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     words = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"H ends where it was", "H may end anywhere"} <= words
     least = min(point.bounds.rigorous or 0.0 for front in traded() for point in front.points)
-    assert f"lower bound for the nutation that these leave: {cost(down(least), 'N m s')}" in words
+    assert f"lower bound of cost, same nutation left: {cost(down(least), 'N m s')}" in words
     first, second = ({(p.plan.end, p.cost) for p in front.points} for front in traded())
     assert first & second, "no point is on both fronts"
     assert "the same schedule, on this front too" in words

@@ -189,7 +189,7 @@ def _column(axes: Axes, column: Quantity, rows: Rows) -> None:
             _mark(axes, place, rows.short.get(plan.scheme, ""), chosen=plan is rows.chosen, less=value < low)
             labels.add(axes, column.text(value), place, INK, role="vital")
     if column.floor is not None:
-        name = f"lower bound for what {column.floor.scheme} leaves"
+        name = f"lower bound of cost, for {column.floor.scheme}"
         axes.axvline(column.floor.least, color=INK, linewidth=1.0, linestyle=":", label=name, zorder=1.5)
     if column.required is not None:
         axes.axvline(column.required, color=PULSE, linewidth=1.6, label="required", zorder=1.5)

@@ -70,7 +70,7 @@ def trade_figure(
     proved = [point.bounds.rigorous for point in points]
     if None not in proved:
         least = min(scale * value for value in proved if value is not None)
-        name = f"lower bound for the nutation that these leave: {written(down(least) / scale, points[0].unit)}"
+        name = f"lower bound of cost, same nutation left: {written(down(least) / scale, points[0].unit)}"
         axes.axhline(least, color=INK, linewidth=1.0, linestyle=":", label=name)
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)

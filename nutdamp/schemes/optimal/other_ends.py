@@ -35,8 +35,7 @@ EARLIER = 300.0
 """Units of `work` after which no other one is looked for."""
 
 MOST = 900.0
-"""Units that may be spent on all of them..."""
-
+"""Units that may be spent on all of them."""
 
 ELSEWHERE = (0.85, 0.7, 0.55, 0.4)
 """Shares of the horizon that are tried in turn where a schedule is dear or was not found."""
