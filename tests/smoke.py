@@ -82,7 +82,7 @@ disperse smoke.yaml --samples 3000 --resume study.npz
 disperse smoke.yaml --schedule pulses.csv --samples 2000 --flown
 disperse smoke.yaml --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
-loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png --map map.png
+loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png
 loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
 disperse smoke.yaml --loop --set disturbances=[] --until 30s --samples 40 --csv loops.csv --json l.json --plot l.png

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from nutdamp.cli.boundary import leave
 from nutdamp.cli.common import Input, quiet_option, require_dispersions, require_loop, spacecraft_argument
-from nutdamp.cli.job import Output, begin, expect_picture
+from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, Count, EndTime
 from nutdamp.cli.screen import say
 
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.loop.plan import LoopPlan
-    from nutdamp.spacecraft import Spacecraft
 
 
 @click.command("loop")
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 @click.option("--track", type=FILE, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=FILE, help="Write firings, dead band, margins.")
 @click.option("--plot", type=FILE, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
-@click.option("--map", "mapped", type=FILE, help="Map of damping over delay and C/A: .csv, or a picture.")
 @quiet_option
 def command(
     spacecraft: Input,
@@ -47,7 +44,6 @@ def command(
     track: str | None,
     json: str | None,
     plot: str | None,
-    mapped: str | None,
     quiet: bool,
 ) -> None:
     """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
@@ -55,10 +51,7 @@ def command(
     A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
     firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    drawn = mapped is not None and Path(mapped).suffix.lower() not in ("", ".csv")
-    if drawn:
-        expect_picture(mapped)
-    job = begin(spacecraft, quiet=quiet, csv=csv, track=track, json=json, plot=plot, map=mapped)
+    job = begin(spacecraft, quiet=quiet, csv=csv, track=track, json=json, plot=plot)
     body = job.spacecraft
     require_loop(body)
     if case is not None:
@@ -81,7 +74,6 @@ def command(
         (track, lambda: partial(write_track, run.flight.pieces(samples, run.until), run.flight.spacecraft.inertia)),
         (json, lambda: loop_json(plan)),
         (plot, partial(_picture, plan)),
-        (mapped, partial(_map, body, drawn)),
     ]
     job.deliver(outputs, lambda: loop_screen(plan))
     if run.stop.fault:
@@ -93,17 +85,3 @@ def _picture(plan: LoopPlan) -> Figure:
     from nutdamp.presentation.figures.loop import loop_figure
 
     return loop_figure(plan)
-
-
-def _map(body: Spacecraft, drawn: bool) -> str | Figure:
-    """Where delay and C/A let the loop damp: a table, or drawn."""
-    from nutdamp.files.loop_json import map_csv
-    from nutdamp.loop.stability import delay_map
-
-    assert body.loop is not None
-    found = delay_map(body, body.loop)
-    if not drawn:
-        return map_csv(found)
-    from nutdamp.presentation.figures.loop import map_figure
-
-    return map_figure(found, body)

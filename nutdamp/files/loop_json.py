@@ -1,11 +1,10 @@
-"""What ``loop --json`` gives, and the map of delays and C/A as CSV."""
+"""What ``loop --json`` and ``verify --loop --json`` give."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from nutdamp.files.output import csv_text, number
 from nutdamp.files.plan_json import (
     final_json,
     heading,
@@ -15,10 +14,8 @@ from nutdamp.files.plan_json import (
     target_json,
 )
 from nutdamp.loop.plan import LoopPlan
-from nutdamp.loop.stability import Map, Margin
+from nutdamp.loop.stability import Margin
 from nutdamp.loop.verify import LoopVerification
-
-MAP_HEADER = ("delay_s", "c_over_a", "factor", "damps")
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
@@ -88,13 +85,3 @@ def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
         }
         for one in found
     ]
-
-
-def map_csv(found: Map) -> str:
-    """One row for each delay and C/A; ``factor`` and ``damps`` are empty where no law is."""
-    rows = []
-    for ratio, factors in zip(found.ratios.tolist(), found.factor.tolist(), strict=True):
-        for delay, factor in zip(found.delays.tolist(), factors, strict=True):
-            damps = "" if math.isnan(factor) else str(factor < 1.0).lower()
-            rows.append((number(delay), number(ratio), "" if math.isnan(factor) else number(factor), damps))
-    return csv_text(MAP_HEADER, rows)

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.errors import Infeasible
 from nutdamp.limits import effective_on_time, shortest_on_time
 from nutdamp.loop.law import Actuator, Law
 from nutdamp.loop.sensor import Estimator, lag
 from nutdamp.loop_settings import Loop
-from nutdamp.spacecraft import Inertia, Spacecraft, Vector
+from nutdamp.spacecraft import Spacecraft
 
 HALVINGS = 60
 """Steps in which the largest lateness that still damps is found."""
@@ -46,7 +45,7 @@ class Margin:
 
     It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
     later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
-    not counted in these figures. ``pull``: share of the nutation that a firing takes at its moment.
+    not counted in these figures.
     """
 
     channel: str
@@ -57,7 +56,6 @@ class Margin:
     growth: float
     delay: float
     cause: Cause
-    pull: float = 0.0
 
     @property
     def damps(self) -> bool:
@@ -105,7 +103,7 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     most = _most_late(pull, growth)
     cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause, pull)
+    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause)
 
 
 def _most_late(pull: float, growth: float) -> float:
@@ -159,41 +157,3 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
 def _shortest(spacecraft: Spacecraft, actuator: Actuator) -> float:
     least = shortest_on_time(spacecraft, actuator.channel)
     return max(actuator.shortest, effective_on_time(actuator.channel, least))
-
-
-@dataclass(frozen=True, eq=False)
-class Map:
-    """What a firing leaves of the start threshold by the next, (ratios, delays): below 1 it damps, NaN where no law is.
-
-    ``delays`` s come on top of what the law reckons with; ``ratios`` are C/A, with A, spin and channels as they are.
-    """
-
-    delays: Vector
-    ratios: Vector
-    factor: Vector
-
-
-def delay_map(spacecraft: Spacecraft, loop: Loop, *, delays: Vector | None = None, ratios: Vector | None = None) -> Map:
-    """The worst channel's gain times growth over delays and C/A, default to a nutation period and 0.05 to 2."""
-    period = spacecraft.nutation_period
-    late = np.linspace(0.0, period, 121) if delays is None else delays
-    shapes = np.linspace(0.05, 2.0, 79) if ratios is None else ratios
-    rows = [_row(_shaped(spacecraft, ratio), loop, late) for ratio in shapes.tolist()]
-    return Map(late, shapes, np.array(rows))
-
-
-def _shaped(spacecraft: Spacecraft, ratio: float) -> Spacecraft:
-    """The spacecraft with another C."""
-    A = spacecraft.inertia.A
-    return replace(spacecraft, inertia=Inertia((A, A, ratio * A), spacecraft.inertia.axes))
-
-
-def _row(spacecraft: Spacecraft, loop: Loop, delays: Vector) -> Vector:
-    """Gain times growth of the worst channel at each delay (n,)."""
-    try:
-        found = margins(spacecraft, loop)
-    except Infeasible:
-        return np.full(len(delays), math.nan)
-    rate = abs(spacecraft.inertia.body_rate * spacecraft.spin)
-    left = [np.abs(1.0 - one.pull * np.exp(1j * (one.late + rate * delays))) * one.growth for one in found]
-    return np.asarray(np.max(left, axis=0))

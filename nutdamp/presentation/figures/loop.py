@@ -1,4 +1,4 @@
-"""The pictures of ``loop``: what the sensor shows, the nutation between its thresholds, the firings; the map."""
+"""The picture of ``loop``: what the sensor shows, the nutation between its thresholds, the firings."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 
 from nutdamp.loop.plan import LoopPlan
 from nutdamp.loop.sensor import Signal
-from nutdamp.loop.stability import Map
 from nutdamp.loop_settings import GYRO
 from nutdamp.presentation.figures import labels, style
 from nutdamp.presentation.figures.history import TIME, firings
-from nutdamp.presentation.figures.legends import heading, legend
+from nutdamp.presentation.figures.legends import legend
 from nutdamp.presentation.figures.motion import title
 from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.presentation.loop_tables import described
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.spacecraft import Vector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,25 +111,3 @@ def _nutation(axes: Axes, plan: LoopPlan) -> None:
     axes.yaxis.set_minor_formatter("")
     axes.set_ylabel("nutation, deg (log)")
     axes.grid()
-
-
-@style.styled
-def map_figure(found: Map, spacecraft: Spacecraft) -> Figure:
-    """Where the loop damps and where it feeds, over unforeseen delay and C/A."""
-    from matplotlib.colors import BoundaryNorm
-
-    figure = style.sheet(7.4, 4.8)
-    axes = figure.subplots()
-    levels = [0.0, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.5, 2.0]
-    norm = BoundaryNorm(levels, 256, extend="max")
-    mesh = axes.pcolormesh(found.delays, found.ratios, found.factor, cmap="RdBu_r", norm=norm, shading="nearest")
-    axes.contour(found.delays, found.ratios, found.factor, levels=[1.0], colors=INK, linewidths=1.2)
-    ratio = spacecraft.inertia.C / spacecraft.inertia.A
-    axes.axhline(ratio, color=INK, linewidth=0.9, linestyle="--", label="C/A of the file")
-    axes.set_xlabel("delay that the law does not compensate, s")
-    axes.set_ylabel("C/A")
-    said = "nutation after a firing and a period,\nover that before; below 1 it damps"
-    figure.colorbar(mesh, ax=axes, label=said)
-    heading(figure, spacecraft, "where the loop damps (blue) and where it feeds the nutation (red)")
-    legend(figure, [axes])
-    return figure
