@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import HealthCheck, settings
+from pages import unpictured
 from planned_once import Planner
 from process import Run, apart, within
 from samples import mark_few
@@ -72,16 +73,23 @@ def run_apart(tmp_path: Path) -> Run:
     return functools.partial(apart, tmp_path)
 
 
+@pytest.fixture
+def plain_pages() -> Iterator[None]:
+    """Pages of `report` have no pictures."""
+    with unpictured():
+        yield
+
+
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """A running browser."""
-    from nutdamp.presentation.page import pdf
+    from browser_finder import browser as found
 
     why = "NOT CHECKED in a browser: "
     playwright = pytest.importorskip(
         "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
     )
-    executable = pdf.browser()
+    executable = found()
     if executable is None:
         pytest.skip(f"{why}no Chromium, Chrome or Edge is installed")
     root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []

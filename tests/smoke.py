@@ -96,7 +96,8 @@ plan fitted.yaml --scheme optimal
 fit telemetry.csv smoke.yaml --schedule missing.csv; 1
 verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
 report smoke.yaml -o report.html
-report -o report.md --disperse 2000; 0 4
+report -o dispersed.html --disperse 2000; 0 4
+report -o report.pdf; 2
 animate smoke.yaml --seconds 0.5 --fps 8 --width 320 -o film.gif
 export smoke.yaml --format apm -o out.apm
 export smoke.yaml --format apm -o out.xml

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from markup import parsed
+from pages import plain_page
 from process import Run
 
 import nutdamp
@@ -25,7 +27,6 @@ from nutdamp.dispersion.study import run as fly
 from nutdamp.flight import by_impulses
 from nutdamp.outcome import seen_at
 from nutdamp.presentation import decisions, verdicts
-from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Goal, Inertia, Keep, Requirement, Spacecraft
@@ -232,7 +233,7 @@ def test_the_warning_names_the_plans_that_keep_the_cones() -> None:
     assert verdicts.warnings(compared, beside_verdict=True) == ("Plans that keep all cones: one-pulse.",)
     alone = compare(body, ["two-pulse"])
     assert verdicts.warnings(alone, beside_verdict=True) == ("Plans that keep all cones: none.",)
-    page = report_page(compared, Repeat("", "", ""), pictured=False)
+    page = plain_page(compared)
     assert page.verdict.count("the spin axis comes to") == 1
     assert page.verdict.endswith("Plans that keep all cones: one-pulse.")
     assert verdicts.warnings(compare(body, ["one-pulse"]))[0].startswith("one-pulse does not meet the requirement.")
@@ -251,6 +252,7 @@ keep: [{name: star, direction: [10 deg, 86 deg], min: 3.5 deg, max: 30 deg}]
 """
 
 
+@pytest.mark.usefixtures("plain_pages")
 def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: Path) -> None:
     done = run("plan", "-q", "-", "--scheme", "two-pulse", "--json", "plan.json", stdin=FILE, columns=200)
     assert done.returncode == 4
@@ -263,13 +265,13 @@ def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: 
     (verdict,) = (line for line in done.stdout.splitlines() if line.startswith("Requirement "))
     assert verdict == f"Requirement {found['decision']['verdict']}."
 
-    page = run("report", "-q", "-", "--scheme", "two-pulse", "-o", "page.md", stdin=FILE)
+    page = run("report", "-q", "-", "--scheme", "two-pulse", "-o", "page.html", stdin=FILE)
     assert page.returncode == 4
-    text = (tmp_path / "page.md").read_text("utf-8")
-    assert "requirement: **NOT met: the spin axis comes to" in text
-    assert "axis from star: **1.956" in text
-    assert "(at least 3.5 deg and at most 30 deg: NOT kept)" in text
-    assert "| Sun | 8" in text.replace("**", "")
+    text = parsed((tmp_path / "page.html").read_text("utf-8")).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "requirementNOT met: the spin axis comes to" in text
+    assert "axis from star1.956" in text
+    assert "at least 3.5 deg and at most 30 deg: NOT kept" in text
+    assert "Sun8" in text
 
 
 def test_simulate_says_whether_the_requirement_is_met(run: Run, tmp_path: Path) -> None:

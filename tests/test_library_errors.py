@@ -131,7 +131,7 @@ WRONG: dict[str, tuple[Callable[[Any, Any], object], str]] = {
         lambda _, plan: nutdamp.report(plan),
         "path: expected the name of a file or a dict of its keys, got a nutdamp.planning.Plan",
     ),
-    "another ending": (lambda craft, _: nutdamp.report(craft, "page.txt"), "page.txt: the ending says the format"),
+    "another ending": (lambda craft, _: nutdamp.report(craft, "page.txt"), "page.txt: a report is written as HTML"),
     "a number to change": (
         lambda *_: nutdamp.load("x", set={3: 4}),  # type: ignore[dict-item]
         "set: expected a mapping such as {'limits.horizon': '300 s'}, got a dict",

@@ -80,7 +80,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     type=FILE,
     default="report.html",
     show_default=True,
-    help="What to write: .html (one page, pictures inside), .md (for pull requests, no pictures), .pdf (by a browser).",
+    help="HTML file to write, one page with its pictures inside; a browser prints it as PDF.",
 )
 @click.option(
     "--disperse",
@@ -113,11 +113,11 @@ def command(
     """Write a report: decision, spacecraft, method, schemes, schedule, manoeuvre sheet, verification, how to repeat it.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output, as HTML. Needs the extra plot; a PDF needs Chromium, Chrome or Edge.
+    standard output. Needs the extra plot.
     """
-    from nutdamp.presentation.page.formats import form_of
+    from nutdamp.presentation.page.html import expect_html
 
-    form_of(output)
+    expect_html(output)
     expect_impulses(impulses, force, disperse is not None, "--disperse")
     job = begin(spacecraft, aim=aim, quiet=quiet, output=output)
 
@@ -138,7 +138,7 @@ def command(
         dispersed, note = _dispersed(compared, disperse, impulses=impulses, force=force, quiet=quiet)
     fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
-        made = made_of(compared, repeat, output, dispersed, note, kept, fronts)
+        made = made_of(compared, repeat, dispersed, note, kept, fronts)
     deliver([(output, lambda: made.content)])
     if not made.good:
         job.remark(made.verdict)

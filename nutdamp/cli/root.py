@@ -22,7 +22,7 @@ COMMANDS = {
     "fit": "Estimate motion, C/A and thrust from telemetry; re-plan.",
     "disperse": "Fly many dispersed cases; percentiles, tolerance budget.",
     "verify": "Fly a schedule by independent means; an error budget.",
-    "report": "One page to hand on: HTML, Markdown or PDF.",
+    "report": "One page to hand on, in HTML.",
     "animate": "Film the body cone rolling on the space cone.",
     "check": "Check spacecraft files: all faults, derived quantities.",
     "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",

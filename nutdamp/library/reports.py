@@ -23,7 +23,7 @@ from nutdamp.library.studies import trade
 from nutdamp.planning import Plan
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import UNCONTROLLED, Control, Page
-from nutdamp.presentation.page.formats import form_of
+from nutdamp.presentation.page.html import expect_html, page_html
 from nutdamp.schemes import Choice, Options
 from nutdamp.spacecraft import Spacecraft
 
@@ -35,7 +35,7 @@ class Report:
     comparison: Comparison
     dispersed: Results | None
     page: Page = field(repr=False)
-    content: str | bytes = field(repr=False)
+    content: str = field(repr=False)
 
     @property
     def verdict(self) -> str:
@@ -66,14 +66,14 @@ def report(
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
-    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: .html, .md or .pdf; ``disperse``: in how
+    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: an HTML file; ``disperse``: in how
     many dispersed cases to fly the plans; ``points``: how many horizons to try for each front of time against cost,
     none by default; ``control``: title, document, issue, author, date, as `controlled` takes
     them. Raises as `load`, `compare` and `disperse` do, BadRequest for another ending, MissingExtra without the extra
     plot, CannotWrite.
     """
     name, kept = arguments.path("output", output), controlled(**control)
-    form_of(name)
+    expect_html(name)
     body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
     compared = compare(body, names, options)
     cases: dict[str, Results] = {}
@@ -88,7 +88,7 @@ def report(
     given |= {key: repr(value) for key, value in control.items()}
     more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
     named = f", {list(names)!r}" if names else ""
-    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), name, cases, control=kept, traded=fronts)
+    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), cases, control=kept, traded=fronts)
     write_whole(name, made.content)
     return made
 
@@ -118,24 +118,21 @@ def controlled(**given: str) -> Control:
 def made_of(
     compared: Comparison,
     repeat: Repeat,
-    output: str,
     dispersed: Mapping[str, Results] | None = None,
     note: str = "",
     control: Control = UNCONTROLLED,
     traded: Sequence[Front] = (),
 ) -> Report:
-    """The report that goes to ``output``, not yet written; ``dispersed`` by scheme. Raises as `form_of` does."""
-    form, flown, chosen = form_of(output), dispersed or {}, compared.recommended
-    page = report_page(
-        compared, repeat, pictured=form.pictured, dispersed=flown, note=note, traded=traded, control=control
-    )
-    return Report(compared, None if chosen is None else flown.get(chosen.scheme), page, form.write(page, output))
+    """The report, not yet written; ``dispersed`` by scheme. Raises MissingExtra without the extra plot."""
+    flown, chosen = dispersed or {}, compared.recommended
+    page = report_page(compared, repeat, dispersed=flown, note=note, traded=traded, control=control)
+    return Report(compared, None if chosen is None else flown.get(chosen.scheme), page, page_html(page))
 
 
 def _repeat(body: Spacecraft, how: str) -> Repeat:
     """How to make the page again in Python; where fields were replaced, no file says of what."""
     source = body.source
     if not isinstance(source, Source):
-        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "", language="python")
+        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
     settings = tuple((dotted(one.path), str(one.value)) for one in source.settings)
-    return Repeat(f"nutdamp.report({source.name!r}, {how})", source.name, source.text, settings, "python")
+    return Repeat(f"nutdamp.report({source.name!r}, {how})", source.name, source.text, settings)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from dispersed import FILE
+from markup import parsed
 from process import Run
 
 from nutdamp import dispersion
@@ -274,8 +275,8 @@ def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path
     assert planned["met_fraction"] == robust["recommended"]["met_fraction"]
     dispersed_ = run("disperse", "--scheme", "two-pulse", "--json", "s.json")
     assert json.loads((tmp_path / "s.json").read_text())["requirement"]["met_fraction"] == planned["met_fraction"]
-    assert run("report", "--scheme", "two-pulse", "--disperse", "20000", "-o", "r.md").returncode == 4
-    report = (tmp_path / "r.md").read_text(encoding="utf-8")
+    assert run("report", "--scheme", "two-pulse", "--disperse", "20000", "-o", "r.html").returncode == 4
+    report = parsed((tmp_path / "r.html").read_text(encoding="utf-8")).text
     assert verdict(done.stdout) == verdict(dispersed_.stdout) == verdict(report)
     assert set(re.findall(sentence, report)) == {verdict(report)}
     assert verdict(report).startswith(f"NOT met: {100 * planned['met_fraction']:.1f} % of cases comply")

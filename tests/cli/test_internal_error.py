@@ -44,10 +44,11 @@ def test_the_traceback_is_shown_on_demand(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("plain_pages")
 def test_the_page_is_written(folder: Path) -> None:
-    done = CliRunner().invoke(group, ["report", "-o", "report.md"])
+    done = CliRunner().invoke(group, ["report"])
     assert done.exit_code == 1
-    assert "ZeroDivisionError" in (folder / "report.md").read_text(encoding="utf-8")
+    assert "ZeroDivisionError" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_scheme_that_fails_alone_recommends_nothing(folder: Path) -> None:

@@ -175,10 +175,6 @@ def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str
     assert "pip install 'nutdamp[plot]'" in done.stderr
     assert "Traceback" not in done.stderr
     assert left(tmp_path) == []
-    # A page without pictures needs no matplotlib.
-    done = without(package, tmp_path, "report", "--scheme", "two-pulse", "-o", "a.md")
-    assert done.returncode == (1 if package == "jinja2" else 0)
-    assert ("a page needs the extra 'plot': pip install 'nutdamp[plot]'" in done.stderr) == (package == "jinja2")
 
 
 def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:

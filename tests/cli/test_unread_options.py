@@ -41,7 +41,7 @@ def test_an_option_that_one_scheme_reads_is_no_matter(run: Run, command: str) ->
         ("disperse --literal", "--literal is for two-pulse, an option of `nutdamp plan`", True),
         ("animate -o x.gif --cones 3", "--cones is for half-cone, an option of `nutdamp plan`", True),
         ("export --format json --free-axis", "--free-axis is for optimal, an option of `nutdamp plan`", True),
-        ("report -o x.md --per-turn 2", "--per-turn is for rhumb-line, an option of `nutdamp plan`", False),
+        ("report --per-turn 2", "--per-turn is for rhumb-line, an option of `nutdamp plan`", False),
         ("trade --shift 1deg", "--shift is for optimal, an option of `nutdamp plan`", False),
     ],
 )
@@ -87,7 +87,7 @@ def test_a_direction_of_the_sun_that_nothing_reads_is_refused(run: Run, tmp_path
         ("simulate", "--scheme", "two-pulse", *aim),
         ("simulate", "--schedule", "pulses.csv"),
         ("trade", "--points", "1", *aim),
-        ("report", "-o", "x.md", "--scheme", "optimal", *aim),
+        ("report", "--scheme", "optimal", *aim),
     ):
         done = run(*command, "--sun", "70deg,0deg")
         assert (done.returncode, done.stdout) == (2, "")
@@ -106,7 +106,7 @@ def test_of_schemes_that_do_not_read_the_sun_it_is_reported(run: Run) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
-@pytest.mark.parametrize("command", ["plan", "simulate", "verify", "export --format json", "report -o x.md"])
+@pytest.mark.parametrize("command", ["plan", "simulate", "verify", "export --format json", "report"])
 def test_what_turns_to_a_target_is_refused_without_one(run: Run, command: str, scheme: str) -> None:
     done = run(*command.split(), "--scheme", scheme)
     assert (done.returncode, done.stdout) == (2, "")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import reference
 from markup import Node, parsed
+from pages import plain_page
 from process import Run
 from spinners import FILE
 
@@ -20,7 +21,7 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.flight import flown
 from nutdamp.physics import attitude
-from nutdamp.presentation.page.content import Repeat, _reading, report_page
+from nutdamp.presentation.page.content import _reading
 from nutdamp.presentation.page.html import page_html
 from nutdamp.spacecraft import Goal
 
@@ -41,7 +42,7 @@ def sheet(text: str, scheme: str, degrees: float, cases: int = 0) -> Node:
     body = body.replace(goal=Goal(body.direction_in_n(math.radians(degrees), math.radians(82.0))))
     compared = compare(body, [scheme])
     studied = {scheme: run(Results(study_of(body, compared[scheme].pulses), cases))} if cases else {}
-    made = report_page(compared, Repeat("", "", ""), pictured=False, dispersed=studied)
+    made = plain_page(compared, dispersed=studied)
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     (found,) = (one for one in tree.all("section") if one.attributes["id"] == "manoeuvre")
     return found
@@ -128,7 +129,7 @@ def test_ideal_impulses_are_loaded_by_size_and_direction(run: Run, tmp_path: Pat
     """They have no on-time to load; the page says beside the verdict that they are ideal."""
     assert run("init", "--from", "magnus-oblate", "oblate.yaml").returncode == 0
     compared = compare(read_spacecraft((tmp_path / "oblate.yaml").read_text(), "oblate.yaml", ()), ["two-pulse"])
-    tree = parsed(page_html(report_page(compared, Repeat("", "", ""), pictured=False)).removeprefix("<!DOCTYPE html>"))
+    tree = parsed(page_html(plain_page(compared)).removeprefix("<!DOCTYPE html>"))
     (found,) = (one for one in tree.all("section") if one.attributes["id"] == "manoeuvre")
     for pulse, row in zip(compared["two-pulse"].pulses, rows(found, "Pulses to fire"), strict=True):
         assert row["on-time s"] == "ideal"
@@ -140,12 +141,13 @@ def test_ideal_impulses_are_loaded_by_size_and_direction(run: Run, tmp_path: Pat
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("plain_pages")
 def test_the_command_writes_it(run: Run, tmp_path: Path) -> None:
-    done = run("report", "-", "--target", "20deg,82deg", "--scheme", "rhumb-line", "-o", "page.md", stdin=FILE)
+    done = run("report", "-", "--target", "20deg,82deg", "--scheme", "rhumb-line", "-o", "page.html", stdin=FILE)
     assert done.returncode in (0, 4), done.stderr
-    text = (tmp_path / "page.md").read_text("utf-8")
-    assert "## Manoeuvre sheet: rhumb-line" in text
-    assert "Sun phase, deg" in text
+    text = parsed((tmp_path / "page.html").read_text("utf-8")).text
+    assert "Manoeuvre sheet: rhumb-line" in text
+    assert "Sun phase deg" in text
 
 
 def test_the_signature_is_that_of_the_reference() -> None:

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from cases_dir import case
 from markup import parsed
+from pages import plain_page
 from process import Run
 
 from nutdamp.comparison import compare
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation.page import moving
-from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import Section
 from nutdamp.presentation.page.html import page_html
 from nutdamp.presentation.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
@@ -188,7 +188,7 @@ def parsed_view(text: str) -> str:
     compared = compare(read_spacecraft(text, "a.yaml"), CLASSIC)
     assert compared.recommended is not None
     section = Section("pictures", "Pictures", (moving_of(compared.recommended),))
-    made = replace(report_page(compared, Repeat("", "", ""), pictured=False), sections=(section,))
+    made = replace(plain_page(compared), sections=(section,))
     tree = parsed(page_html(made).removeprefix("<!DOCTYPE html>"))
     (found,) = (node for node in tree if "moving" in node.attributes.get("class", "").split())
     return found.text
@@ -290,5 +290,5 @@ def test_the_script_is_small() -> None:
 
 
 def test_a_page_without_pictures_has_neither_view_nor_its_script() -> None:
-    made = report_page(compare(read_spacecraft(SINGLE, "a.yaml"), CLASSIC), Repeat("", "", ""), pictured=False)
+    made = plain_page(compare(read_spacecraft(SINGLE, "a.yaml"), CLASSIC))
     assert "requestAnimationFrame" not in page_html(made)

@@ -44,7 +44,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
     def page(text: str) -> Path:
         if text not in known:
-            made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""), pictured=True)
+            made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""))
             known[text] = folder / f"{len(known)}.html"
             known[text].write_text(page_html(made), encoding="utf-8")
         return known[text]

@@ -58,7 +58,7 @@ if TYPE_CHECKING:  # few reports disperse
 
 
 class Repeat(NamedTuple):
-    """What it takes to make the page again: the command in its ``language``, and the input file by name and text.
+    """What it takes to make the page again: the command, and the input file by name and text.
 
     ``settings``: keys that the command sets in place of what the file says, and their values.
     """
@@ -67,20 +67,18 @@ class Repeat(NamedTuple):
     name: str
     text: str
     settings: tuple[tuple[str, str], ...] = ()
-    language: str = "console"
 
 
 def report_page(
     compared: Comparison,
     repeat: Repeat,
     *,
-    pictured: bool,
     dispersed: Mapping[str, Results] | None = None,
     note: str = "",
     traded: Sequence[Front] = (),
     control: Control = UNCONTROLLED,
 ) -> Page:
-    """The page; ``pictured``: with pictures of the recommended schedule, which raises MissingExtra without matplotlib.
+    """The page; raises MissingExtra without matplotlib.
 
     ``dispersed``: schemes whose schedules were flown in dispersed cases; ``note``: a remark on how; ``traded``: fronts
     of time against cost.
@@ -90,19 +88,18 @@ def report_page(
     sections = [
         Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         Section("method", "Method", tuple(method_blocks(compared))),
-        _schemes(compared, decided, pictured=pictured),
+        _schemes(compared, decided),
     ]
     if traded:
-        sections.append(_trade(compared, traded, pictured=pictured))
+        sections.append(_trade(compared, traded))
     if decided is not None:
         chosen = decided.plan
         sections.append(_schedule(chosen))
         sections.append(manoeuvre_section(chosen, flown.get(chosen.scheme)))
-        if pictured:
-            sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
+        sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
         sections.append(_verification(chosen))
         if chosen.scheme in flown:
-            sections.append(_dispersion(chosen, flown[chosen.scheme], note, pictured=pictured))
+            sections.append(_dispersion(chosen, flown[chosen.scheme], note))
     sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
     return Page(
         title=control.title or _title(body),
@@ -184,14 +181,14 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
     yield Figure("nutation at t = 0", degrees(body.tilt))
 
 
-def _schemes(compared: Comparison, decided: Decision | None, *, pictured: bool) -> Section:
+def _schemes(compared: Comparison, decided: Decision | None) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared, None if decided is None else decided.shares))
     blocks: list[Block] = [comparison_sheet(compared, decided), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
-    if pictured and decided is not None and len(compared) > 1:
+    if decided is not None and len(compared) > 1:
         blocks.append(schemes_picture_of(compared, decided))
     return Section("schemes", "Schemes compared", tuple(blocks))
 
@@ -216,13 +213,13 @@ COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
 """Pulses by the names of schemes."""
 
 
-def _trade(compared: Comparison, traded: Sequence[Front], *, pictured: bool) -> Section:
+def _trade(compared: Comparison, traded: Sequence[Front]) -> Section:
     """What an earlier end costs, as ``trade`` has it."""
     tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
     chosen = compared.recommended
     notes = [] if chosen is None else [said for say in (beats, apart) if (said := say(traded, chosen))]
     tables += [Remarks((("Note", said),)) for said in notes]
-    drawn = pictured and any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
+    drawn = any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
     pictures = (trade_picture_of(compared, traded),) if drawn else ()
     return Section("trade", "Time against cost", (*tables, *pictures))
 
@@ -260,26 +257,25 @@ def _verification(chosen: Plan) -> Section:
     return Section("budget", "Verification and error budget", tuple(blocks))
 
 
-def _dispersion(chosen: Plan, dispersed: Results, note: str, *, pictured: bool) -> Section:
+def _dispersion(chosen: Plan, dispersed: Results, note: str) -> Section:
     from nutdamp.presentation.dispersion_tables import dispersion_screen
 
     blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
     if note:
         blocks.append(Prose(f"Note: {note}."))
-    if pictured:
-        blocks += dispersion_pictures_of(dispersed, chosen.scheme)
+    blocks += dispersion_pictures_of(dispersed, chosen.scheme)
     return Section("dispersion", "Dispersion", tuple(blocks))
 
 
 def _repeat(repeat: Repeat, flown: Mapping[str, Results]) -> Section:
-    blocks: list[Block] = [Listing("Command", repeat.command, repeat.language), Facts("Versions", tuple(_versions()))]
+    blocks: list[Block] = [Listing("Command", repeat.command), Facts("Versions", tuple(_versions()))]
     facts = [("seed of the dispersed cases", str(results.study.seed)) for results in flown.values()][:1]
     if repeat.text:
         facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
     if facts:
         blocks.append(Facts("Input", tuple(facts)))
     if repeat.text:
-        blocks.append(Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n"), "yaml"))
+        blocks.append(Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n")))
     if repeat.settings:
         blocks.append(Facts("Set in place of what the file says", repeat.settings))
     return Section("repeat", "To repeat it", tuple(blocks))

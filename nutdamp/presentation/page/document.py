@@ -94,11 +94,10 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """Text as it is in a file or on a command line; ``language`` as Markdown names it."""
+    """Text as it is in a file or on a command line."""
 
     title: str
     text: str
-    language: str = ""
 
 
 Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing

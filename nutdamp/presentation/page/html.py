@@ -8,17 +8,40 @@ import pkgutil
 import re
 from functools import cache
 from html import escape
+from importlib.util import find_spec
 from itertools import cycle
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nutdamp.errors import BadRequest, MissingExtra
+from nutdamp.presentation.figures.style import require
 from nutdamp.presentation.page.document import Block, Page
 from nutdamp.presentation.page.moving import Moving
-from nutdamp.presentation.page.templates import templates
 from nutdamp.presentation.text import MISSING
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
+
+
+ENDINGS = (".html", ".htm")
+"""Of the files that a page is written to."""
+
+
+def expect_html(path: str) -> None:
+    """Say at once, not after the work, that a page cannot be made, or not in this form; ``-`` is standard output.
+
+    Raises BadRequest for an ending other than `ENDINGS`, MissingExtra without Jinja or matplotlib.
+    """
+    if path != "-" and Path(path).suffix.lower() not in ENDINGS:
+        raise BadRequest(f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF")
+    _require_jinja()
+    require()
+
+
+def _require_jinja() -> None:
+    if find_spec("jinja2") is None:
+        raise MissingExtra("plot", "a page")
 
 
 def page_html(page: Page) -> str:
@@ -39,8 +62,19 @@ def block_html(block: Block) -> str:
 
 @cache
 def _templates() -> Environment:
-    made = templates(escape)
+    _require_jinja()
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(
+        loader=PackageLoader("nutdamp.presentation", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
     made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
+    made.filters["kind"] = lambda block: type(block).__name__
     return made
 
 

@@ -1,0 +1,34 @@
+"""Pages of `report` for tests of their texts, without the pictures, which take most of the time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest.mock import patch
+
+from nutdamp.comparison import Comparison
+from nutdamp.presentation.page import content
+from nutdamp.presentation.page.content import Repeat, report_page
+from nutdamp.presentation.page.document import Page, Prose
+
+
+@contextmanager
+def unpictured() -> Iterator[None]:
+    """Pages are made without pictures."""
+    one, several = (lambda *_: Prose("")), (lambda *_: ())
+    with patch.multiple(
+        content,
+        moving_of=one,
+        pictures_of=several,
+        schemes_picture_of=one,
+        trade_picture_of=one,
+        dispersion_pictures_of=several,
+    ):
+        yield
+
+
+def plain_page(compared: Comparison, repeat: Repeat | None = None, **more: Any) -> Page:
+    """The page of a comparison without pictures."""
+    with unpictured():
+        return report_page(compared, repeat or Repeat("", "", ""), **more)
