@@ -17,7 +17,7 @@ from nutdamp.cli.places import expect_outputs
 @click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
 def command(form: str, file: str, output: str, schedule: str | None, quiet: bool) -> None:  # noqa: ARG001 - one form
-    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN or XML).
+    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, in KVN).
 
     The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
     manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for

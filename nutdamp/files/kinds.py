@@ -34,7 +34,7 @@ KINDS = (
         "name the spacecraft file that it was made from",
     ),
     Kind(
-        r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_APM_VERS|\s*<\?xml[\s\S]*<apm\b",
+        r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_APM_VERS",
         "a CCSDS attitude parameter message",
         "`nutdamp import apm FILE` makes a spacecraft file of it",
     ),

@@ -202,6 +202,15 @@ def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
     assert "2 manoeuvres; --schedule FILE writes them" in shown.stderr
 
 
+def test_a_message_in_xml_is_refused_with_the_cure(run: Run, dated: Path) -> None:
+    assert run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse", "-o", "there.xml").returncode == 0
+    done = run("import", "apm", "there.xml", "-o", "out.yaml")
+    assert done.returncode == 2
+    said = "XML is not read; write the message in keyword = value notation (KVN)"
+    assert done.stderr == f"there.xml:1:1: {said}\n"
+    assert not (dated.parent / "out.yaml").exists()
+
+
 def test_faults_of_a_message_are_reported_by_line(run: Run, dated: Path) -> None:
     text = run("export", "dated.yaml", "--format", "apm", "--scheme", "two-pulse").stdout
     bad = text.replace("QC ", "QD ").replace("IZZ               = 80.0", "IZZ               = 800.0")

@@ -236,7 +236,7 @@ def test_a_file_of_another_kind_is_called_what_it_is(run: Run, written: tuple[st
     ("text", "said"),
     [
         ("COMMENT a\nCCSDS_APM_VERS = 2.0\n", "`nutdamp import apm FILE`"),
-        ('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n', "`nutdamp import apm FILE`"),
+        ('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n', "another XML or HTML text"),
         ("CCSDS_OEM_VERS = 2.0\n", "another XML or HTML text"),
     ],
 )

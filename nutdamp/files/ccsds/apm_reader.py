@@ -1,4 +1,4 @@
-"""Reads attitude parameter messages, KVN and XML: state, inertia and manoeuvres, with every fault and its line.
+"""Reads attitude parameter messages in KVN: state, inertia and manoeuvres, with every fault and its line.
 
 Other readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here
 nothing is guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
@@ -17,7 +17,6 @@ from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.checked import Checked, unit_length
 from nutdamp.files.ccsds.kvn import from_kvn
 from nutdamp.files.ccsds.message import APM_BLOCKS, APM_METADATA, HEADER, MOMENTUM, VERSION, Block, Keyword
-from nutdamp.files.ccsds.xml import from_xml, is_xml
 from nutdamp.files.frames import FRAMES
 from nutdamp.files.input import read_limited, utf8_text
 from nutdamp.physics import attitude
@@ -35,6 +34,9 @@ SAME_AXES = {"ICRF": "GCRF"}
 _VERSION = "CCSDS_APM_VERS"
 _OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
 _BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
+_BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
+
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
@@ -76,7 +78,10 @@ MOST_BYTES = 16 << 20
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
     data = read_limited(path, MOST_BYTES)
-    blocks, faults = from_xml(data, path) if is_xml(data) else from_kvn(utf8_text(data, path), path)
+    if data.lstrip(_BEFORE).startswith(b"<"):
+        cure = "write the message in keyword = value notation (KVN)"
+        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
+    blocks, faults = from_kvn(utf8_text(data, path), path)
     _refuse_other_versions(path, blocks[0], faults)
     contents = _Reader(path, blocks, faults).read()
     if faults or contents is None:
