@@ -51,10 +51,10 @@ def _list() -> None:
     """Prints the examples."""
     from nutdamp.cli.screen import show
     from nutdamp.files.examples import example_names, example_subject
-    from nutdamp.presentation.explain_tables import pairs_screen
+    from nutdamp.presentation.explain_tables import examples_screen
 
     rows = tuple((name, example_subject(name)) for name in example_names())
-    show(pairs_screen("Spacecraft to start from: nutdamp init --from NAME [FILE]", rows))
+    show(examples_screen(rows))
 
 
 def _known(name: str) -> str:

@@ -28,9 +28,10 @@ def topics_screen() -> RenderableType:
     return Constrain(Group(*parts), WIDEST)
 
 
-def pairs_screen(title: str, rows: tuple[tuple[str, str], ...]) -> RenderableType:
-    """Names with what they are, under a title."""
-    return Constrain(Group(Text(title), Text(), _Pairs(rows)), WIDEST)
+def examples_screen(rows: tuple[tuple[str, str], ...]) -> RenderableType:
+    """The spacecraft to start from, each with what it is."""
+    title = Text("Spacecraft to start from: nutdamp init --from NAME [FILE]")
+    return Constrain(Group(title, Text(), _Pairs(rows)), WIDEST)
 
 
 def topic_screen(topic: Topic) -> RenderableType:
