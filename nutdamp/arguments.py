@@ -123,8 +123,11 @@ def replaced(value: Record, fields: Mapping[str, object]) -> Record:
 
 
 def _array(kind: Any) -> bool:
-    """Whether a type hint is that of an array."""
-    return getattr(get_origin(kind), "__name__", "") == "ndarray"
+    """True for the type hint of three numbers; what it is made of differs between versions of numpy."""
+    import numpy as np  # here, because the command line knows options without it
+    from numpy.typing import NDArray
+
+    return bool(kind == NDArray[np.float64])
 
 
 def _fits(value: object, kind: Any) -> bool:
@@ -133,7 +136,8 @@ def _fits(value: object, kind: Any) -> bool:
     if get_origin(kind) is UnionType:
         return any(_fits(value, part) for part in parts)
     if _array(kind):
-        return isinstance(value, Sequence | get_origin(kind)) and len(value) == 3 and all(map(is_number, value))
+        sized = isinstance(value, Sequence) or getattr(value, "ndim", 0) == 1
+        return sized and len(value) == 3 and all(map(is_number, value))
     if get_origin(kind) is tuple:
         return isinstance(value, tuple) and all(_fits(one, parts[0]) for one in value)
     return is_number(value) if kind is float else isinstance(value, kind)
