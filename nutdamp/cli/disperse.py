@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,9 +34,6 @@ SAMPLES = 20_000
 FIGURES = ("overview", "cases", "momentum", "budget")
 """What --plot draws."""
 
-SAVED_EVERY = 30.0
-"""Seconds after which a run with --resume saves what is done."""
-
 
 @click.command("disperse", cls=PlanningCommand)
 @spacecraft_argument
@@ -60,7 +55,6 @@ SAVED_EVERY = 30.0
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
-@click.option("--resume", type=FILE, help="Save finished cases in this file, and resume from it if it exists.")
 @quiet_option
 def command(
     spacecraft: Input,
@@ -81,7 +75,6 @@ def command(
     json: str | None,
     plot: str | None,
     figure: str,
-    resume: str | None,
     quiet: bool,
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
@@ -93,15 +86,13 @@ def command(
     if real and impulses:
         raise click.UsageError("--flown and --impulses exclude each other")
     expect_impulses(impulses, force, True, "disperse")
-    files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
-    _expect_study(case, files)
+    if case is not None and (csv or plot):
+        raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
     if until is not None and not looped:
         raise click.UsageError("--until is for --loop")
     if looped:
-        _expect_loop(
-            flown, {"impulses": impulses, "resume": resume, "threads": threads, "figure": figure != FIGURES[0]}
-        )
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, **files)
+        _expect_loop(flown, {"impulses": impulses, "threads": threads, "figure": figure != FIGURES[0]})
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     if looped:
         from nutdamp.cli.disperse_loop import Requested, disperse_loop
 
@@ -118,7 +109,7 @@ def command(
     if case is not None:
         _one_case(job, study, case - 1, plan.scheme, json)
         return
-    results, unsaved, stopped_by = fly(study, samples, threads, csv, resume, quiet)
+    results, unsaved, stopped_by = fly(study, samples, threads, csv, quiet)
     data = partial(dispersion_json, results, scheme=plan.scheme, worst=worst)
     outputs: list[Output] = [(json, data), (plot, partial(_picture, results, figure, plan.scheme))]
     job.deliver(outputs, partial(_screen, results, plan.scheme, worst), unsaved=unsaved)
@@ -126,14 +117,6 @@ def command(
         say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
     leave(missed=results.meets_requirement is False)
-
-
-def _expect_study(case: int | None, files: Mapping[str, str | None]) -> None:
-    """A usage error for files of a study where a single ``case`` is shown, or which cannot be read again."""
-    if case is not None and (files["csv"] or files["plot"] or files["resume"]):
-        raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
-    if files["resume"] == "-":
-        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
 
 
 def _picture(results: Results, figure: str, scheme: str) -> Figure:
@@ -172,25 +155,15 @@ class Run(NamedTuple):
     stopped_by: int | None
 
 
-def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Run:
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet: bool) -> Run:
     """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.dispersion.study import Results, run, threads_here
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.study_file import load_results, save_results
 
-    results = Results(study, samples) if resume is None else load_results(resume, study, samples)
+    results = Results(study, samples)
     unsaved: list[CannotWrite] = []
-    with stoppable() as stopped, progress("flying", samples, quiet=quiet, done=results.done) as show_done:
-        saved = time.monotonic()
-
-        def watch(done: int) -> None:
-            nonlocal saved
-            show_done(done)
-            if resume is not None and time.monotonic() - saved > SAVED_EVERY:
-                with suppress(CannotWrite):  # the last time tells
-                    save_results(resume, results)
-                saved = time.monotonic()
+    with stoppable() as stopped, progress("flying", samples, quiet=quiet) as watch:
 
         def fly_all(collect: Collect | None) -> None:
             run(results, threads=threads or threads_here(), watch=watch, stopped=stopped, collect=collect)
@@ -203,11 +176,6 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume
             if results.done < samples and not stopped():
                 raise  # it never began
             unsaved.append(wrong)
-        if resume is not None:
-            try:
-                save_results(resume, results)
-            except CannotWrite as wrong:
-                unsaved.append(wrong)
     return Run(results, tuple(unsaved), stopped.number)
 
 

@@ -164,7 +164,7 @@ def _dispersed(
         try:
             study, note = study_of_cases(plan, SEED, impulses=impulses, force=force)
             notes.append(note)
-            results, _, stopped_by = fly(study, samples, None, None, None, quiet)
+            results, _, stopped_by = fly(study, samples, None, None, quiet)
         except (BadRequest, Infeasible):
             if not found:
                 raise

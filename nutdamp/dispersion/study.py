@@ -1,8 +1,7 @@
-"""Running a study: blocks of cases over threads, in rounds, so that it can be watched, stopped and taken up again."""
+"""Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 from collections.abc import Callable
@@ -27,7 +26,6 @@ from nutdamp.dispersion.rounds import Round
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.dispersion.watched import cones_used
-from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
 
 Array = NDArray[np.float64]
@@ -135,25 +133,6 @@ class Study:
         found = self.ends_of(draws).aspects
         return None if found is None else found[:, :, 0]
 
-    @property
-    def fingerprint(self) -> str:
-        """Tells whether kept results belong to this study: everything that the numbers depend on, but their count."""
-        body, schedule = self.model.spacecraft, self.model.schedule
-        parts: list[Any] = [self.seed, self.flown, body.inertia.moments, body.inertia.axes, body.omega0]
-        parts += [body.dispersions, body.requirement, body.goal.spin, body.disturbances, body.dissipation]
-        parts += [body.channels, body.steerable, self.model.target]
-        parts.append([(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule])
-        if body.keep:
-            parts += [(one.direction, one.least, one.most) for one in body.keep]
-        if body.cold is not None or body.tank is not None:
-            parts += [body.cold, body.tank]
-        if schedule.blocks:  # each case fires them from its own Sun pulses
-            parts += [schedule.blocks, body.sun, body.sun_sensor]
-        if schedule.through_valves:
-            parts.append([pulse.command for pulse in schedule])
-        with np.printoptions(precision=17, floatmode="unique"):
-            return hashlib.sha256(repr(parts).encode()).hexdigest()
-
 
 class Counted:
     """The ``done`` cases of a ``study``, of which ``met`` comply."""
@@ -205,19 +184,18 @@ class Results(Counted):
     met: int = 0
     emptied: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
-    values: Array | None = None
-    sketches: list[Sketch] | None = None
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
+    values: Array | None = field(init=False)
+    sketches: list[Sketch] | None = field(init=False)
     broken: NDArray[np.int64] = field(init=False)
     aspects: Array = field(init=False)
 
     def __post_init__(self) -> None:
         cones = len(self.study.model.spacecraft.keep)
         self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
-        if self.values is None and self.sketches is None:
-            exact = self.requested <= EXACT_CASES
-            self.values = np.empty((self.rows, self.requested)) if exact else None
-            self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+        exact = self.requested <= EXACT_CASES
+        self.values = np.empty((self.rows, self.requested)) if exact else None
+        self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
 
     @property
     def rows(self) -> int:
@@ -273,17 +251,13 @@ class Results(Counted):
         self.done = first + values.shape[1]
 
     def extended(self, requested: int) -> Results:
-        """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
-        if requested < self.done:
-            raise BadRequest(f"{self.done} cases are done already: expected at least as many, or no --resume")
+        """The same, with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
         done = self.done, self.redrawn, self.met, self.emptied, self.worst
-        more = Results(self.study, requested, *done, sketches=self.sketches, early=self.early)
+        more = Results(self.study, requested, *done, self.early)
         more.broken, more.aspects = self.broken, self.aspects
-        if self.values is not None and more.values is not None:
-            more.values[:, : self.done] = self.values[:, : self.done]
-        elif self.values is not None and more.sketches is not None:
-            for sketch, row in zip(more.sketches, self.values, strict=False):
-                sketch.add(row[: self.done])
+        assert self.values is not None
+        assert more.values is not None
+        more.values[:, : self.done] = self.values[:, : self.done]
         return more
 
 
@@ -299,12 +273,8 @@ def run(
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.
+    the first ones, are kept. ``collect`` is given their outputs in order.
     """
-    if collect is not None and results.done:
-        if results.values is None:
-            raise BadRequest(f"single cases of an earlier run are stored only for runs of up to {EXACT_CASES}")
-        collect(0, results.values[:, : results.done])
     while results.done < results.requested and not stopped():
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)

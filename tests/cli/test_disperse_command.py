@@ -179,7 +179,7 @@ def test_pictures(run: Run, body: Path, tmp_path: Path, ending: str) -> None:
         (("--seed", "-1"), "--seed"),
         (("--scheme", "two-pulse", "--schedule", "x.csv"), "one of --scheme, --schedule and --blocks"),
         (("--case", "3", "--csv", "x.csv"), "--case shows a single case"),
-        (("--resume", "-"), "standard output cannot be read again"),
+        (("--resume", "x.npz"), "No such option"),
         (("--flown", "--impulses"), "--flown and --impulses exclude each other"),
         (("--force",), "--force is for --impulses"),
         (("--csv", "-", "--json", "-"), "both go to standard output"),
