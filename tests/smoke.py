@@ -78,7 +78,7 @@ simulate smoke.yaml --schedule pulses.csv --flown --plot motion.svg --figure mot
 simulate smoke.yaml --scheme none --until 60s --plot history.pdf --figure history
 trade --points 2 --csv trade.csv --json trade.json --plot trade.png --schedules folder
 disperse smoke.yaml --samples 2000 --csv cases.csv --json disperse.json --plot disperse.png
-disperse smoke.yaml --schedule pulses.csv --samples 2000 --flown
+disperse smoke.yaml --schedule pulses.csv --samples 2000
 disperse smoke.yaml --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
 loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png --map map.png
@@ -114,7 +114,6 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
     ".gif": b"GIF8",
     ".svg": b"<?xml",
-    ".npz": b"PK",
     ".html": b"<!doctype",
 }
 """How a file of a kind begins."""

@@ -12,7 +12,6 @@ import click
 from nutdamp.cli.boundary import interruption, leave
 from nutdamp.cli.common import Input, plot_options, quiet_option, require_dispersions, spacecraft_argument
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.job import Job, Output, begin
 from nutdamp.cli.parameters import FILE, Count, EndTime
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from nutdamp.dispersion.statistics import Array
     from nutdamp.dispersion.study import Collect, Results, Study
     from nutdamp.errors import CannotWrite
-    from nutdamp.planning import Plan
 
 SAMPLES = 20_000
 """Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
@@ -44,8 +42,6 @@ FIGURES = ("overview", "cases", "momentum", "budget")
     "--seed", type=click.IntRange(0, 2**64 - 1), default=1, show_default=True, help="Same seed, same draws, always."
 )
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
-@impulse_options
-@click.option("--flown", "real", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
 @click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
 @click.option("--until", type=EndTime(), help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
@@ -64,9 +60,6 @@ def command(
     samples: int,
     seed: int,
     threads: int | None,
-    real: bool,
-    impulses: bool,
-    force: bool,
     looped: bool,
     until: float | None,
     case: int | None,
@@ -83,15 +76,12 @@ def command(
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     # Long by its options, each a parameter, and by the two ways to fly, cases of a schedule and of a loop.
-    if real and impulses:
-        raise click.UsageError("--flown and --impulses exclude each other")
-    expect_impulses(impulses, force, True, "disperse")
     if case is not None and (csv or plot):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
     if until is not None and not looped:
         raise click.UsageError("--until is for --loop")
     if looped:
-        _expect_loop(flown, {"impulses": impulses, "threads": threads, "figure": figure != FIGURES[0]})
+        _expect_loop(flown, {"threads": threads, "figure": figure != FIGURES[0]})
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     if looped:
         from nutdamp.cli.disperse_loop import Requested, disperse_loop
@@ -101,10 +91,11 @@ def command(
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)
 
+    from nutdamp.dispersion import study_of
     from nutdamp.files.dispersion_json import dispersion_json
 
-    study, note = study_of_cases(plan, seed, impulses=impulses, force=force)
-    if note:
+    study = study_of(plan.spacecraft, plan.pulses, seed=seed)
+    if note := study.lightening_error:
         job.remark(note)
     if case is not None:
         _one_case(job, study, case - 1, plan.scheme, json)
@@ -129,15 +120,6 @@ def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
     from nutdamp.presentation.dispersion_tables import dispersion_screen
 
     return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
-
-
-def study_of_cases(plan: Plan, seed: int, *, impulses: bool, force: bool) -> tuple[Study, str]:
-    """The study of a plan, and how far ``impulses``, or falling moments, err in it; raises as `check_impulses` does."""
-    from nutdamp.dispersion import study_of
-    from nutdamp.dispersion.agreement import check_impulses, lightening_error
-
-    study = study_of(plan.spacecraft, plan.pulses, seed=seed, flown=not impulses)
-    return study, check_impulses(study, force=force) if impulses else lightening_error(study)
 
 
 def _expect_loop(flown: Flown, others: Mapping[str, object]) -> None:
@@ -208,18 +190,13 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
 
 
 def _one_case(job: Job, study: Study, case: int, scheme: str, json: str | None) -> None:
-    """Show a single case, by the impulse sum and flown."""
-    from nutdamp.dispersion.single import flown_outputs
+    """Show a single case."""
     from nutdamp.files.dispersion_json import case_json
     from nutdamp.presentation.dispersion_tables import case_screen
 
     draws = study.draws_of(case)
 
     def data() -> dict[str, Any]:
-        return {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
+        return {"scheme": scheme, "seed": study.seed, **case_json(study, case, draws)}
 
-    def screen() -> RenderableType:
-        flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
-        return case_screen(study, case, draws, flown, scheme=scheme)
-
-    job.deliver([(json, data)], screen)
+    job.deliver([(json, data)], partial(case_screen, study, case, draws, scheme=scheme))

@@ -14,25 +14,23 @@ from numpy.typing import NDArray
 
 from nutdamp import compliance, flight
 from nutdamp.aspect import aspects
-from nutdamp.compliance import Left
+from nutdamp.compliance import Left, Part
 from nutdamp.demands import required_share
 from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
-from nutdamp.dispersion.kernel import ClosedForm, Ends
+from nutdamp.dispersion.flown import RealWidths
+from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure
 from nutdamp.dispersion.rounds import Round
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.dispersion.watched import cones_used
 from nutdamp.flight import Flight
+from nutdamp.lightening import shed
 
 Array = NDArray[np.float64]
-Fly = Callable[[DispersedCases], Ends]
-
-CHUNK = 8_192
-"""Cases that the kernel works on at once, so that they stay in the cache."""
 
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
@@ -46,6 +44,9 @@ KEPT_WORST = 1_000
 CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
 
+WORTH_SAYING = math.radians(1e-4)
+"""rad by which cases of falling moments must err for that to be said."""
+
 Collect = Callable[[int, Array], None]
 """Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
 
@@ -57,30 +58,18 @@ def threads_here() -> int:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is studied: cases of ``model`` drawn from ``seed``, flown by ``fly`` (closed form by default).
+    """What is studied: cases of ``model`` drawn from ``seed``.
 
     Cases count from 0 here; people see them count from 1.
     """
 
     model: Model
     seed: int = 1
-    fly: Fly | None = None
-    flown: bool = False
-
-    @property
-    def flies(self) -> Fly:
-        """What flies the cases."""
-        return self.fly or self._closed_form
 
     @cached_property
-    def _closed_form(self) -> Fly:
-        form = ClosedForm(self.model)
-        if not self.model.schedule.blocks:
-            return form
-        from nutdamp.dispersion.flown import RealWidths  # closed forms need no integrator
-
-        real = RealWidths(self.model)
-        return lambda cases: form(real.timed(cases))
+    def flies(self) -> RealWidths:
+        """What flies the cases."""
+        return RealWidths(self.model)
 
     @cached_property
     def first_order(self) -> FirstOrder:
@@ -109,8 +98,7 @@ class Study:
     @property
     def nominal(self) -> Flight:
         """The estimate itself, flown alone as the cases are."""
-        fly = flight.flown if self.flown else flight.by_impulses
-        return fly(self.model.spacecraft, self.model.schedule)
+        return flight.flown(self.model.spacecraft, self.model.schedule)
 
     @property
     def nominal_aspects(self) -> Array:
@@ -132,6 +120,25 @@ class Study:
         """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
         found = self.ends_of(draws).aspects
         return None if found is None else found[:, :, 0]
+
+    @property
+    def lightening_error(self) -> str:
+        """By how much cases of falling moments err, as the nominal one shows; empty where that is nothing to speak of.
+
+        They fall half as each pulse begins and half as it ends, which errs in second order; `flight.flown` lets them
+        fall as the thrust goes.
+        """
+        body = self.model.spacecraft
+        if shed(body) is None:
+            return ""
+        found, exact = self.outputs_of({}), self.nominal.residual
+        part = compliance.aim(body)
+        aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
+        errors = {Part.NUTATION: found[0] - exact.nutation, part: found[OUTPUTS.index(part.value)] - aim}
+        if max(map(abs, errors.values())) < WORTH_SAYING:
+            return ""
+        said = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {one.label}" for one, error in errors.items())
+        return f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {said}"
 
 
 class Counted:
@@ -265,7 +272,6 @@ def run(
     results: Results,
     *,
     threads: int = 1,
-    chunk: int = CHUNK,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
     collect: Collect | None = None,
@@ -279,7 +285,7 @@ def run(
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)
         out = np.empty((results.rows, last - first)) if results.values is None else results.values[:, first:last]
-        flights = Round(results, first, last, out, chunk)
+        flights = Round(results, first, last, out)
         done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:
             break

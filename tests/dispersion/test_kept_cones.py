@@ -12,6 +12,7 @@ import dispersed
 import numpy as np
 import pytest
 from process import Run
+from single_case import realised
 from test_aspect import axis_path
 from test_sun_fired import model_of
 
@@ -20,9 +21,7 @@ from nutdamp.aspect import aspects
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.kernel import ClosedForm
-from nutdamp.dispersion.single import realised
-from nutdamp.dispersion.study import Fly, Results, Study
+from nutdamp.dispersion.study import Results, Study
 from nutdamp.dispersion.study import run as fly_all
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
@@ -41,75 +40,46 @@ def with_directions(model: Model, **fields: object) -> Model:
 
 JETS = dispersed.with_jets()
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
-PLAIN = {
+MODELS = {
     "prolate": with_directions(JETS),
     "oblate, spin reversed": with_directions(dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0)),
     "dissipation": with_directions(dispersed.sinking(JETS)),
-}
-REAL = {
-    **PLAIN,
     "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
     "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
     "blocks": with_directions(model_of()),
 }
 
 
-def end_of(made: Flight, last: float) -> float:
-    """When the axis has gone round H once more after the ``last`` pulse."""
+def end_of(made: Flight) -> float:
+    """When the axis has gone round H once more after the last pulse."""
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
-    return last + math.pi * (made.moments[0] + made.moments[1]) / size
+    return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
 
 
-def check(model: Model, fly: Fly, *, by_sum: bool = False) -> None:
+@pytest.mark.few(3)
+@pytest.mark.parametrize("name", MODELS)
+def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
+    model = MODELS[name]
     draws = dispersed.first_cases(Study(model), CASES)
-    found = fly(model.cases(draws)).aspects
+    found = RealWidths(model)(model.cases(draws)).aspects
     assert found is not None
     for case in range(0, CASES, 3):
         true, made = realised(model, dispersed.one_of(draws, case))
-        alone = (flight.by_impulses if by_sum else flight.flown)(true, made)
-        last = made.pulses[-1].t if by_sum else made.end
-        for one, (least, largest) in zip(aspects(alone, end_of(alone, last)), found[:, :, case], strict=False):
+        alone = flight.flown(true, made)
+        for one, (least, largest) in zip(aspects(alone, end_of(alone)), found[:, :, case], strict=False):
             assert (least, largest) == pytest.approx((one.least, one.largest), abs=2e-5)
             if one.keep.name != "3":  # near no direction but that of the axis itself
                 assert (least, largest) == pytest.approx((one.least, one.largest), abs=1e-6)
 
 
-@pytest.mark.few(3)
-@pytest.mark.parametrize("name", REAL)
-def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
-    check(REAL[name], RealWidths(REAL[name]))
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_by_the_impulse_sum_they_are_those_of_that_flight(name: str) -> None:
-    check(PLAIN[name], ClosedForm(PLAIN[name]), by_sum=True)
-
-
-def test_pulses_in_another_order_in_some_cases() -> None:
-    """Two of the pulses come 20 ms one after the other, with timing errors of 5 ms each, and 0.1 s in one case."""
-    model = PLAIN["oblate, spin reversed"]
-    draws = dispersed.first_cases(Study(model), CASES)
-    draws["timing pulse 2"][3] += 0.1
-    _, second, third = (
-        start + 0.5 * lasts for start, lasts in zip(model.cases(draws).starts, model.on_times, strict=True)
-    )
-    assert 0 < np.count_nonzero(second > third) < CASES
-    assert (second > third)[3]
-    found = ClosedForm(model)(model.cases(draws)).aspects
-    alone = ClosedForm(model)(model.cases({name: draw[3:4] for name, draw in draws.items()})).aspects
-    assert found is not None
-    assert alone is not None
-    assert found[:, :, 3] == pytest.approx(alone[:, :, 0], abs=1e-12)
-
-
 def test_the_reference_integrator_sees_the_same_angles() -> None:
-    model = REAL["three moments"]
+    model = MODELS["three moments"]
     draws = dispersed.first_cases(Study(model), CASES)
     found = RealWidths(model)(model.cases(draws)).aspects
     assert found is not None
     for case in (0, 5):
         true, made = realised(model, dispersed.one_of(draws, case))
-        path = axis_path(true, made, end_of(flight.flown(true, made), made.end), 400)
+        path = axis_path(true, made, end_of(flight.flown(true, made)), 400)
         for keep, (least, largest) in zip(model.spacecraft.keep[:3], found[:, :, case], strict=False):
             angles = attitude.angle_between(path, keep.direction)
             assert (least, largest) == pytest.approx((angles.min(), angles.max()), abs=1e-5)

@@ -329,7 +329,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))
     assert found.recommended is not None
     assert found.recommended.meets_requirement
-    results = Results(study_of(found.spacecraft, found.recommended.pulses, flown=True), 1000)
+    results = Results(study_of(found.spacecraft, found.recommended.pulses), 1000)
     run(results, threads=1)
     made = report_page(found, Repeat("", "", ""), pictured=good, dispersed={"two-pulse": results})
     assert made.good == good
