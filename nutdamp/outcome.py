@@ -23,15 +23,11 @@ ANGLE = math.radians(0.01)
 
 
 class Deviation(NamedTuple):
-    """By how much the impulse sum errs in a part (rad, rad/s); ``probability`` of the cases do not exceed it.
-
-    ``most``: by how much it may; infinite for a part that nothing bounds where something else is required.
-    """
+    """By how much the impulse sum errs in a part, and the ``most`` by which it may (rad, rad/s)."""
 
     part: Part
     error: float
     most: float
-    probability: float = 1.0
 
     def __str__(self) -> str:
         if self.part is Part.SPIN:
@@ -85,15 +81,13 @@ def left_by(flight: Flight) -> Left:
     return Left(residual.nutation, residual.axis_error, flight.settled.spin)
 
 
-def tolerated(spacecraft: Spacecraft, otherwise: float = ANGLE) -> dict[Part, float]:
+def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
     """By how much models may differ in nutation, in the direction of H, and in the spin where the goal names one.
 
-    A tenth of what is required; `ANGLE` where nothing is, and ``otherwise`` for a part that nothing bounds where
-    something else is.
+    A tenth of what is required; `ANGLE` for a part that nothing bounds.
     """
     required = {bound.part: SHARE * bound.most for bound in compliance.required(spacecraft)}
-    unbounded = otherwise if required else ANGLE
-    return {Part.NUTATION: unbounded, compliance.aim(spacecraft): unbounded, **required}
+    return {Part.NUTATION: ANGLE, compliance.aim(spacecraft): ANGLE, **required}
 
 
 def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:

@@ -21,7 +21,6 @@ from nutdamp.comparison import Comparison, attempt
 from nutdamp.decision import Cases, Decision, cases_of
 from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
-from nutdamp.dispersion.agreement import check_impulses
 from nutdamp.dispersion.study import Results, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.limits import keeps_limits
@@ -75,8 +74,8 @@ class RobustComparison:
     """Candidates from the best down; ``usual`` is what `recommendation.recommend` takes, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
-    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed`` through real widths or, not ``flown``,
-    in closed form. ``tightening``: with which tolerances enough cases would comply with it, where too few do.
+    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``tightening``: with which tolerances
+    enough cases would comply with the robust plan, where too few do.
     ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
     """
 
@@ -90,7 +89,6 @@ class RobustComparison:
     probability: float
     samples: int
     seed: int
-    flown: bool
     tightening: Tightening | None = None
     fresh: Fresh | None = None
 
@@ -191,14 +189,11 @@ def compare(
     *,
     samples: int = SAMPLES,
     whole: bool = False,
-    impulses: bool = False,
-    force: bool = False,
 ) -> RobustComparison:
     """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
     ``samples`` cases of those that may be chosen, or, ``whole``, of all, see `screening`; ``watch`` is called with how
-    many trials are done, and then beyond that now and then. ``impulses``: in closed form. Raises BadRequest for a
-    spacecraft without dispersions, and for closed forms that err by too much unless ``force``.
+    many trials are done, and then beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
@@ -212,15 +207,12 @@ def compare(
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                study = study_of(body, own.pulses, flown=not impulses)
-                if impulses and not force:
-                    check_impulses(study)
-                found[kind] = entered(own, variant, study, samples)
+                found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
     candidates = list(found.values())
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
     always = [one for one in candidates if whole or one is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
-    ranks = ranked(comparison, candidates, samples, probability, flown=not impulses)
+    ranks = ranked(comparison, candidates, samples, probability)
     return ranks if whole or ranks.chosen is None else _checked(ranks, candidates)
 
 
@@ -233,21 +225,21 @@ def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> Robust
     comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
     refused: list[Candidate] = []
     while (chosen := ranks.chosen) is not None:
-        ranks = replace(ranks, fresh=_fresh(chosen, samples, ranks.flown))
+        ranks = replace(ranks, fresh=_fresh(chosen, samples))
         if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
             break
         refused.append(chosen)
-        ranks = ranked(comparison, candidates, samples, required, flown=ranks.flown, refused=refused)
-    if not ranks.flown or chosen is None or ranks.met is None or ranks.met >= required:
+        ranks = ranked(comparison, candidates, samples, required, refused=refused)
+    if chosen is None or ranks.met is None or ranks.met >= required:
         return ranks
     return replace(ranks, tightening=tightening(chosen.plan, required))
 
 
-def _fresh(chosen: Candidate, samples: int, flown: bool) -> Fresh | None:
+def _fresh(chosen: Candidate, samples: int) -> Fresh | None:
     """The chosen plan in cases that are new to the choice; None where nothing is required of it."""
     if chosen.met is None:
         return None
-    study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH, flown=flown)
+    study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH)
     try:
         found = run(Results(study, samples), threads=threads_here())
     except Infeasible:  # a case among them takes too long to fly
@@ -261,7 +253,6 @@ def ranked(
     samples: int,
     probability: float,
     *,
-    flown: bool,
     refused: Sequence[Candidate] = (),
 ) -> RobustComparison:
     """The comparison of candidates that have flown, and which of them to take.
@@ -289,7 +280,6 @@ def ranked(
         probability,
         samples,
         SEED,
-        flown,
     )
 
 

@@ -77,9 +77,8 @@ simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot 
 simulate smoke.yaml --schedule pulses.csv --flown --plot motion.svg --figure motion
 simulate smoke.yaml --scheme none --until 60s --plot history.pdf --figure history
 trade --points 2 --csv trade.csv --json trade.json --plot trade.png --schedules folder
-disperse smoke.yaml --samples 2000 --csv cases.csv --json disperse.json --plot disperse.png --resume study.npz
-disperse smoke.yaml --samples 3000 --resume study.npz
-disperse smoke.yaml --schedule pulses.csv --samples 2000 --flown
+disperse smoke.yaml --samples 2000 --csv cases.csv --json disperse.json --plot disperse.png
+disperse smoke.yaml --schedule pulses.csv --samples 2000
 disperse smoke.yaml --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
 loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png
@@ -116,7 +115,6 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
     ".gif": b"GIF8",
     ".svg": b"<?xml",
-    ".npz": b"PK",
     ".html": b"<!doctype",
 }
 """How a file of a kind begins."""
@@ -156,7 +154,7 @@ def _faults(program: str, folder: Path) -> Iterator[str]:
             yield f"nutdamp {arguments}: exit status {done.returncode}, expected {statuses or 0}\n{done.stderr}"
         elif re.search(r"Traceback|Warning", done.stderr):
             yield f"nutdamp {arguments}:\n{done.stderr}"
-        for name in re.findall(r"(?:--json|--csv|--plot|--resume|--schedules|-o) (\S+)", arguments):
+        for name in re.findall(r"(?:--json|--csv|--plot|--schedules|-o) (\S+)", arguments):
             if done.returncode in (0, 4):
                 yield from _file_faults(folder / name, arguments)
     yield from _untried(run)

@@ -155,7 +155,7 @@ def commands(seed: int, body: dict[str, Any]) -> Iterator[list[str]]:
         (apm, ["import", "apm", "f.apm", "--schedule", "f.csv"], ["simulate", "f.yaml", "--schedule", "f.csv"]),
         (["plan", "f.yaml", *(part for one in CLASSIC for part in ("--scheme", one))],),
         (["simulate", "f.yaml", "--scheme", "none", "--samples", "20", "--json", "-"],),
-        (["disperse", *chosen, "--samples", "100", "--impulses", "--force"],),
+        (["disperse", *chosen, "--case", "3"],),
         (["plan", *chosen, "--csv", "-"], ["plan", *chosen, "--set", "limits.max_pulses=3"]),
         (["plan", *chosen], ["simulate", *chosen, "--samples", "20"]),
         (["plan", *chosen, *([] if scheme == "optimal" else ["--robust"]), "--json", "-"],),

@@ -15,7 +15,6 @@ from spinners import FILE as SPINNER
 
 from nutdamp import planning
 from nutdamp.dispersion import study_of
-from nutdamp.dispersion.agreement import lightening_error
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.errors import FaultyFile, Unsuitable
@@ -256,7 +255,7 @@ def test_how_far_cases_of_falling_moments_err_is_said() -> None:
         jets = [one.of(valve=None, max_on_time=2.0) for one in craft.channels]
         craft = replace(craft, channels=tuple(jets), tank=replace(craft.tank or TANK, propellant=0.02))
         made = Schedule(supplied(craft, [on_command(one, 0.7 + 3.0 * at, 1.2) for at, one in enumerate(jets)]))
-        return lightening_error(study_of(craft, made))
+        return study_of(craft, made).lightening_error
 
     assert said(None) == ""
     assert said((1.0, 1.0, 0.5)) == ""

@@ -92,7 +92,7 @@ def test_of_plans_that_cost_the_same_the_one_recommended_for_nominal_values() ->
     ]
     for recommended in (0, 1):
         compared = Comparison(body, (given[recommended].plan,))
-        found = robust.ranked(compared, given, 1_000, 0.997, flown=False)
+        found = robust.ranked(compared, given, 1_000, 0.997)
         assert found.equals == 2
         assert found.chosen is given[recommended]
 
@@ -102,17 +102,19 @@ def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
     body = example(None)
     schedule = planning.plan(body, "two-pulse").pulses
     study, begun, over = study_of(body, schedule), threading.Event(), threading.Event()
+    real = study.flies
 
     def fly(cases: DispersedCases) -> Ends:
         begun.set()
         over.wait(60.0)
-        return study.flies(cases)
+        return real(cases)
 
     def interrupt(_: int) -> None:
         assert begun.wait(60.0)
         raise KeyboardInterrupt
 
+    vars(study)["flies"] = fly
     with pytest.raises(KeyboardInterrupt):
-        run(Results(replace(study, fly=fly), 2_048), watch=interrupt)
+        run(Results(study, 2_048), watch=interrupt)
     assert not over.is_set()
     over.set()

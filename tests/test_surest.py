@@ -79,7 +79,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
     model = Model(body, made)
     names = [one.name for one in model.inputs.drawn]
-    kernel = study_of(body, made, flown=False).first_order
+    kernel = study_of(body, made).first_order
     spins = body.inertia.C * abs(body.spin)
     for kind, rows, size in ((0, slice(0, 2), spins), (1, slice(2, 4), float(np.linalg.norm(body.momentum)))):
         shared, _, own = cones.spread(kind, columns, columns.width)

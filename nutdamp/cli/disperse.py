@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +12,6 @@ import click
 from nutdamp.cli.boundary import interruption, leave
 from nutdamp.cli.common import Input, plot_options, quiet_option, require_dispersions, spacecraft_argument
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.job import Job, Output, begin
 from nutdamp.cli.parameters import FILE, Count, EndTime
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
@@ -28,16 +25,12 @@ if TYPE_CHECKING:
     from nutdamp.dispersion.statistics import Array
     from nutdamp.dispersion.study import Collect, Results, Study
     from nutdamp.errors import CannotWrite
-    from nutdamp.planning import Plan
 
 SAMPLES = 20_000
 """Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
 
 FIGURES = ("overview", "cases", "momentum", "budget")
 """What --plot draws."""
-
-SAVED_EVERY = 30.0
-"""Seconds after which a run with --resume saves what is done."""
 
 
 @click.command("disperse", cls=PlanningCommand)
@@ -49,8 +42,6 @@ SAVED_EVERY = 30.0
     "--seed", type=click.IntRange(0, 2**64 - 1), default=1, show_default=True, help="Same seed, same draws, always."
 )
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
-@impulse_options
-@click.option("--flown", "real", is_flag=True, help="Real widths, true tensor and disturbances; this is the default.")
 @click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
 @click.option("--until", type=EndTime(), help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
@@ -60,7 +51,6 @@ SAVED_EVERY = 30.0
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
-@click.option("--resume", type=FILE, help="Save finished cases in this file, and resume from it if it exists.")
 @quiet_option
 def command(
     spacecraft: Input,
@@ -70,9 +60,6 @@ def command(
     samples: int,
     seed: int,
     threads: int | None,
-    real: bool,
-    impulses: bool,
-    force: bool,
     looped: bool,
     until: float | None,
     case: int | None,
@@ -81,7 +68,6 @@ def command(
     json: str | None,
     plot: str | None,
     figure: str,
-    resume: str | None,
     quiet: bool,
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
@@ -90,18 +76,13 @@ def command(
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     # Long by its options, each a parameter, and by the two ways to fly, cases of a schedule and of a loop.
-    if real and impulses:
-        raise click.UsageError("--flown and --impulses exclude each other")
-    expect_impulses(impulses, force, True, "disperse")
-    files = {"csv": csv, "json": json, "plot": plot, "resume": resume}
-    _expect_study(case, files)
+    if case is not None and (csv or plot):
+        raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
     if until is not None and not looped:
         raise click.UsageError("--until is for --loop")
     if looped:
-        _expect_loop(
-            flown, {"impulses": impulses, "resume": resume, "threads": threads, "figure": figure != FIGURES[0]}
-        )
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, **files)
+        _expect_loop(flown, {"threads": threads, "figure": figure != FIGURES[0]})
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     if looped:
         from nutdamp.cli.disperse_loop import Requested, disperse_loop
 
@@ -110,15 +91,16 @@ def command(
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)
 
+    from nutdamp.dispersion import study_of
     from nutdamp.files.dispersion_json import dispersion_json
 
-    study, note = study_of_cases(plan, seed, impulses=impulses, force=force)
-    if note:
+    study = study_of(plan.spacecraft, plan.pulses, seed=seed)
+    if note := study.lightening_error:
         job.remark(note)
     if case is not None:
         _one_case(job, study, case - 1, plan.scheme, json)
         return
-    results, unsaved, stopped_by = fly(study, samples, threads, csv, resume, quiet)
+    results, unsaved, stopped_by = fly(study, samples, threads, csv, quiet)
     data = partial(dispersion_json, results, scheme=plan.scheme, worst=worst)
     outputs: list[Output] = [(json, data), (plot, partial(_picture, results, figure, plan.scheme))]
     job.deliver(outputs, partial(_screen, results, plan.scheme, worst), unsaved=unsaved)
@@ -126,14 +108,6 @@ def command(
         say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
     leave(missed=results.meets_requirement is False)
-
-
-def _expect_study(case: int | None, files: Mapping[str, str | None]) -> None:
-    """A usage error for files of a study where a single ``case`` is shown, or which cannot be read again."""
-    if case is not None and (files["csv"] or files["plot"] or files["resume"]):
-        raise click.UsageError("--case shows a single case: --csv, --plot and --resume are for a study")
-    if files["resume"] == "-":
-        raise click.UsageError("--resume keeps a study in a file; standard output cannot be read again")
 
 
 def _picture(results: Results, figure: str, scheme: str) -> Figure:
@@ -146,15 +120,6 @@ def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
     from nutdamp.presentation.dispersion_tables import dispersion_screen
 
     return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
-
-
-def study_of_cases(plan: Plan, seed: int, *, impulses: bool, force: bool) -> tuple[Study, str]:
-    """The study of a plan, and how far ``impulses``, or falling moments, err in it; raises as `check_impulses` does."""
-    from nutdamp.dispersion import study_of
-    from nutdamp.dispersion.agreement import check_impulses, lightening_error
-
-    study = study_of(plan.spacecraft, plan.pulses, seed=seed, flown=not impulses)
-    return study, check_impulses(study, force=force) if impulses else lightening_error(study)
 
 
 def _expect_loop(flown: Flown, others: Mapping[str, object]) -> None:
@@ -172,25 +137,15 @@ class Run(NamedTuple):
     stopped_by: int | None
 
 
-def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume: str | None, quiet: bool) -> Run:
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet: bool) -> Run:
     """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
     from nutdamp.cli.progress import progress, stoppable
     from nutdamp.dispersion.study import Results, run, threads_here
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.study_file import load_results, save_results
 
-    results = Results(study, samples) if resume is None else load_results(resume, study, samples)
+    results = Results(study, samples)
     unsaved: list[CannotWrite] = []
-    with stoppable() as stopped, progress("flying", samples, quiet=quiet, done=results.done) as show_done:
-        saved = time.monotonic()
-
-        def watch(done: int) -> None:
-            nonlocal saved
-            show_done(done)
-            if resume is not None and time.monotonic() - saved > SAVED_EVERY:
-                with suppress(CannotWrite):  # the last time tells
-                    save_results(resume, results)
-                saved = time.monotonic()
+    with stoppable() as stopped, progress("flying", samples, quiet=quiet) as watch:
 
         def fly_all(collect: Collect | None) -> None:
             run(results, threads=threads or threads_here(), watch=watch, stopped=stopped, collect=collect)
@@ -203,11 +158,6 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, resume
             if results.done < samples and not stopped():
                 raise  # it never began
             unsaved.append(wrong)
-        if resume is not None:
-            try:
-                save_results(resume, results)
-            except CannotWrite as wrong:
-                unsaved.append(wrong)
     return Run(results, tuple(unsaved), stopped.number)
 
 
@@ -240,18 +190,13 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
 
 
 def _one_case(job: Job, study: Study, case: int, scheme: str, json: str | None) -> None:
-    """Show a single case, by the impulse sum and flown."""
-    from nutdamp.dispersion.single import flown_outputs
+    """Show a single case."""
     from nutdamp.files.dispersion_json import case_json
     from nutdamp.presentation.dispersion_tables import case_screen
 
     draws = study.draws_of(case)
 
     def data() -> dict[str, Any]:
-        return {"scheme": scheme, "seed": study.seed, "flown": study.flown, **case_json(study, case, draws)}
+        return {"scheme": scheme, "seed": study.seed, **case_json(study, case, draws)}
 
-    def screen() -> RenderableType:
-        flown = flown_outputs(study.model, {}), flown_outputs(study.model, draws)
-        return case_screen(study, case, draws, flown, scheme=scheme)
-
-    job.deliver([(json, data)], screen)
+    job.deliver([(json, data)], partial(case_screen, study, case, draws, scheme=scheme))

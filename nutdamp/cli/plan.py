@@ -19,7 +19,6 @@ from nutdamp.cli.common import (
 )
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.flown import compared_with
-from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options, scheme_options
@@ -57,7 +56,6 @@ SCHEMES, PRIMER = "schemes", "primer"
 @scheme_options
 @goal_options
 @click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")
-@impulse_options
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
 @click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
@@ -71,8 +69,6 @@ def command(
     options: Options,
     aim: Aim,
     robust: bool,
-    impulses: bool,
-    force: bool,
     csv: str | None,
     blocks: str | None,
     table: str | None,
@@ -87,7 +83,6 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    expect_impulses(impulses, force, robust, "--robust")
     one_plan, all_plans, curve = (plot if here else None for here in _pictured(figure))
     _expect_one_scheme(names, csv=csv, plot=one_plan)
     files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "certificate": certificate, "plot": plot}
@@ -102,7 +97,7 @@ def command(
     from nutdamp.presentation import verdicts
 
     compared = compared_with(job, names, options)
-    dispersed = _disperse(compared, options, quiet, impulses=impulses, force=force) if robust else None
+    dispersed = _disperse(compared, options, quiet) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
@@ -134,14 +129,14 @@ def _expect_one_scheme(names: Sequence[str], **written: str | None) -> None:
             )
 
 
-def _disperse(compared: Comparison, options: Options, quiet: bool, *, impulses: bool, force: bool) -> RobustComparison:
+def _disperse(compared: Comparison, options: Options, quiet: bool) -> RobustComparison:
     """Fly the plans and their variants in dispersed cases, with a bar."""
     from nutdamp import robust
     from nutdamp.cli.progress import progress
 
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=quiet) as advance:
-        return robust.compare(compared, trials, advance, impulses=impulses, force=force)
+        return robust.compare(compared, trials, advance)
 
 
 def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: str) -> list[Output]:

@@ -26,13 +26,13 @@ LONG = 10.0
 
 
 @contextmanager
-def progress(what: str, total: int, *, quiet: bool = False, done: int = 0) -> Iterator[Callable[[int], None]]:
-    """A function to call now and then with how many of ``total`` are done; ``done`` were before the run began.
+def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """A function to call now and then with how many of ``total`` are done.
 
     It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
     behind. Elsewhere one line says how far it is, after `LONG`.
     """
-    shown = _Bar(what, total, done) if sys.stderr.isatty() else _Line(what, total, done)
+    shown = _Bar(what, total) if sys.stderr.isatty() else _Line(what, total)
     try:
         yield (lambda _: None) if quiet else shown.update
     finally:
@@ -85,8 +85,8 @@ class _Doing:
 class _Line:
     """What is shown where there is no terminal: one line, once, that names the share done and the time left."""
 
-    def __init__(self, what: str, total: int, done: int) -> None:
-        self.what, self.total, self.before = what, total, done
+    def __init__(self, what: str, total: int) -> None:
+        self.what, self.total = what, total
         self.began, self.said = time.monotonic(), False
 
     def update(self, done: int) -> None:
@@ -94,7 +94,7 @@ class _Line:
         if self.said or passed < LONG:
             return
         self.said = True
-        left = passed * (self.total - done) / max(done - self.before, 1)
+        left = passed * (self.total - done) / max(done, 1)
         rest = f", about {left:.0f} s left" if left > 0.0 else ""
         say(f"{self.what}: {min(done, self.total):,} of {self.total:,} done after {passed:.0f} s{rest}")
 
@@ -103,8 +103,8 @@ class _Line:
 
 
 class _Bar:
-    def __init__(self, what: str, total: int, done: int) -> None:
-        self.what, self.total, self.before = what, total, done
+    def __init__(self, what: str, total: int) -> None:
+        self.what, self.total = what, total
         self.began = time.monotonic()
         self.bar: Progress | None = None
         self.task: TaskID | None = None
@@ -117,7 +117,7 @@ class _Bar:
             self._open()
         assert self.bar is not None
         assert self.task is not None
-        rate = (done - self.before) / passed
+        rate = done / passed
         self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
 
     def _open(self) -> None:
@@ -133,7 +133,7 @@ class _Bar:
             console=Console(stderr=True),
             transient=True,
         )
-        self.task = self.bar.add_task(self.what, total=self.total, completed=self.before, rate="")
+        self.task = self.bar.add_task(self.what, total=self.total, rate="")
         self.bar.start()
 
     def close(self) -> None:

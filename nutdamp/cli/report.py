@@ -12,10 +12,9 @@ import click
 
 from nutdamp.cli.boundary import interruption, leave
 from nutdamp.cli.common import Input, quiet_option, require_dispersions, spacecraft_argument
-from nutdamp.cli.disperse import SAMPLES, fly, study_of_cases
+from nutdamp.cli.disperse import SAMPLES, fly
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.flown import compared_with
-from nutdamp.cli.impulses import expect_impulses, impulse_options
 from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
 from nutdamp.cli.progress import working
@@ -94,7 +93,6 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     metavar="[POINTS]",
     help=f"Show what an earlier end costs, as `nutdamp trade` does; {POINTS} points where no number follows.",
 )
-@impulse_options
 @control_options
 @quiet_option
 def command(
@@ -105,8 +103,6 @@ def command(
     output: str,
     disperse: int | None,
     trade: int | None,
-    impulses: bool,
-    force: bool,
     quiet: bool,
     **control: str | None,
 ) -> None:
@@ -118,7 +114,6 @@ def command(
     from nutdamp.presentation.page.html import expect_html
 
     expect_html(output)
-    expect_impulses(impulses, force, disperse is not None, "--disperse")
     job = begin(spacecraft, aim=aim, quiet=quiet, output=output)
 
     from nutdamp.files.yaml_tree import dotted
@@ -135,7 +130,7 @@ def command(
     dispersed: dict[str, Results] = {}
     note = ""
     if compared.recommended is not None and disperse is not None:
-        dispersed, note = _dispersed(compared, disperse, impulses=impulses, force=force, quiet=quiet)
+        dispersed, note = _dispersed(compared, disperse, quiet=quiet)
     fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
         made = made_of(compared, repeat, dispersed, note, kept, fronts)
@@ -147,14 +142,12 @@ def command(
     leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=made.met is False)
 
 
-def _dispersed(
-    compared: Comparison, samples: int, *, impulses: bool, force: bool, quiet: bool
-) -> tuple[dict[str, Results], str]:
-    """The schedules in many cases, the recommended one first, and how far impulses err with it.
+def _dispersed(compared: Comparison, samples: int, *, quiet: bool) -> tuple[dict[str, Results], str]:
+    """The schedules in many cases, the recommended one first, and how far falling moments err with it.
 
     Of the others none is there whose cases cannot be flown. Interrupted, nothing is written.
     """
-    from nutdamp.dispersion import SEED
+    from nutdamp.dispersion import study_of
     from nutdamp.errors import BadRequest, Infeasible
     from nutdamp.library.reports import feasible_first
 
@@ -162,9 +155,9 @@ def _dispersed(
     notes = []
     for plan in feasible_first(compared):
         try:
-            study, note = study_of_cases(plan, SEED, impulses=impulses, force=force)
-            notes.append(note)
-            results, _, stopped_by = fly(study, samples, None, None, None, quiet)
+            study = study_of(plan.spacecraft, plan.pulses)
+            notes.append(study.lightening_error)
+            results, _, stopped_by = fly(study, samples, None, None, quiet)
         except (BadRequest, Infeasible):
             if not found:
                 raise

@@ -1,4 +1,4 @@
-"""Draws: the same numbers for the same seed, whatever the number of threads, the working chunk or a resumed run.
+"""Draws: the same numbers for the same seed, whatever the number of threads or of cases.
 
 Cases come in fixed blocks of `BLOCK`. Every input has a stream of its own in every block: the counter-based Philox
 generator with the seed and the input's name in the key, the block in the counter. So case 1234 is the same in a study

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,6 @@ from nutdamp.dispersion.watched import number_of, watch_of
 from nutdamp.dynamics import Dynamics, make_dynamics
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.physics.axis_watch import AxisWatch
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,9 @@ class RealWidths:
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
         propellant = cases.propellant
         if self.model.schedule.blocks:
-            settled, turned, _, seen, over = self._fired(cases, watch)
+            settled, turned, _, seen, over = sun_fired.fly(
+                self.model, self._bodies(moments), rates, _upright(count), cases, watch
+            )
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
@@ -73,22 +74,8 @@ class RealWidths:
             drained=cases.drained,
         )
 
-    def timed(self, cases: DispersedCases) -> DispersedCases:
-        """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they are."""
-        if not self.model.schedule.blocks:
-            return cases
-        fired = self._fired(cases)
-        pulses = zip(cases.impulses, fired.seen, strict=True)
-        impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
-        return replace(cases, starts=tuple(fired.starts), impulses=impulses)
-
     def _bodies(self, moments: Array) -> rigid_cases.Bodies:
         return rigid_cases.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
-
-    def _fired(self, cases: DispersedCases, watch: AxisWatch | None = None) -> sun_fired.Fired:
-        count = number_of(cases)
-        bodies = self._bodies(_whole(cases.moments, count))
-        return sun_fired.fly(self.model, bodies, _whole(cases.omega0, count), _upright(count), cases, watch)
 
     def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> rigid_cases.Pulses:
         """The pulses by the ramps of their thrust, each as one of its own; as in `rigid_cases.Pulses`."""

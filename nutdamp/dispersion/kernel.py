@@ -1,4 +1,4 @@
-"""The closed form over many cases: impulse sum Magnus 1970 (17) with exact attitude arcs, structure of arrays.
+"""The closed form of cases, for derivatives: impulse sum Magnus 1970 (17) with exact attitude arcs, in arrays.
 
 Between pulses a symmetric body is free, and two facts make the arcs cheap. Seen in the frame that turns with the
 nutation, by the phase aα with α = ∫ω3 dt, the angular momentum does not move: its transverse part is
@@ -12,23 +12,18 @@ rounding (`nutdamp.dispersion.sensitivity`).
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import DispersedCases, Model
-from nutdamp.dispersion.elementwise import Cases, Triple, plus, rotated, times, triple
-from nutdamp.dispersion.watched import watch_of
+from nutdamp.dispersion.elementwise import Cases, Triple, plus, rotated, times
 from nutdamp.physics import attitude, energy_sink
-from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.energy_sink import TINY
-from nutdamp.physics.rigid import Forcing
-from nutdamp.physics.rigid_cases import Bodies, Stretch, cos_sin
+from nutdamp.physics.rigid_cases import cos_sin
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
@@ -71,25 +66,8 @@ class ClosedForm:
     model: Model
 
     def __call__(self, cases: DispersedCases) -> Ends:
-        """How the ``cases`` end."""
-        nodes = self._nodes
-        mixed = _out_of_order(cases.starts, cases.widths)
-        growth = self.model.spacecraft.growth
-        watch = self._watch(cases)
-        ends = _fly(cases, nodes, growth, watch)
-        if mixed is not None:
-            # Few cases, if any, fire in another order than planned: fly those again, each in its own order.
-            again = None if watch is None else watch.anew(mixed)
-            others = _fly(_reordered(cases, mixed), (max(nodes),) * len(nodes), growth, again)
-            ends = _replaced(ends, mixed, others)
-        return ends if watch is None else replace(ends, aspects=watch.angles)
-
-    def _watch(self, cases: DispersedCases) -> AxisWatch | None:
-        """Sees the spin axis where the body has cones to keep; not while derivatives are taken by a complex step."""
-        parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.widths, *cases.tilt, *sum(cases.impulses, ()))
-        if not self.model.spacecraft.keep or any(map(np.iscomplexobj, parts)):
-            return None
-        return watch_of(self.model, cases)
+        """How the ``cases`` end, whose pulses all come in the order of the first of them."""
+        return _fly(*_in_order(cases, self._nodes), self.model.spacecraft.growth)
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
@@ -104,11 +82,8 @@ class ClosedForm:
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: AxisWatch | None = None) -> Ends:
-    """How cases end whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s.
-
-    ``watch`` sees the motion, and one turn of the axis after the last pulse.
-    """
+def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
+    """How cases end whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
     # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
     A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
@@ -124,8 +99,6 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
         on_time = cases.widths[number]
         centre = start + 0.5 * on_time
         coast = centre - now
-        if watch is not None:
-            _show(watch, (A, C), (x, y, spin), turn, growth, coast)
         turn = _turned_on(turn, (x, y, z), coast * per_A)
         if growth == 0.0:
             phase = phase + a * spin * coast
@@ -135,7 +108,7 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
             x, y, spin = x * found.transverse, y * found.transverse, spin * found.axial
             z = C * spin
         if sheds is not None:  # half before the pulse and half after it, the rates as they are
-            x, y, A, C = _lighter(x, y, A, C, 0.5, sheds[number])
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
             a, z = 1.0 - C / A, C * spin
         along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number], growth)
         cosine, sine = cos_sin(phase)
@@ -145,11 +118,9 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
             spin = spin + gained / C
             z = C * spin
         if sheds is not None:
-            x, y, A, C = _lighter(x, y, A, C, 0.5, sheds[number])
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
             a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin
         now = centre
-    if watch is not None:
-        _show(watch, (A, C), (x, y, spin), turn, growth)
     after = (x, y, z) if turn is None else carried(turn, (x, y, z))
     return Ends(
         momentum=(x, y, z),
@@ -163,39 +134,10 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float, watch: Ax
     )
 
 
-def _show(
-    watch: AxisWatch,
-    moments: tuple[Cases, Cases],
-    motion: Triple,
-    turn: tuple[Cases, ...] | None,
-    growth: float,
-    coast: Cases | None = None,
-) -> None:
-    """Show a ``coast`` (s) to a ``watch``, by default one turn of the axis about H.
-
-    ``moments``: A and C. ``motion``: AΩ1, AΩ2 and ω3 in the frame that turns with the nutation and ``turn`` in space:
-    its third axis is that of the body, and more of the body is not looked at.
-    """
-    count = watch.count
-
-    def rows(*values: Cases) -> Any:
-        return np.array([np.broadcast_to(np.asarray(value, dtype=float), count) for value in values])
-
-    (x, y, spin), (A, C) = motion, moments
-    bodies = Bodies(rows(A, A, C), np.zeros(3), Forcing(growth=growth))
-    here = Stretch(bodies, np.zeros(count), rows(x / A, y / A, spin), rows(*(turn or (1.0, 0.0, 0.0, 0.0))))
-    if coast is None:
-        watch.turn(here)
-    else:
-        watch.motion(here, rows(coast)[0])
-
-
-def _lighter(
-    x: Cases, y: Cases, A: Cases, C: Cases, share: float, sheds: tuple[Cases, Cases]
-) -> tuple[Cases, Cases, Cases, Cases]:
-    """AΩ1, AΩ2, A and C with a ``share`` of ``sheds`` off A and C, which leaves the rates as they are."""
-    less = A - share * sheds[0]
-    return x * (less / A), y * (less / A), less, C - share * sheds[1]
+def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]) -> tuple[Cases, Cases, Cases, Cases]:
+    """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
+    less = A - 0.5 * sheds[0]
+    return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
 
 
 def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
@@ -309,59 +251,15 @@ def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
     return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
 
 
-def _out_of_order(starts: tuple[Cases, ...], on_times: tuple[Cases, ...]) -> NDArray[np.intp] | None:
-    """Rows of the cases in which a pulse comes before one that is planned earlier; None where there are none."""
-    centres = [start + 0.5 * on_time for start, on_time in zip(starts, on_times, strict=True)]
-    mixed: Any = False
-    for first, second in itertools.pairwise(centres):
-        if isinstance(first, float) and isinstance(second, float):
-            continue
-        mixed = mixed | (np.real(second) < np.real(first))
-    rows = np.flatnonzero(mixed)
-    return rows if len(rows) else None
-
-
-def _reordered(cases: DispersedCases, rows: NDArray[np.intp]) -> DispersedCases:
-    """The ``rows`` of ``cases`` with the pulses of each in the order of their centres."""
-
-    def taken(value: Cases) -> Any:
-        return value[rows] if np.ndim(value) else np.full(len(rows), value)
-
-    starts = np.array([taken(start) for start in cases.starts])
-    widths = np.array([taken(width) for width in cases.widths])
-    impulses = np.array([[taken(part) for part in impulse] for impulse in cases.impulses])
-    order = np.argsort(np.real(starts + 0.5 * widths), axis=0, kind="stable")
-    starts, widths = np.take_along_axis(starts, order, 0), np.take_along_axis(widths, order, 0)
-    impulses = np.take_along_axis(impulses, order[:, None, :], 0)
-    first, second, third = (taken(moment) for moment in cases.moments)
-    spent = None
-    if cases.spent is not None:
-        spent = tuple(np.take_along_axis(np.array([taken(one) for one in cases.spent]).reshape(starts.shape), order, 0))
-    return replace(
-        cases,
-        moments=(first, first if cases.moments[0] is cases.moments[1] else second, third),
-        omega0=triple(taken(rate) for rate in cases.omega0),
-        starts=tuple(starts),
-        widths=tuple(widths),
-        impulses=tuple((impulse[0], impulse[1], impulse[2]) for impulse in impulses),
-        tilt=(taken(cases.tilt[0]), taken(cases.tilt[1])),
-        spent=spent,
-        per_kg=None if cases.per_kg is None else triple(taken(part) for part in cases.per_kg),
+def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedCases, tuple[int, ...]]:
+    """The ``cases``, and the ``nodes``, with the pulses in the order of their centres in the first case."""
+    centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
+    order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable").tolist()
+    if order == sorted(order):
+        return cases, nodes
+    starts, widths, impulses = (
+        tuple(each[number] for number in order) for each in (cases.starts, cases.widths, cases.impulses)
     )
-
-
-def _replaced(ends: Ends, rows: NDArray[np.intp], others: Ends) -> Ends:
-    """``ends`` with those of ``rows`` taken from ``others``."""
-
-    def mended(value: Cases, other: Cases, count: int) -> Any:
-        whole = np.array(np.broadcast_to(value, count), dtype=np.result_type(value, other))
-        whole[rows] = other
-        return whole
-
-    count = max(np.size(part) for part in (*ends.momentum, *ends.after))
-    triples: dict[str, Any] = {
-        name: tuple(mended(v, o, count) for v, o in zip(getattr(ends, name), getattr(others, name), strict=True))
-        for name in ("momentum", "before", "after", "pointed")
-    }
-    spins = {name: mended(getattr(ends, name), getattr(others, name), count) for name in ("spin", "spin_change")}
-    return replace(ends, **triples, **spins)
+    spent = None if cases.spent is None else tuple(cases.spent[number] for number in order)
+    placed = replace(cases, starts=starts, widths=widths, impulses=impulses, spent=spent)
+    return placed, tuple(nodes[number] for number in order)

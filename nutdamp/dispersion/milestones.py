@@ -43,7 +43,7 @@ def milestones(study: Study, after: Sequence[int], probability: float) -> Iterat
     draws = {name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()}
     tails = np.array([0.5 * (1.0 - probability), 0.5 * (1.0 + probability)])
     for count in after:
-        part = study_of(body, first_pulses(schedule, count), seed=study.seed, flown=study.flown)
+        part = study_of(body, first_pulses(schedule, count), seed=study.seed)
         cases = part.model.cases(draws)
         ends, outcome = part.flies(cases), np.empty((len(OUTPUTS), CASES))
         measure(part.model, ends, outcome)

@@ -20,27 +20,25 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STRIDE = rigid_cases.BLOCK
-"""Cases that are always flown together, as real widths need it; chunks are multiples of it."""
+"""Cases that are always flown together, as real widths need it."""
 
 PORTION = 2 * STRIDE
-"""Cases that a thread takes at once where they are flown through real widths; blocks are multiples of it."""
+"""Cases that a thread takes at once; blocks are multiples of it."""
 
 
 class Round:
     """Some cases of a study, flown by several threads that take one portion after the other.
 
-    A portion is a block of draws; where flying takes much longer than drawing a part of it, so that few cases too
-    are shared by the threads.
+    A portion is a part of a block of draws: flying takes much longer than drawing, and few cases too are shared by the
+    threads.
     """
 
-    def __init__(self, results: Results, first: int, last: int, out: Array, chunk: int) -> None:
+    def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
         self.severity = np.empty(last - first)
         self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
         self.emptied = np.zeros(last - first, dtype=bool)
-        self.chunk = max(chunk // STRIDE, 1) * STRIDE
-        self.portion = PORTION if results.study.flown else BLOCK
-        self.portions = range(first // self.portion, math.ceil(last / self.portion))
+        self.portions = range(first // PORTION, math.ceil(last / PORTION))
         self.taken = 0
         self.finished = 0
         self.redrawn = 0
@@ -70,7 +68,7 @@ class Round:
     @property
     def _flown(self) -> int:
         """Where the cases end that are flown; below ``first`` where none is."""
-        return min(self.last, (self.portions[0] + self.finished) * self.portion)
+        return min(self.last, (self.portions[0] + self.finished) * PORTION)
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
@@ -82,8 +80,8 @@ class Round:
                         return
                     portion = self.portions[self.taken]
                     self.taken += 1
-                begin = max(self.first, portion * self.portion)
-                end = min(self.last, (portion + 1) * self.portion)
+                begin = max(self.first, portion * PORTION)
+                end = min(self.last, (portion + 1) * PORTION)
                 if drawn is None or begin // BLOCK != block:
                     block = begin // BLOCK
                     drawn = source.block(block)
@@ -103,22 +101,20 @@ class Round:
         study, early = self.results.study, self.results.early
         draws, redrawn = drawn
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
-        for low in range(begin - begin % STRIDE, end, self.chunk):
-            high = min(low + self.chunk, end + -end % STRIDE)
-            rows = slice(low - start, high - start)
-            ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
-            columns = slice(max(low, begin), min(high, end))
-            inner = slice(columns.start - low, columns.stop - low)
-            outputs = np.empty((len(OUTPUTS), high - low))
-            measure(study.model, ends, outputs)
-            place = slice(columns.start - self.first, columns.stop - self.first)
-            self.out[: len(OUTPUTS), place] = outputs[:, inner]
-            self.severity[place] = study.severity(outputs, ends)[inner]
-            self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
-            if ends.aspects is not None:
-                self.aspects[:, :, place] = ends.aspects[:, :, inner]
-            if low < early.shape[1]:
-                outcome = np.empty((ROWS, high - low))
-                vectors(study.model, ends, outcome)
-                early[:, columns] = outcome[:, inner]
+        low, high = begin - begin % STRIDE, end + -end % STRIDE
+        rows = slice(low - start, high - start)
+        ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
+        inner = slice(begin - low, end - low)
+        outputs = np.empty((len(OUTPUTS), high - low))
+        measure(study.model, ends, outputs)
+        place = slice(begin - self.first, end - self.first)
+        self.out[: len(OUTPUTS), place] = outputs[:, inner]
+        self.severity[place] = study.severity(outputs, ends)[inner]
+        self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
+        if ends.aspects is not None:
+            self.aspects[:, :, place] = ends.aspects[:, :, inner]
+        if low < early.shape[1]:
+            outcome = np.empty((ROWS, high - low))
+            vectors(study.model, ends, outcome)
+            early[:, begin:end] = outcome[:, inner]
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))

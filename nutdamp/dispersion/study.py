@@ -1,8 +1,7 @@
-"""Running a study: blocks of cases over threads, in rounds, so that it can be watched, stopped and taken up again."""
+"""Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 from collections.abc import Callable
@@ -15,26 +14,23 @@ from numpy.typing import NDArray
 
 from nutdamp import compliance, flight
 from nutdamp.aspect import aspects
-from nutdamp.compliance import Left
+from nutdamp.compliance import Left, Part
 from nutdamp.demands import required_share
 from nutdamp.dispersion.binomial import binomial_interval
-from nutdamp.dispersion.cases import DispersedCases, Model
+from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.correlation import independent
 from nutdamp.dispersion.draws import BLOCK, Draws, Source
-from nutdamp.dispersion.kernel import ClosedForm, Ends
+from nutdamp.dispersion.flown import RealWidths
+from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure
 from nutdamp.dispersion.rounds import Round
 from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.dispersion.watched import cones_used
-from nutdamp.errors import BadRequest
 from nutdamp.flight import Flight
+from nutdamp.lightening import shed
 
 Array = NDArray[np.float64]
-Fly = Callable[[DispersedCases], Ends]
-
-CHUNK = 8_192
-"""Cases that the kernel works on at once, so that they stay in the cache."""
 
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
@@ -48,6 +44,9 @@ KEPT_WORST = 1_000
 CONFIDENCE = 0.95
 """Of the interval about the fraction that meets it."""
 
+WORTH_SAYING = math.radians(1e-4)
+"""rad by which cases of falling moments must err for that to be said."""
+
 Collect = Callable[[int, Array], None]
 """Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
 
@@ -59,30 +58,18 @@ def threads_here() -> int:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is studied: cases of ``model`` drawn from ``seed``, flown by ``fly`` (closed form by default).
+    """What is studied: cases of ``model`` drawn from ``seed``.
 
     Cases count from 0 here; people see them count from 1.
     """
 
     model: Model
     seed: int = 1
-    fly: Fly | None = None
-    flown: bool = False
-
-    @property
-    def flies(self) -> Fly:
-        """What flies the cases."""
-        return self.fly or self._closed_form
 
     @cached_property
-    def _closed_form(self) -> Fly:
-        form = ClosedForm(self.model)
-        if not self.model.schedule.blocks:
-            return form
-        from nutdamp.dispersion.flown import RealWidths  # closed forms need no integrator
-
-        real = RealWidths(self.model)
-        return lambda cases: form(real.timed(cases))
+    def flies(self) -> RealWidths:
+        """What flies the cases."""
+        return RealWidths(self.model)
 
     @cached_property
     def first_order(self) -> FirstOrder:
@@ -111,8 +98,7 @@ class Study:
     @property
     def nominal(self) -> Flight:
         """The estimate itself, flown alone as the cases are."""
-        fly = flight.flown if self.flown else flight.by_impulses
-        return fly(self.model.spacecraft, self.model.schedule)
+        return flight.flown(self.model.spacecraft, self.model.schedule)
 
     @property
     def nominal_aspects(self) -> Array:
@@ -136,23 +122,23 @@ class Study:
         return None if found is None else found[:, :, 0]
 
     @property
-    def fingerprint(self) -> str:
-        """Tells whether kept results belong to this study: everything that the numbers depend on, but their count."""
-        body, schedule = self.model.spacecraft, self.model.schedule
-        parts: list[Any] = [self.seed, self.flown, body.inertia.moments, body.inertia.axes, body.omega0]
-        parts += [body.dispersions, body.requirement, body.goal.spin, body.disturbances, body.dissipation]
-        parts += [body.channels, body.steerable, self.model.target]
-        parts.append([(p.t, p.on_time, p.channel, p.impulse, p.propellant) for p in schedule])
-        if body.keep:
-            parts += [(one.direction, one.least, one.most) for one in body.keep]
-        if body.cold is not None or body.tank is not None:
-            parts += [body.cold, body.tank]
-        if schedule.blocks:  # each case fires them from its own Sun pulses
-            parts += [schedule.blocks, body.sun, body.sun_sensor]
-        if schedule.through_valves:
-            parts.append([pulse.command for pulse in schedule])
-        with np.printoptions(precision=17, floatmode="unique"):
-            return hashlib.sha256(repr(parts).encode()).hexdigest()
+    def lightening_error(self) -> str:
+        """By how much cases of falling moments err, as the nominal one shows; empty where that is nothing to speak of.
+
+        They fall half as each pulse begins and half as it ends, which errs in second order; `flight.flown` lets them
+        fall as the thrust goes.
+        """
+        body = self.model.spacecraft
+        if shed(body) is None:
+            return ""
+        found, exact = self.outputs_of({}), self.nominal.residual
+        part = compliance.aim(body)
+        aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
+        errors = {Part.NUTATION: found[0] - exact.nutation, part: found[OUTPUTS.index(part.value)] - aim}
+        if max(map(abs, errors.values())) < WORTH_SAYING:
+            return ""
+        said = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {one.label}" for one, error in errors.items())
+        return f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {said}"
 
 
 class Counted:
@@ -205,19 +191,18 @@ class Results(Counted):
     met: int = 0
     emptied: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
-    values: Array | None = None
-    sketches: list[Sketch] | None = None
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
+    values: Array | None = field(init=False)
+    sketches: list[Sketch] | None = field(init=False)
     broken: NDArray[np.int64] = field(init=False)
     aspects: Array = field(init=False)
 
     def __post_init__(self) -> None:
         cones = len(self.study.model.spacecraft.keep)
         self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
-        if self.values is None and self.sketches is None:
-            exact = self.requested <= EXACT_CASES
-            self.values = np.empty((self.rows, self.requested)) if exact else None
-            self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+        exact = self.requested <= EXACT_CASES
+        self.values = np.empty((self.rows, self.requested)) if exact else None
+        self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
 
     @property
     def rows(self) -> int:
@@ -273,17 +258,13 @@ class Results(Counted):
         self.done = first + values.shape[1]
 
     def extended(self, requested: int) -> Results:
-        """The same, with room for ``requested`` cases; raises BadRequest where that is fewer than are done."""
-        if requested < self.done:
-            raise BadRequest(f"{self.done} cases are done already: expected at least as many, or no --resume")
+        """The same, with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
         done = self.done, self.redrawn, self.met, self.emptied, self.worst
-        more = Results(self.study, requested, *done, sketches=self.sketches, early=self.early)
+        more = Results(self.study, requested, *done, self.early)
         more.broken, more.aspects = self.broken, self.aspects
-        if self.values is not None and more.values is not None:
-            more.values[:, : self.done] = self.values[:, : self.done]
-        elif self.values is not None and more.sketches is not None:
-            for sketch, row in zip(more.sketches, self.values, strict=False):
-                sketch.add(row[: self.done])
+        assert self.values is not None
+        assert more.values is not None
+        more.values[:, : self.done] = self.values[:, : self.done]
         return more
 
 
@@ -291,7 +272,6 @@ def run(
     results: Results,
     *,
     threads: int = 1,
-    chunk: int = CHUNK,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
     collect: Collect | None = None,
@@ -299,17 +279,13 @@ def run(
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given all outputs in order, those of earlier cases too where they are kept.
+    the first ones, are kept. ``collect`` is given their outputs in order.
     """
-    if collect is not None and results.done:
-        if results.values is None:
-            raise BadRequest(f"single cases of an earlier run are stored only for runs of up to {EXACT_CASES}")
-        collect(0, results.values[:, : results.done])
     while results.done < results.requested and not stopped():
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)
         out = np.empty((results.rows, last - first)) if results.values is None else results.values[:, first:last]
-        flights = Round(results, first, last, out, chunk)
+        flights = Round(results, first, last, out)
         done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:
             break

@@ -35,7 +35,6 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "requested": results.requested,
         "interrupted": results.done < results.requested,
         "seed": study.seed,
-        "flown": study.flown,
         "redrawn": results.redrawn,
         "final": final_json(study.nominal),
         "target": target_json(study.model.spacecraft),

@@ -22,7 +22,6 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
         "probability": found.probability,
         "samples": found.samples,
         "seed": found.seed,
-        "flown": found.flown,
         "target": target_json(found.comparison.spacecraft),
         "candidates": [_candidate(one) for one in found.candidates],
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},

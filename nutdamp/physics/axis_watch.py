@@ -55,17 +55,6 @@ class AxisWatch:
         rows = np.arange(self.least.shape[1])[self.rows][cases]
         return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
 
-    def anew(self, cases: Any) -> AxisWatch:
-        """That of some of the cases, of which nothing has been seen yet."""
-        found = self.some(cases)
-        self.least[:, found.rows], self.largest[:, found.rows] = math.pi, 0.0
-        return found
-
-    @property
-    def count(self) -> int:
-        """How many cases are given to it."""
-        return len(np.arange(self.least.shape[1])[self.rows])
-
     def motion(self, here: Stretch, duration: Array) -> None:
         """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
         bodies = here.bodies

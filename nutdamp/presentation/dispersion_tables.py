@@ -13,7 +13,6 @@ from rich.text import Text
 
 from nutdamp.aspect import aspects
 from nutdamp.demands import Keep
-from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import cases_to_show
 from nutdamp.dispersion.inputs import Input, Unused
 from nutdamp.dispersion.outputs import OUTPUTS
@@ -61,11 +60,11 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
 def _title(results: Results, scheme: str) -> Text:
     study = results.study
     pulses = "ideal impulses" if model_name([study.model.schedule]) == IDEAL_IMPULSES else "real widths"
-    how = f"{pulses} and true tensor" if study.flown else "the impulse sum (17)"
     drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
         drawn += f", {results.redrawn:,} unphysical ones drawn again"
-    return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, flown by {how}, {drawn}")
+    how = f"flown by {pulses} and true tensor"
+    return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, {how}, {drawn}")
 
 
 def _percentiles(results: Results) -> Table:
@@ -232,29 +231,20 @@ def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
     return inputs
 
 
-def case_screen(
-    study: Study, case: int, draws: dict[str, float], flown: tuple[Array, Array], *, scheme: str
-) -> RenderableType:
-    """One case (from 0): every input, and how it and the nominal one end by the impulse sum and through real widths.
-
-    ``flown``: the outputs (5,) through real widths, of the nominal case and of this one.
-    """
+def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
+    """One case (from 0): every input, and how it and the nominal one end."""
     inputs = inputs_table(study.model.inputs.drawn, draws)
-    ways = "impulses", "flown"
-    outcome = columns("\n", *(f"{which}\n{how}" for how in ways for which in ("nominal", "this case")))
-    closed = Study(study.model, study.seed)
-    real = study_of(study.model.spacecraft, study.model.schedule, seed=study.seed)
-    ends = (closed.outputs_of({}), closed.outputs_of(draws), *flown)
-    for name, scale, *values in zip(NAMES, SCALES, *ends, strict=True):
+    outcome = columns("", "nominal", "this case")
+    cases: tuple[dict[str, float], ...] = {}, draws
+    for name, scale, *values in zip(NAMES, SCALES, *map(study.outputs_of, cases), strict=True):
         largest = scale * float(np.max(np.abs(values)))
         cells = (MISSING if math.isnan(value) else beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
-    found = [one.aspects_of(case_) for one in (closed, real) for case_ in ({}, draws)]
-    add_angles(outcome, study.model.spacecraft.keep, [one for one in found if one is not None])
-    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(real.ends_of(draws).drained > 1.0)
+    found = [angles for angles in map(study.aspects_of, cases) if angles is not None]
+    add_angles(outcome, study.model.spacecraft.keep, found)
+    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
-    note = "impulses: by the impulse sum (17); flown: through real widths, with the true tensor and disturbances"
-    return Group(title, Text(), inputs, Text(), outcome, Text(note, style="dim"), *empty)
+    return Group(title, Text(), inputs, Text(), outcome, *empty)
 
 
 def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:

@@ -29,7 +29,6 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
     if decided is None or found.chosen is None:
         none = Text(f"No recommendation: {reason}.", style="bold")
         return Group(Text(body.name, style="bold"), none, *reasons, Text(), derived_table(body))
-    how = "flown through real widths" if found.flown else "by the impulse sum (17)"
     named = f"{decided.plan.scheme}, {found.chosen.variant}"
     parts: list[RenderableType] = [
         Text(body.name, style="bold"),
@@ -41,7 +40,8 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(
-            f"{'Up to ' * bool(_fewer(found))}{found.samples:,} dispersed cases of each plan, {how}, seed {found.seed}",
+            f"{'Up to ' * bool(_fewer(found))}{found.samples:,} dispersed cases of each plan, "
+            f"flown through real widths, seed {found.seed}",
             style="bold",
         ),
         *(Text(), _candidates(found), *reasons),

@@ -95,9 +95,6 @@ PROCESSES = (
         Process(name, plan(f"{name}.yaml"), "import numpy", 100.0)
         for name in ("slow-89-deg", "slow-dissipation", "slow-dissipation-two-pulse", "slow-goal", "slow-optimal")
     ),
-    Process("disperse --impulses, 1e5 cases", (*DISPERSE, "1e5", "--impulses"), "import numpy", None, 250.0, True),
-    Process("disperse --impulses, 1e6 cases", (*DISPERSE, "1e6", "--impulses"), "import numpy", 8.0, 250.0, True),
-    Process("with dissipation, 1e6", (*DISPERSE, "1e6", "--impulses", *SINK), "import numpy", 10.0, 250.0, True),
     Process("disperse, 2e4 cases", (*DISPERSE, "2e4"), "import numpy", None, 250.0, True),
     Process("disperse, 1e5 cases", (*DISPERSE, "1e5"), "import numpy", None, 250.0, True),
 )

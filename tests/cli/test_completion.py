@@ -41,7 +41,6 @@ def completed(*words: str) -> list[str]:
         "plan --plot out",
         "report -o out",
         "schema --output out",
-        "disperse --resume out",
     ],
 )
 def test_names_of_files_are_left_to_the_shell(words: str) -> None:
@@ -70,5 +69,5 @@ def test_every_file_of_every_command_is_completed() -> None:
         command = group.get_command(context, name)
         assert command is not None
         for parameter in command.params:
-            if parameter.name in ("spacecraft", "files", "file", "csv", "json", "plot", "output", "schedule", "resume"):
+            if parameter.name in ("spacecraft", "files", "file", "csv", "json", "plot", "output", "schedule"):
                 assert isinstance(parameter.type, FileName), f"{name}: {parameter.name}"

@@ -117,8 +117,7 @@ def test_cases_that_fly_one_by_one_say_their_price(run: Run, stage: Path) -> Non
     ("options", "message"),
     [
         (("--loop", "--scheme", "two-pulse"), "--loop flies the loop of the file, all in one way: leave --scheme out"),
-        (("--loop", "--impulses"), "leave --impulses out"),
-        (("--loop", "--resume", "x.npz"), "leave --resume out"),
+        (("--loop", "--threads", "2"), "leave --threads out"),
         (("--loop", "--plot", "x.svg", "--figure", "budget"), "leave --figure out"),
         (("--until", "9s"), "--until is for --loop"),
         (("--loop", "--until", "0s"), "expected a time after t = 0"),

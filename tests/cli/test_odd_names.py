@@ -36,7 +36,7 @@ def odd(run: Run, tmp_path: Path) -> str:
         "check {0}.yaml --json out.json",
         slow("simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg"),
         "verify {0}.yaml --schedule {0}.csv --json out.json",
-        "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out --resume {0}.z",
+        "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out",
         "trade {0}.yaml --points 1 --json out.json --schedules {0}",
         slow("report {0}.yaml -o {0}.html"),
         slow("animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320"),

@@ -194,7 +194,7 @@ LEAN_TOO = (
     "plan --target 10deg,20deg",
     "plan --robust --scheme one-pulse",
     "trade --points 2",
-    "disperse --samples 100 --scheme optimal --impulses --force",
+    "disperse --samples 100 --scheme optimal",
 )
 
 

@@ -61,14 +61,14 @@ def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> N
 
 @pytest.mark.slow
 def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: Path) -> None:
-    named = ("--scheme", "two-pulse", "--robust", "--impulses", "--force", "-q")
+    named = ("--scheme", "two-pulse", "--robust", "-q")
     run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes")
     assert "complying cases, %" in (tmp_path / "schemes.svg").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
-    common = ("disperse", "--scheme", "two-pulse", "--impulses", "--force", "--samples", "200", "-q")
+    common = ("disperse", "--scheme", "two-pulse", "--samples", "200", "-q")
     said = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.6 kg m²"}
     for figure, words in said.items():
         run(*common, "--plot", f"{figure}.svg", "--figure", figure)

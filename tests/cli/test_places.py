@@ -49,8 +49,6 @@ def files(tmp_path: Path) -> Path:
         ("simulate in.yaml --schedule s.csv --csv s.csv", "--csv s.csv: this command reads this file"),
         ("simulate in.yaml --schedule s.csv --json in.yaml", "--json in.yaml: this command reads this file"),
         ("disperse in.yaml --schedule s.csv --json s.csv", "--json s.csv: this command reads this file"),
-        ("disperse in.yaml --csv new.csv --resume new.csv", "--resume new.csv: --csv goes to this file"),
-        ("disperse in.yaml --resume in.yaml", "--resume in.yaml: this command reads this file"),
         ("verify in.yaml --schedule s.csv --json s.csv", "this command reads this file"),
         ("check a.yaml in.yaml --json in.yaml", "--json in.yaml: this command reads this file"),
         ("trade in.yaml --csv new.csv --json new.csv", "--json new.csv: --csv goes to this file"),

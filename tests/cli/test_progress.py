@@ -23,7 +23,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float,
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(module, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
-    with progress("flying", 1_000, quiet=quiet, done=100) as tell:
+    with progress("flying", 1_000, quiet=quiet) as tell:
         for done in (200, 500, 900):
             tell(done)
     return stream.getvalue()

@@ -36,7 +36,6 @@ def limited(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         slow("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
         ("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
         ("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "Tolerance budget"),
-        slow("disperse --scheme two-pulse --samples 20000 --resume big.npz --json small.json", "Tolerance budget"),
         slow("plan --plot big.svg --json small.json", "Recommended"),
         slow("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
     ],

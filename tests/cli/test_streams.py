@@ -141,7 +141,6 @@ def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
         "simulate --scheme none --json no/x.json",
         "trade --points 1000 --csv no/x.csv",
         "disperse --samples 1e10 --json no/x.json",
-        "disperse --samples 1e10 --resume no/x.npz",
         "animate -o no/x.gif --seconds 600",
         "report -o no/x.html",
         "export --format json -o no/x.json",

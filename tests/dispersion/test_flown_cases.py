@@ -8,12 +8,12 @@ from dataclasses import replace
 import dispersed
 import numpy as np
 import pytest
+from single_case import flown_outputs, realised
 
 from nutdamp import flight
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths, largest_nutation
 from nutdamp.dispersion.outputs import measure
-from nutdamp.dispersion.single import flown_outputs, realised
 from nutdamp.dispersion.study import Study
 from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.schedule import Schedule
@@ -79,4 +79,4 @@ def test_largest_nutation_of_many_is_that_of_each() -> None:
 def test_a_schedule_without_pulses_flies() -> None:
     model = Model(MODELS["three moments"].spacecraft, Schedule())
     left = flight.flown(model.spacecraft, Schedule()).residual
-    assert Study(model, fly=RealWidths(model), flown=True).outputs_of({})[0] == pytest.approx(left.nutation)
+    assert Study(model).outputs_of({})[0] == pytest.approx(left.nutation)

@@ -12,6 +12,7 @@ import dispersed
 import numpy as np
 import pytest
 from process import Run
+from single_case import realised
 from test_aspect import axis_path
 from test_sun_fired import model_of
 
@@ -20,11 +21,8 @@ from nutdamp.aspect import aspects
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.kernel import ClosedForm
-from nutdamp.dispersion.single import realised
-from nutdamp.dispersion.study import Fly, Results, Study
+from nutdamp.dispersion.study import Results, Study
 from nutdamp.dispersion.study import run as fly_all
-from nutdamp.files.study_file import load_results, save_results
 from nutdamp.flight import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Disturbance, Keep, Requirement
@@ -42,75 +40,46 @@ def with_directions(model: Model, **fields: object) -> Model:
 
 JETS = dispersed.with_jets()
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
-PLAIN = {
+MODELS = {
     "prolate": with_directions(JETS),
     "oblate, spin reversed": with_directions(dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0)),
     "dissipation": with_directions(dispersed.sinking(JETS)),
-}
-REAL = {
-    **PLAIN,
     "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
     "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
     "blocks": with_directions(model_of()),
 }
 
 
-def end_of(made: Flight, last: float) -> float:
-    """When the axis has gone round H once more after the ``last`` pulse."""
+def end_of(made: Flight) -> float:
+    """When the axis has gone round H once more after the last pulse."""
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
-    return last + math.pi * (made.moments[0] + made.moments[1]) / size
+    return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
 
 
-def check(model: Model, fly: Fly, *, by_sum: bool = False) -> None:
+@pytest.mark.few(3)
+@pytest.mark.parametrize("name", MODELS)
+def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
+    model = MODELS[name]
     draws = dispersed.first_cases(Study(model), CASES)
-    found = fly(model.cases(draws)).aspects
+    found = RealWidths(model)(model.cases(draws)).aspects
     assert found is not None
     for case in range(0, CASES, 3):
         true, made = realised(model, dispersed.one_of(draws, case))
-        alone = (flight.by_impulses if by_sum else flight.flown)(true, made)
-        last = made.pulses[-1].t if by_sum else made.end
-        for one, (least, largest) in zip(aspects(alone, end_of(alone, last)), found[:, :, case], strict=False):
+        alone = flight.flown(true, made)
+        for one, (least, largest) in zip(aspects(alone, end_of(alone)), found[:, :, case], strict=False):
             assert (least, largest) == pytest.approx((one.least, one.largest), abs=2e-5)
             if one.keep.name != "3":  # near no direction but that of the axis itself
                 assert (least, largest) == pytest.approx((one.least, one.largest), abs=1e-6)
 
 
-@pytest.mark.few(3)
-@pytest.mark.parametrize("name", REAL)
-def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
-    check(REAL[name], RealWidths(REAL[name]))
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_by_the_impulse_sum_they_are_those_of_that_flight(name: str) -> None:
-    check(PLAIN[name], ClosedForm(PLAIN[name]), by_sum=True)
-
-
-def test_pulses_in_another_order_in_some_cases() -> None:
-    """Two of the pulses come 20 ms one after the other, with timing errors of 5 ms each, and 0.1 s in one case."""
-    model = PLAIN["oblate, spin reversed"]
-    draws = dispersed.first_cases(Study(model), CASES)
-    draws["timing pulse 2"][3] += 0.1
-    _, second, third = (
-        start + 0.5 * lasts for start, lasts in zip(model.cases(draws).starts, model.on_times, strict=True)
-    )
-    assert 0 < np.count_nonzero(second > third) < CASES
-    assert (second > third)[3]
-    found = ClosedForm(model)(model.cases(draws)).aspects
-    alone = ClosedForm(model)(model.cases({name: draw[3:4] for name, draw in draws.items()})).aspects
-    assert found is not None
-    assert alone is not None
-    assert found[:, :, 3] == pytest.approx(alone[:, :, 0], abs=1e-12)
-
-
 def test_the_reference_integrator_sees_the_same_angles() -> None:
-    model = REAL["three moments"]
+    model = MODELS["three moments"]
     draws = dispersed.first_cases(Study(model), CASES)
     found = RealWidths(model)(model.cases(draws)).aspects
     assert found is not None
     for case in (0, 5):
         true, made = realised(model, dispersed.one_of(draws, case))
-        path = axis_path(true, made, end_of(flight.flown(true, made), made.end), 400)
+        path = axis_path(true, made, end_of(flight.flown(true, made)), 400)
         for keep, (least, largest) in zip(model.spacecraft.keep[:3], found[:, :, case], strict=False):
             angles = attitude.angle_between(path, keep.direction)
             assert (least, largest) == pytest.approx((angles.min(), angles.max()), abs=1e-5)
@@ -150,16 +119,6 @@ def test_without_a_requirement_cones_alone_make_cases_comply_or_not() -> None:
     for limit, share in ((least - 1e-3, 1.0), (least + 1e-6, 299 / 300), (math.pi, 0.0)):
         cone = replace(body, keep=(replace(body.keep[0], least=limit),))
         assert fly_all(Results(study_of(cone, results.study.model.schedule), 300)).met_fraction == share
-
-
-def test_a_study_taken_up_again_counts_the_same(tmp_path: Path) -> None:
-    path, whole = str(tmp_path / "kept.npz"), kept(14.8, 3000)
-    save_results(path, kept(14.8, 1000))
-    again = fly_all(load_results(path, whole.study, 3000))
-    assert (again.met, again.broken.tolist()) == (whole.met, whole.broken.tolist())
-    assert 0 < whole.met < 3000
-    assert np.array_equal(again.aspects, whole.aspects)
-    assert kept(14.8, 10).study.fingerprint != kept(14.9, 10).study.fingerprint
 
 
 FILE = """
@@ -208,7 +167,7 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_csv_has_the_angles_of_each_case_also_of_those_resumed(run: Run, keeper: Path, tmp_path: Path) -> None:
+def test_the_csv_has_the_angles_of_each_case(run: Run, keeper: Path, tmp_path: Path) -> None:
     arguments = (
         "disperse",
         str(keeper),
@@ -216,10 +175,7 @@ def test_the_csv_has_the_angles_of_each_case_also_of_those_resumed(run: Run, kee
         "half-cone",
         "--csv",
         str(tmp_path / "s.csv"),
-        "--resume",
-        str(tmp_path / "kept"),
     )
-    run(*arguments, "--samples", "100")
     found = json.loads(run(*arguments, "--samples", "300", "--json", "-").stdout)
     rows = list(csv.DictReader((tmp_path / "s.csv").read_text().splitlines()))
     assert list(rows[0])[-3:] == ["propellant_kg", "Sun_least_deg", "Sun_largest_deg"]
@@ -232,14 +188,11 @@ def test_the_csv_has_the_angles_of_each_case_also_of_those_resumed(run: Run, kee
         (angles,) = worst["aspects"]
         assert least[worst["case"] - 1] == pytest.approx(angles["least_deg"], abs=1e-9)
         assert largest[worst["case"] - 1] == pytest.approx(angles["largest_deg"], abs=1e-9)
-    resumed = (tmp_path / "s.csv").read_bytes()
-    run(*arguments[:-2], "--samples", "300")
-    assert (tmp_path / "s.csv").read_bytes() == resumed
     both = []
     for cone in ("keep: [{name: Sun, direction: sun, min: 1 deg}]\n", ""):  # so far away that nothing is routed
         lines = FILE.splitlines(keepends=True)
         keeper.write_text("".join(cone if line.startswith("keep") else line for line in lines))
-        run(*arguments[:-2], "--samples", "300")
+        run(*arguments, "--samples", "300")
         both.append((tmp_path / "s.csv").read_bytes().splitlines())
     assert both[1] == [line.rsplit(b",", 2)[0] for line in both[0]]
 

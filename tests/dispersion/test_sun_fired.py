@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import dispersed
 import numpy as np
 import pytest
 from builders import channel, cross, spinner
-from process import Run
-from spinners import FILE, commanded, flown_by_reference
+from single_case import flown_outputs, realised, timed
+from spinners import commanded, flown_by_reference
 
 from nutdamp import flight
 from nutdamp.commands import Block, SunSensor
@@ -21,9 +20,7 @@ from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.outputs import OUTPUTS, measure
-from nutdamp.dispersion.single import flown_outputs, realised
 from nutdamp.dispersion.study import Results, run
-from nutdamp.errors import BadRequest
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Trapezoid
 from nutdamp.schemes.tools.sun_pulses import fired
@@ -77,7 +74,7 @@ def three_moments(spin: float) -> Model:
 )
 def test_each_case_fires_as_its_own_body_alone(model: Model) -> None:
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
-    timed = RealWidths(model).timed(model.cases(draws))
+    own = timed(model, model.cases(draws))
     found = np.empty((len(OUTPUTS), CASES))
     measure(model, RealWidths(model)(model.cases(draws)), found)
     planned = np.array([pulse.start for pulse in model.schedule])
@@ -85,7 +82,7 @@ def test_each_case_fires_as_its_own_body_alone(model: Model) -> None:
         one = dispersed.one_of(draws, case)
         true, _ = realised(model, one)
         starts = np.array([pulse.start for pulse in fired(true, model.schedule.blocks)])
-        assert np.array([start[case] for start in timed.starts]) == pytest.approx(starts, abs=1e-9)
+        assert np.array([start[case] for start in own.starts]) == pytest.approx(starts, abs=1e-9)
         assert np.abs(starts - planned).max() > 0.05  # at planned times they would be elsewhere
         assert found[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
 
@@ -97,14 +94,14 @@ def test_cases_fire_what_their_valves_give() -> None:
     body = replace(model.spacecraft, channels=tuple(one.of(valve=valve) for one in model.spacecraft.channels))
     model = Model(body, fired(body, model.schedule.blocks))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
-    timed = RealWidths(model).timed(model.cases(draws))
+    own = timed(model, model.cases(draws))
     found = np.empty((len(OUTPUTS), CASES))
     measure(model, RealWidths(model)(model.cases(draws)), found)
     for case in (2, 11):
         one = dispersed.one_of(draws, case)
         true, _ = realised(model, one)
         made = fired(true, model.schedule.blocks)
-        middles = [start[case] + 0.5 * width for start, width in zip(timed.starts, model.on_times, strict=True)]
+        middles = [start[case] + 0.5 * width for start, width in zip(own.starts, model.on_times, strict=True)]
         assert middles == pytest.approx([pulse.t for pulse in made], abs=1e-9)
         assert np.abs(np.array(middles) - [pulse.t for pulse in model.schedule]).max() > 0.05
         settled = flight.flown(true, made).settled
@@ -117,11 +114,11 @@ def test_and_as_the_reference_has_it() -> None:
     """Euler's equations by DOP853, Sun pulses as their roots."""
     model = model_of()
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 4)
-    timed = RealWidths(model).timed(model.cases(draws))
+    own = timed(model, model.cases(draws))
     for case in (0, 3):
         true, _ = realised(model, dispersed.one_of(draws, case))
         _, starts = flown_by_reference(true, model.schedule.blocks)
-        assert [start[case] for start in timed.starts] == pytest.approx(starts, abs=1e-7)
+        assert [start[case] for start in own.starts] == pytest.approx(starts, abs=1e-7)
 
 
 def test_errors_of_timing_and_of_the_attitude_are_those_of_the_case() -> None:
@@ -132,12 +129,12 @@ def test_errors_of_timing_and_of_the_attitude_are_those_of_the_case() -> None:
     assert names.count("Sun pulse 15") == 1
     assert sum(name.startswith("Sun pulse") for name in names) == len(model.schedule)
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), CASES)
-    timed = RealWidths(model).timed(model.cases(draws))
+    own = timed(model, model.cases(draws))
     one = dispersed.one_of(draws, 5)
     true, _ = realised(model, {name: draw for name, draw in one.items() if name.startswith("attitude")})
     late = one["timing offset"] + one["timing pulse 1"] + one["Sun pulse 1"]
     first = fired(replace(true, sun_sensor=SunSensor(0.4)), model.schedule.blocks[:1]).pulses[0]
-    assert timed.starts[0][5] == pytest.approx(first.start + late, abs=1e-9)
+    assert own.starts[0][5] == pytest.approx(first.start + late, abs=1e-9)
 
 
 def test_an_error_of_the_spin_turns_no_heading() -> None:
@@ -156,9 +153,9 @@ def test_a_sensor_that_loses_the_sun_fires_nothing() -> None:
     body = model.spacecraft
     ends = RealWidths(model)(model.cases({}))
     blind = replace(body, sun_sensor=SunSensor(0.4, elevation=1.4, half_width=0.1), dispersions=BODY)
-    left = RealWidths(Model(blind, model.schedule))
-    timed, gone = left.timed(model.cases({})), left(model.cases({}))
-    assert not np.array(timed.impulses).any()
+    blinded = Model(blind, model.schedule)
+    own, gone = timed(blinded, model.cases({})), RealWidths(blinded)(model.cases({}))
+    assert not np.array(own.impulses).any()
     assert gone.propellant is None or float(np.max(gone.propellant)) == 0.0
     assert float(np.squeeze(gone.spin_change)) == pytest.approx(0.0, abs=1e-12)
     assert abs(float(np.squeeze(ends.spin_change))) > 1e-3
@@ -176,20 +173,3 @@ def test_sensitivities_are_those_of_pulses_fired_by_the_sun() -> None:
         index = [entry.name for entry in first.inputs].index(name)
         expected = derivative(model, name, 1e-3 * first.inputs[index].size)["spin_change"]
         assert first.jacobian[8, index] == pytest.approx(expected, rel=1e-4, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_a_single_case_ends_alike_by_both_models(run: Run, tmp_path: Path) -> None:
-    """By the impulse sum too it fires from its own Sun pulses."""
-    (tmp_path / "f.yaml").write_text(FILE + DISPERSED)
-    done = run("disperse", "f.yaml", "--target", "20deg,82deg", "--scheme", "command-block", "--case", "7")
-    assert done.returncode == 0, done.stderr
-    row = next(line for line in done.stdout.splitlines() if line.startswith("error of H"))
-    impulses, flown = (float(row.split()[index]) for index in (4, 6))
-    assert impulses == pytest.approx(flown, abs=0.02)
-
-
-def test_the_impulse_sum_is_refused() -> None:
-    model = model_of()
-    with pytest.raises(BadRequest, match="Sun pulses of each case; leave --impulses out"):
-        study_of(model.spacecraft, model.schedule, flown=False)

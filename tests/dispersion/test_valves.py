@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import channel, spinner
+from single_case import flown_outputs
 
 from nutdamp import planning
 from nutdamp.dispersion import study_of
@@ -16,7 +17,6 @@ from nutdamp.dispersion.draws import Source
 from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.inputs import list_inputs
 from nutdamp.dispersion.kernel import ClosedForm
-from nutdamp.dispersion.single import flown_outputs
 from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import FaultyFile
 from nutdamp.files.spacecraft_file import read_spacecraft

@@ -311,7 +311,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))
     assert found.recommended is not None
     assert found.recommended.meets_requirement
-    results = Results(study_of(found.spacecraft, found.recommended.pulses, flown=True), 1000)
+    results = Results(study_of(found.spacecraft, found.recommended.pulses), 1000)
     run(results, threads=1)
     make = report_page if good else plain_page
     made = make(found, Repeat("", "", ""), dispersed={"two-pulse": results})

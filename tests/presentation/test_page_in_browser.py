@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
+from nutdamp import load
 from nutdamp.comparison import compare
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
+from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.html import page_html
 from nutdamp.schemes import CLASSIC, COMMANDED
@@ -76,7 +77,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             flown = {}
             if name.endswith(DISPERSED):
                 assert compared.recommended is not None
-                results = Results(study_of(compared.spacecraft, compared.recommended.pulses, flown=True), 500)
+                results = Results(study_of(compared.spacecraft, compared.recommended.pulses), 500)
                 flown[compared.recommended.scheme] = run(results, threads=1)
             made = report_page(compared, repeat, dispersed=flown)
             target.write_text(page_html(made), encoding="utf-8")
@@ -187,7 +188,7 @@ def test_a_click_sorts_and_another_turns_it(tab: Browse) -> None:
         assert [one for one in sorting(page) if one] == ["ascending"]
         marked = page.locator("#schemes tr.mark th").text_content()
         ace = next(path for path in CONFIGS if path.stem == "ace")
-        recommended = compare(load_spacecraft(ace), CLASSIC).recommended
+        recommended = compare(load(ace), CLASSIC).recommended
         assert recommended is not None
         assert marked == recommended.scheme
 

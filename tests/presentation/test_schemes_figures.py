@@ -152,7 +152,7 @@ def test_the_floor_is_that_of_what_optimal_leaves() -> None:
 
 def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
     pulses = planning.plan(BODY, "two-pulse").pulses
-    cases = {"two-pulse": cases_of(run(Results(dispersion.study_of(BODY, pulses, flown=False), 3000)))}
+    cases = {"two-pulse": cases_of(run(Results(dispersion.study_of(BODY, pulses), 3000)))}
     chosen = compared().recommended
     assert chosen is not None
     cases[chosen.scheme] = cases["two-pulse"]

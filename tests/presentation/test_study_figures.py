@@ -39,7 +39,7 @@ def study(which: str = "shift", count: int = 3000) -> Results:
     body = BODY if which == "shift" else POINTED
     plan = planning.plan(body, "two-pulse")
     assert plan.feasible, plan.why
-    return run(Results(dispersion.study_of(body, plan.pulses, flown=False), count))
+    return run(Results(dispersion.study_of(body, plan.pulses), count))
 
 
 @cache
@@ -57,7 +57,7 @@ def test_studies_are_drawn_whole_and_say_what_is_met(name: str, which: str) -> N
     figure = drawn(name, which)
     check_layout(figure)
     heading = " ".join(figure.get_suptitle().split())
-    assert heading.startswith("test: two-pulse by impulse sum (17), 3,000 dispersed cases requirement ")
+    assert heading.startswith("test: two-pulse by real pulse widths, 3,000 dispersed cases requirement ")
     assert re.search(r"(NOT met|met): [\d.]+ % of cases comply \(99\.7 % required\)", heading)
 
 
@@ -114,7 +114,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
     dispersions = replace(STILL.dispersions or Dispersions(), timing_offset=Tolerance("bias", bias) if bias else None)
     body = replace(STILL, dispersions=dispersions)
-    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False)
+    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses)
     results = run(Results(made, 50))
     figure = figures.dispersion_figure("cases", results, scheme="two-pulse")
     check_layout(figure)
@@ -151,7 +151,7 @@ def test_the_cloud_says_how_many_of_how_many_cases_it_shows() -> None:
 def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
     thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
     body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
-    found = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False), 500))
+    found = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses), 500))
     figure = figures.dispersion_figure("momentum", found, scheme="two-pulse")
     check_layout(figure)
     ticks = figure.axes[0].get_xticklabels()
@@ -225,7 +225,7 @@ def test_the_tornado_has_the_rows_and_effects_of_the_table() -> None:
 
 def test_nothing_that_varies_is_an_empty_tornado() -> None:
     body = replace(BODY, dispersions=Dispersions(timing_offset=Tolerance("bias", 0.01)))
-    results = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False), 50))
+    results = run(Results(dispersion.study_of(body, planning.plan(body, "two-pulse").pulses), 50))
     for name in NAMES:
         check_layout(figures.dispersion_figure(name, results, scheme="two-pulse"))
 

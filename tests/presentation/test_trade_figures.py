@@ -177,7 +177,7 @@ def costed() -> Figure:
     levels = {Part.NUTATION: 0.1, Part.SHIFT: 0.0}
     fared = [Candidate(plan, "", Cases(1_000, 1, met, 0.997, levels)) for plan, met in zip(plans, SHARES, strict=True)]
     least = Comparison(plans[0].spacecraft, tuple(plans))
-    found = RobustComparison(least, tuple(fared), None, None, None, 1, False, 0.997, 1_000, 1, True)
+    found = RobustComparison(least, tuple(fared), None, None, None, 1, False, 0.997, 1_000, 1)
     return figures.front_figure(found)
 
 

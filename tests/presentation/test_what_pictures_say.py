@@ -40,7 +40,7 @@ def test_captions_of_dispersed_cases_name_no_bias_and_no_bound_that_is_not_drawn
 ) -> None:
     offset = Tolerance("bias", 0.01) if biased else None
     body = replace(BODY, requirement=required, dispersions=replace(SPREAD, timing_offset=offset))
-    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses, flown=False)
+    made = dispersion.study_of(body, planning.plan(body, "two-pulse").pulses)
     _, momentum, budget = dispersion_pictures_of(run(Results(made, 50)), "two-pulse")
     assert ("required" in momentum.caption) == (required is not None and required.momentum_shift is not None)
     assert ("bias" in budget.caption) == biased

@@ -61,7 +61,7 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     """The figure ``overview``, ``cases``, ``momentum`` or ``budget``; raises KeyError for others."""
     study = results.study
     figure = DRAWN[name](results)
-    how = model_name([study.model.schedule]) if study.flown else "impulse sum (17)"
+    how = model_name([study.model.schedule])
     shown = f"{scheme} by {how}, {results.done:,} dispersed cases"
     share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"

@@ -8,19 +8,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp import flight
-from nutdamp.dispersion.cases import Model, Thrusting
+from nutdamp.dispersion import sun_fired
+from nutdamp.dispersion.cases import DispersedCases, Model, Thrusting
 from nutdamp.dispersion.draws import Draws
-from nutdamp.dispersion.flown import RealWidths
-from nutdamp.physics import attitude
+from nutdamp.dispersion.elementwise import triple
+from nutdamp.dispersion.watched import number_of
+from nutdamp.dynamics import make_dynamics
+from nutdamp.physics import attitude, rigid_cases
+from nutdamp.physics.valve import Ramp
 from nutdamp.schedule import Command, Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Spacecraft
 
 Array = NDArray[np.float64]
 
 
+def timed(model: Model, cases: DispersedCases) -> DispersedCases:
+    """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they are."""
+    if not model.schedule.blocks:
+        return cases
+    count, dynamics = number_of(cases), make_dynamics(model.spacecraft)
+    moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
+    upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
+    bodies = rigid_cases.Bodies(moments, dynamics.constant, dynamics.forcing)
+    fired = sun_fired.fly(model, bodies, rates, upright, cases)
+    pulses = zip(cases.impulses, fired.seen, strict=True)
+    impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
+    return replace(cases, starts=tuple(fired.starts), impulses=impulses)
+
+
 def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
-    body, case = model.spacecraft, RealWidths(model).timed(model.cases(draws))
+    body, case = model.spacecraft, timed(model, model.cases(draws))
     pulses, spent = [], case.spent or (None,) * len(case.starts)
     for number, (planned, used) in enumerate(zip(model.schedule, spent, strict=True)):
         width, start = case.widths[number], case.starts[number]
@@ -60,8 +78,6 @@ def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
 
 def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int) -> Pulse:
     """What one of ``count`` thrusters gives of a pulse, as a pulse of its own; its command begins at ``start`` s."""
-    from nutdamp.physics.valve import Ramp  # few spacecraft have any
-
     acts, centroid, _ = (float(np.squeeze(part)) for part in one.opened.acts)
     ramps = []
     for begin, length, level, lean in (tuple(float(np.squeeze(part)) for part in piece) for piece in one.opened.pieces):
