@@ -1,64 +1,29 @@
-"""Fixtures for all tests."""
+"""Fixtures for all tests. Nothing is shared between tests but what a test asks for by name."""
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any
 
 # Matrices are small here: several threads to multiply them wait for each other, the more the busier the machine is.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import HealthCheck, settings
-from pages import unpictured
-from planned_once import Planner
-from process import Run, apart, within
-from samples import mark_few
+from support.pages import unpictured
+from support.planner import Planner
+from support.process import Run, apart, within
 
 from nutdamp import schemes
 
-PLANNED_ONCE = (
-    "cli",
-    "presentation",
-    "files",
-    "test_library_results.py",
-    "test_readme.py",
-    "test_verification.py",
-    "test_where_it_points.py",
-)
-"""Folders and modules of tests of what is made of plans: these may share them."""
-
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
-settings.register_profile("project", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "project", deadline=None, derandomize=True, max_examples=25, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("project")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """What the marks ``few``, ``orekit`` and ``browser`` say.
-
-    Orekit's Java machine and the solver do not share a process well, and a browser takes as long as a sixth of all
-    other tests: these run when they are requested.
-    """
-    mark_few(items)
-    for mark, what in (("orekit", "against Orekit"), ("browser", "in a browser")):
-        if mark not in config.getoption("markexpr"):
-            for item in items:
-                if mark in item.keywords:
-                    item.add_marker(pytest.mark.skip(reason=f"NOT CHECKED {what} here: pytest -m {mark}"))
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _nothing_kept(request: pytest.FixtureRequest) -> Iterator[None]:
-    """What functions of a module of tests have cached (hundreds of figures) goes with the last test of the module."""
-    yield
-    for found in vars(request.module).values():
-        if hasattr(found, "cache_clear") and found.__module__ == request.module.__name__:
-            found.cache_clear()
 
 
 @pytest.fixture
@@ -69,8 +34,20 @@ def run(tmp_path: Path) -> Run:
 
 @pytest.fixture
 def run_apart(tmp_path: Path) -> Run:
-    """The same as a process of its own, for what only a process shows."""
+    """The same as a process of its own, for signals and streams."""
     return functools.partial(apart, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def planned() -> Planner:
+    """Plans kept for the session: ``planned(spacecraft, "two-pulse")`` searches once for each body and scheme."""
+    return Planner()
+
+
+@pytest.fixture
+def plans_shared(planned: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands and library calls of this test take their schedules from `planned`."""
+    monkeypatch.setattr(schemes, "schedule", planned.schedule)
 
 
 @pytest.fixture
@@ -80,63 +57,30 @@ def plain_pages() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """A running browser."""
-    from browser_finder import browser as found
-
-    why = "NOT CHECKED in a browser: "
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
-    )
-    executable = found()
-    if executable is None:
-        pytest.skip(f"{why}no Chromium, Chrome or Edge is installed")
-    root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=executable, args=root)
-        yield browser
-        browser.close()
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option ``--cpu``."""
+    parser.addoption("--cpu", type=int, default=0, help="list the N test functions that take most CPU time")
 
 
-@pytest.fixture
-def browse(chromium: Any) -> Callable[..., Any]:
-    """Opens a file in a new tab; whatever the browser complains of or fetches from elsewhere fails the test.
-
-    ``browse(path, width=1400, scheme="light", **context)`` is entered with ``with``.
-    """
-
-    @contextmanager
-    def opened(path: Path, width: int = 1400, scheme: str = "light", **options: Any) -> Iterator[Any]:
-        said: list[str] = []
-        context = chromium.new_context(
-            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True, **options
-        )
-        page = context.new_page()
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in ("file:", "data:") else 0)
-        page.goto(path.as_uri())
-        yield page
-        context.close()
-        assert said == []
-
-    return opened
+_cpu: Counter[str] = Counter()
 
 
-_planner = Planner()
-
-
-@pytest.fixture(autouse=True)
-def _planned_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In some folders, what is planned once is kept for all tests there; the mark ``plans_anew`` says which do not."""
-    folders = request.path.relative_to(Path(__file__).parent).parts
-    if folders[0] in PLANNED_ONCE and "plans_anew" not in request.keywords:
-        monkeypatch.setattr(schemes, "schedule", _planner.schedule)
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """CPU time of each function, fixtures included, summed over its cases."""
+    start = sum(os.times()[:4])
+    try:
+        return (yield)
+    finally:
+        _cpu[item.nodeid.partition("[")[0]] += sum(os.times()[:4]) - start
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What could not be checked on this machine is said aloud, once for each reason."""
+    """What takes longest, where that is asked for; what could not be checked here is said aloud, once a reason."""
+    if most := terminalreporter.config.getoption("cpu"):
+        terminalreporter.write_line(f"{_cpu.total():8.2f} s of CPU in {len(_cpu)} functions (of this process)")
+        for name, spent in _cpu.most_common(most):
+            terminalreporter.write_line(f"{spent:8.2f} s  {name}")
     skipped = terminalreporter.stats.get("skipped", [])
     reasons = {str(report.longrepr[2]) for report in skipped if isinstance(report.longrepr, tuple)}
     for reason in sorted(reason.removeprefix("Skipped: ") for reason in reasons if "NOT CHECKED" in reason):

@@ -23,7 +23,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from single_case import realised
+from support.single_case import realised
 
 from nutdamp import flight, load, planning
 from nutdamp.dispersion import study_of

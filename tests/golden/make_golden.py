@@ -18,8 +18,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-import reference
-from reference import Kick, Push, vector
+from support import reference
+from support.reference import Kick, Push, vector
 
 FILE = Path(__file__).with_name("golden.json")
 

@@ -16,7 +16,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import rivals
+from support import rivals
 
 FILE = Path(__file__).with_name("rivals.json")
 

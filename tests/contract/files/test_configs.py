@@ -1,0 +1,45 @@
+"""Every file in configs/ says where its figures come from, loads, and is planned with a sensible answer."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from support import places
+
+from nutdamp.comparison import compare
+from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.remarks import broken_limits, infeasibility
+from nutdamp.schemes import CLASSIC
+
+FILES = sorted((places.CONFIGS).glob("*.yaml"))
+
+
+def test_there_are_at_least_eight() -> None:
+    assert len(FILES) >= 8
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.stem))
+def test_it_names_its_sources(path: Path) -> None:
+    comment = [line for line in path.read_text(encoding="utf-8").splitlines()[:30] if line.startswith("#")]
+    assert len(comment) >= 3
+    assert any("assumed" in line.lower() for line in comment)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.stem))
+def test_it_is_planned(path: Path) -> None:
+    spacecraft = load_spacecraft(path)
+    compared = compare(spacecraft, CLASSIC)
+    best = compared.recommended
+    assert best is not None
+    assert best.flown is not None
+    assert best.flown.nutation < 0.1 * spacecraft.nutation
+    assert best.meets_requirement is not False
+    for plan in compared.plans:
+        assert plan.feasible or infeasibility(plan)
+        assert broken_limits(spacecraft, plan.pulses) == []
+        if plan.feasible and spacecraft.inertia.symmetric and plan.residual is not None:
+            # Nothing beats the floor down to what is left: A|ω0| - C|ω3| tan θ.
+            left = spacecraft.inertia.C * abs(spacecraft.spin) * math.tan(plan.residual.nutation)
+            assert plan.pulses.total_impulse >= (spacecraft.least_impulse - left) * (1 - 1e-3)

@@ -1,0 +1,386 @@
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from support import reference
+
+from nutdamp.actuators import STANDARD_GRAVITY
+from nutdamp.errors import CannotRead, FaultyFile
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft
+from nutdamp.tolerances import Tolerance
+
+pytestmark = pytest.mark.usefixtures("plans_shared")
+
+EVERYTHING = """\
+name: Sounder-1
+mass: 250 kg                               # optional
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+omega0: [0.12, 0.05, 3.0]
+attitude:
+  {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [2, 0, 0, 0]}
+thrusters:
+  - {name: T1, position: [0, 0.5, 0.8], direction: [2, 0, 0], force: 10 N,
+     isp: 220 s, min_on_time: 20 ms, max_on_time: 2 s}
+  - {name: T2, torque: [0, -8, 0], isp: 220 s, lever_arm: 0.8 m}
+channels: {+M1: [T1, T2], 1: [T2]}
+steerable: {torque: 20 N m, isp: 220 s, lever_arm: 1 m}
+requirement: {nutation: 0.5 deg, momentum_shift: 0.2 deg}
+limits: {horizon: 120 s, earliest: 5 s, gap: 0.5 s, tick: 1 ms, max_pulses: 8, blackout: [[10 s, 20 s], [1 min, 1 min]]}
+"""
+
+
+def read(text: str) -> Spacecraft:
+    return read_spacecraft(text, "f.yaml")
+
+
+def channel(spacecraft: Spacecraft, name: str) -> Channel:
+    return next(channel for channel in spacecraft.channels if channel.name == name)
+
+
+def test_everything_a_file_can_say() -> None:
+    craft = read(EVERYTHING)
+    assert (craft.name, craft.mass) == ("Sounder-1", 250.0)
+    assert craft.inertia.moments == (120.0, 120.0, 80.0)
+    assert craft.inertia.aligned
+    assert_array_equal(craft.omega0, [0.12, 0.05, 3.0])
+    assert craft.attitude is not None
+    assert_array_equal(craft.attitude.quaternion, [1, 0, 0, 0])
+    assert (craft.attitude.epoch, craft.attitude.frame) == ("2026-03-01T12:00:00Z", "EME2000")
+    assert [channel.name for channel in craft.channels] == ["+M1", "1"]
+    first, second = channel(craft, "+M1").thrusters
+    assert_allclose(first.torque, [0, 8, -5], atol=0, rtol=1e-15)
+    assert first.force is not None
+    assert_array_equal(first.force, [10, 0, 0])
+    assert (first.thrust, first.isp, first.min_on_time, first.max_on_time) == (10.0, 220.0, 0.02, 2.0)
+    assert_array_equal(second.torque, [0, -8, 0])
+    assert (second.force, second.thrust, second.min_on_time, second.max_on_time) == (None, 10.0, 0.0, math.inf)
+    assert second.mass_flow == pytest.approx(10.0 / (220.0 * STANDARD_GRAVITY))
+    assert craft.steerable is not None
+    assert (craft.steerable.torque, craft.steerable.isp, craft.steerable.lever_arm) == (20.0, 220.0, 1.0)
+    assert craft.requirement is not None
+    assert craft.requirement.nutation == pytest.approx(math.radians(0.5))
+    assert craft.requirement.momentum_shift == pytest.approx(math.radians(0.2))
+    assert craft.limits == Limits(120.0, 5.0, 0.5, 0.001, 8, ((10.0, 20.0), (60.0, 60.0)))
+
+
+def test_the_least_a_file_must_say() -> None:
+    craft = read("{name: Sat, inertia: {A: 1, C: 2}, omega0: [0, 0, -1e-3]}")
+    assert (craft.mass, craft.attitude, craft.channels, craft.steerable, craft.requirement) == (
+        None,
+        None,
+        (),
+        None,
+        None,
+    )
+    assert craft.limits == Limits()
+    assert (craft.disturbances, craft.dissipation, craft.growth) == ((), None, 0.0)
+    assert craft.torquer is not None
+    assert craft.torquer.torque is None
+
+
+def test_json_is_a_spacecraft_file(tmp_path: Path) -> None:
+    path = tmp_path / "spacecraft.json"
+    contents = {"name": "Sat ☉", "inertia": {"A": 1e2, "C": "80 kg m²"}, "omega0": [0.1, 0, "30 rpm"]}
+    path.write_text(json.dumps(contents, indent="\t"), "utf-8")
+    craft = load_spacecraft(path)
+    assert craft.name == "Sat ☉"
+    assert craft.spin == pytest.approx(math.pi)
+
+
+def test_loading_takes_a_path_or_its_text(tmp_path: Path) -> None:
+    path = tmp_path / "spacecraft.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + EVERYTHING.replace("\n", "\r\n").encode())
+    assert load_spacecraft(path).name == load_spacecraft(str(path)).name == "Sounder-1"
+    with pytest.raises(CannotRead, match=r"none\.yaml"):
+        load_spacecraft(tmp_path / "none.yaml")
+    path.write_text("{}")
+    with pytest.raises(FaultyFile, match=re.escape(f"{path}:1:1: name: missing")):
+        load_spacecraft(path)
+
+
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+@pytest.mark.parametrize("phase", [0.0, 40.0, -200.0])
+@pytest.mark.parametrize("nutation", [0.0, 1e-9, 5.0, 89.0])
+def test_a_state_comes_back_from_the_rates(spin: float, phase: float, nutation: float) -> None:
+    craft = read(
+        "{name: Sat, inertia: {A: 120, C: 80}, "
+        f"state: {{spin: {spin}, nutation: {nutation} deg, phase: {phase} deg}}}}"
+    )
+    assert craft.spin == spin
+    assert craft.nutation == pytest.approx(math.radians(nutation), rel=1e-14)
+    if nutation:
+        turns = (math.atan2(craft.omega0[1], craft.omega0[0]) - math.radians(phase)) / (2 * math.pi)
+        assert turns == pytest.approx(round(turns), abs=1e-15)
+
+
+def test_the_phase_of_a_state_is_zero_by_default() -> None:
+    craft = read("{name: Sat, inertia: {A: 120, C: 80}, state: {spin: 30 rpm, nutation: 5 deg}}")
+    assert craft.omega0[0] > 0
+    assert craft.omega0[1] == 0
+
+
+def test_a_thruster_is_a_channel_of_its_own_without_channels() -> None:
+    craft = read(
+        "{name: S, inertia: {A: 1, C: 1}, omega0: [0, 0, 1], "
+        "thrusters: [{name: a, torque: [1, 0, 0]}, {name: b, torque: [0, 1, 0]}]}"
+    )
+    assert [(channel.name, channel.thrusters[0].name) for channel in craft.channels] == [("a", "a"), ("b", "b")]
+
+
+def test_a_torque_without_lever_arm_leaves_the_thrust_open() -> None:
+    craft = read(
+        "{name: S, inertia: {A: 1, C: 1}, omega0: [0, 0, 1], thrusters: [{name: a, torque: [1, 0, 0], isp: 220}]}"
+    )
+    assert craft.channels[0].thrusters[0].thrust is None
+    assert craft.channels[0].mass_flow is None
+
+
+def test_an_empty_requirement_asks_nothing() -> None:
+    assert read("{name: S, inertia: {A: 1, C: 1}, omega0: [0, 0, 1], requirement: {}}").requirement is None
+
+
+@pytest.mark.parametrize("moments", ["A: 1, C: 2", "tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]", "A: 1e-3, C: 2e-3"])
+def test_the_flat_disc_is_allowed(moments: str) -> None:
+    assert read(f"{{name: S, inertia: {{{moments}}}, omega0: [0, 0, 1]}}").inertia.a == -1.0
+
+
+@pytest.mark.parametrize(
+    "epoch", ["2026-03-01T12:00", "2026-03-01T12:00:00", "2026-03-01T12:00:00.123456789Z", "2024-02-29T23:59:59+01:00"]
+)
+def test_epochs_stay_as_they_are_written(epoch: str) -> None:
+    text = "{name: S, inertia: {A: 1, C: 1}, omega0: [0, 0, 1], "
+    craft = read(f"{text}attitude: {{quaternion: [1, 0, 0, 0], epoch: {epoch}}}}}")
+    assert craft.attitude is not None
+    assert craft.attitude.epoch == epoch
+
+
+def test_a_diagonal_tensor_changes_nothing() -> None:
+    whole = read(EVERYTHING)
+    tensor = read(EVERYTHING.replace("A: 120 kg m^2, C: 80 kg m^2", "tensor: [[120, 0, 0], [0, 120, 0], [0, 0, 80]]"))
+    assert tensor.inertia.aligned
+    assert tensor.inertia.moments == whole.inertia.moments
+    assert_array_equal(tensor.omega0, whole.omega0)
+    assert_array_equal(channel(tensor, "+M1").torque, channel(whole, "+M1").torque)
+
+
+def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
+    turn = attitude.matrix(np.array([0.98, 0.1, -0.12, 0.12]) / np.linalg.norm([0.98, 0.1, -0.12, 0.12]))
+    tensor = turn @ np.diag([130.0, 120.0, 80.0]) @ turn.T
+    position, direction = np.array([0.1, 0.5, 0.8]), np.array([1.0, -0.2, 0.1])
+    omega0, torque = np.array([0.12, 0.05, 3.0]), np.array([0.0, -8.0, 1.0])
+    contents = {
+        "name": "Sat",
+        "inertia": {"tensor": tensor.tolist()},
+        "omega0": (turn @ omega0).tolist(),
+        "attitude": {"quaternion": [0.5, 0.5, -0.5, 0.5]},
+        "thrusters": [
+            {
+                "name": "a",
+                "position": (turn @ position).tolist(),
+                "direction": (turn @ direction).tolist(),
+                "force": 10,
+            },
+            {"name": "b", "torque": (turn @ torque).tolist()},
+        ],
+    }
+    craft = read(json.dumps(contents))
+    # Principal axes have no sense of their own: the file's may come out turned by 180 degrees.
+    axes = craft.inertia.axes
+    signs = np.diag(np.round(axes.T @ turn))
+    assert_allclose(axes * signs, turn, atol=1e-12)
+    assert_allclose(craft.inertia.moments, [130.0, 120.0, 80.0], rtol=1e-13)
+    assert_allclose(craft.omega0 * signs, omega0, atol=1e-13)
+    force = 10 * direction / np.linalg.norm(direction)
+    first, second = craft.channels[0].thrusters[0], craft.channels[1].thrusters[0]
+    assert first.force is not None
+    assert_allclose(first.force * signs, force, atol=1e-13)
+    assert_allclose(first.torque * signs, np.cross(position, force), atol=1e-13)
+    assert_allclose(second.torque * signs, torque, atol=1e-13)
+    # The attitude stays that of the file's axes; the initial state is that of the principal ones.
+    assert craft.attitude is not None
+    momentum = np.diag(craft.inertia.moments) @ craft.omega0
+    assert_allclose(
+        attitude.rotate(craft.initial.quaternion, momentum),
+        attitude.rotate(craft.attitude.quaternion, tensor @ turn @ omega0),
+        rtol=1e-12,
+    )
+
+
+def test_a_tensor_is_symmetric_up_to_rounding() -> None:
+    text = "{name: S, inertia: {tensor: [[2, 0.1, 0], [0.1000000001, 2, 0], [0, 0, 3]]}, omega0: [0, 0, 1]}"
+    assert_allclose(read(text).inertia.moments, [1.9, 2.1, 3.0], rtol=1e-9)
+
+
+def test_the_state_of_a_tensor_file_is_about_its_principal_axis() -> None:
+    text = "{name: S, inertia: {tensor: [[2, 0, 0.1], [0, 2, 0], [0.1, 0, 3]]}, state: {spin: -2, nutation: 5 deg}}"
+    craft = read(text)
+    assert craft.spin == -2.0
+    assert craft.tilt == pytest.approx(math.radians(5), rel=1e-12)
+    assert craft.nutation > 1.005 * craft.tilt
+
+
+@pytest.mark.parametrize("phase", [0.0, 37.0, 90.0, -140.0])
+@pytest.mark.parametrize("spin", [2.0, -2.0])
+def test_the_nutation_of_a_state_is_the_angle_of_h_and_the_spin_axis(spin: float, phase: float) -> None:
+    """In vectors, with I1 ≠ I2 too; the mean of both moments would be up to 1.5 deg off."""
+    craft = read(
+        "{name: S, inertia: {tensor: [[100, 0, 0], [0, 130, 0], [0, 0, 180]]}, "
+        f"state: {{spin: {spin}, nutation: 10 deg, phase: {phase} deg}}}}"
+    )
+    assert craft.spin == spin
+    assert math.degrees(math.atan2(craft.omega0[1], craft.omega0[0])) == pytest.approx(phase, abs=1e-12)
+    momentum = np.array([100.0, 130.0, 180.0]) * craft.omega0
+    angle = math.degrees(reference.angle(momentum, np.array([0.0, 0.0, math.copysign(1.0, spin)])))
+    assert angle == pytest.approx(10.0, rel=1e-13)
+    assert math.degrees(craft.tilt) == pytest.approx(10.0, rel=1e-13)
+
+
+BODY = "name: S\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0.2, -3]\n"
+
+
+@pytest.mark.parametrize(
+    ("entry", "disturbance"),
+    [
+        ("{name: leak, torque: [20 mN m, 0.1, 1e-3]}", Disturbance(0.02 + 0.1j, 0.001, 0.0, "leak")),
+        ("{kind: constant, torque: [0, 0, -1]}", Disturbance(0j, -1.0)),
+        ("{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}", Disturbance(0.005 - 1j, 0.0, 2 * math.pi)),
+        ("{torque: [0, 2, 0], rate: -3}", Disturbance(2j, 0.0, -3.0)),
+        ("{kind: rotating, torque: [1, 0, 0], fixed_in: inertial}", Disturbance(1 + 0j, 0.0, 3.0)),
+        ("{torque: [1, 0, 0], fixed_in: inertial}", Disturbance(1 + 0j, 0.0, 3.0)),
+        ("{kind: axial, torque: -1 mN m}", Disturbance(0j, -0.001)),
+        ("{kind: axial, torque: 2}", Disturbance(0j, 2.0)),
+        ("{kind: axial, torque: [0, 0, 2 N m]}", Disturbance(0j, 2.0)),
+        ("{torque: [1, 0, 1e-13], rate: 2}", Disturbance(1 + 0j, 1e-13, 2.0)),  # rounding, but not dropped
+    ],
+)
+def test_disturbances(entry: str, disturbance: Disturbance) -> None:
+    assert read(f"{BODY}disturbances: [{entry}]").disturbances == (disturbance,)
+
+
+def test_an_empty_list_of_disturbances_disturbs_nothing() -> None:
+    assert read(f"{BODY}disturbances: []").disturbances == ()
+
+
+def test_disturbances_keep_their_order_and_may_share_names_with_thrusters() -> None:
+    craft = read(
+        f"{BODY}thrusters: [{{name: T, torque: [1, 0, 0]}}]\n"
+        "disturbances: [{name: T, torque: [1, 0, 0]}, {torque: [0, 1, 0]}, {torque: [0, 0, 1]}]"
+    )
+    assert [one.name for one in craft.disturbances] == ["T", "", ""]
+    assert [one.transverse for one in craft.disturbances] == [1, 1j, 0]
+
+
+def test_disturbances_are_turned_to_principal_axes_with_nothing_dropped() -> None:
+    craft = read(
+        "{name: S, inertia: {tensor: [[120, 0, 3], [0, 118, 2], [3, 2, 80]]}, omega0: [0.1, 0.2, 3], disturbances: ["
+        "{torque: [0.1, 0.2, 0.3]}, {torque: [0.1, 0.2, 0], rate: 2}, {torque: [0.1, 0.2, 0], fixed_in: inertial}, "
+        "{kind: axial, torque: 0.3}]}"
+    )
+    assert [one.rate for one in craft.disturbances] == [0.0, 2.0, -craft.spin, 0.0]
+    for one, torque in zip(craft.disturbances, [(0.1, 0.2, 0.3), *[(0.1, 0.2, 0)] * 2, (0, 0, 0.3)], strict=True):
+        principal = np.array([one.transverse.real, one.transverse.imag, one.axial])
+        assert np.all(principal != 0.0)
+        assert_allclose(craft.inertia.axes @ principal, torque, atol=1e-16)
+
+
+def test_a_turn_about_axis_3_alone_leaves_no_axial_dust() -> None:
+    craft = read(
+        "{name: S, inertia: {tensor: [[120, 3, 0], [3, 118, 0], [0, 0, 80]]}, omega0: [0.1, 0.2, 3], "
+        "disturbances: [{torque: [0.1, 0.2, 0], rate: 2}, {kind: axial, torque: 1}]}"
+    )
+    turning, axial = craft.disturbances
+    assert turning.axial == 0.0
+    assert abs(turning.transverse) == pytest.approx(math.hypot(0.1, 0.2))
+    assert (axial.transverse, axial.axial) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(("A", "C", "growth"), [(120, 80, 1 / 600), (80, 120, -1 / 600), (80, 80, 0.0)])
+def test_dissipation_lets_nutation_grow_or_decay_by_shape(A: float, C: float, growth: float) -> None:
+    craft = read(f"{{name: S, inertia: {{A: {A}, C: {C}}}, omega0: [0, 0, 1], dissipation: {{time_constant: 10 min}}}}")
+    assert craft.dissipation == 600.0
+    assert craft.growth == pytest.approx(growth)
+
+
+@pytest.mark.parametrize(
+    "tensor",
+    [
+        "[[120, 0, 0], [0, 80, 0], [0, 0, 79.999]]",
+        "[[120, 0, 0], [0, 80, 0], [0, 0, 120.001]]",
+        "[[120, 0, 0], [0, 120, 0], [0, 0, 80]]",
+        "[[80, 0, 0], [0, 80.00000001, 0], [0, 0, 80.00000002]]",
+        "[[80, 0, 0], [0, 80, 0], [0, 0, 80]]",
+        "[[80, 1e-9, 0], [1e-9, 80, 2e-9], [0, 2e-9, 80]]",
+    ],
+)
+def test_spin_about_an_outer_axis_or_of_a_sphere_is_sound(tensor: str) -> None:
+    assert read(f"{{name: S, inertia: {{tensor: {tensor}}}, omega0: [0, 0.1, 1]}}").spin == pytest.approx(1.0, rel=0.2)
+
+
+def test_the_example_is_the_one_it_describes() -> None:
+    craft = read(example_text())
+    assert (craft.name, craft.mass, craft.inertia.moments) == ("Sounder-1", 250.0, (120.0, 120.0, 80.0))
+    assert craft.spin == pytest.approx(math.pi)
+    assert craft.nutation == pytest.approx(math.radians(5))
+    torques = {channel.name: channel.torque.tolist() for channel in craft.channels}
+    assert torques == {"+M1": [8, 0, 0], "-M1": [-8, 0, 0], "+M2": [0, 8, 0], "-M2": [0, -8, 0]}
+    # A handful of pulses of an eighth of the nutation period each removes the nutation.
+    assert 2 < craft.least_impulse / (8.0 * craft.body_period / 8) < 6
+
+
+def uncommented(text: str, *keys: str) -> str:
+    """The example with the commented blocks of ``keys`` taken into use."""
+    for key in keys:
+        block = re.search(rf"^# {key}:.*\n(#  .*\n)*", text, re.MULTILINE)
+        assert block is not None, key
+        text = text.replace(block[0], re.sub(r"^# ", "", block[0], flags=re.MULTILINE))
+    return text
+
+
+def test_what_the_example_shows_in_comments_works() -> None:
+    text = uncommented(
+        example_text(),
+        "attitude",
+        "channels",
+        "steerable",
+        "limits",
+        "disturbances",
+        "dissipation",
+    )
+    craft = read(text.replace("  # - {", "  - {"))
+    assert craft.attitude is not None
+    assert craft.steerable is not None
+    assert [channel.name for channel in craft.channels] == ["upper", "lower"]
+    assert (craft.limits.horizon, craft.limits.blackout) == (120.0, ((10.0, 20.0),))
+    assert [(one.name, one.rate) for one in craft.disturbances] == [
+        ("leak", 0.0),
+        ("pump", -3.0),
+        ("sunlight", -craft.spin),
+        ("drag", 0.0),
+    ]
+    assert (craft.spin_drift, craft.dissipation) == (-0.001 / 80, 600.0)
+    assert craft.dispersions is not None
+    assert craft.dispersions.thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"}
+    assert craft.dispersions.timing_offset == Tolerance("bias", 0.002)
+    others = re.sub(r"^(state|inertia): .*\n", "", example_text(), flags=re.MULTILINE)
+    craft = read(uncommented(others, "inertia", "omega0"))
+    assert craft.nutation == pytest.approx(math.radians(5), rel=0.05)
+
+
+def test_the_example_shows_every_key() -> None:
+    from nutdamp.files.models import SpacecraftFile
+    from nutdamp.files.schema import json_schema
+
+    sections = [json_schema(), *json_schema()["$defs"].values()]
+    assert sections[0]["properties"].keys() == SpacecraftFile.fields().keys()
+    for section in sections:
+        for key in section["properties"]:
+            assert re.search(rf"\b{key}:", example_text()), key

@@ -1,0 +1,257 @@
+"""Flights by Basilisk against `nutdamp.flight.flown`: agreement to 1e-8 rad is promised, and far less is found."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.cases import spread
+
+from nutdamp import flight, schemes
+from nutdamp.basilisk import BasiliskFlight, fly
+from nutdamp.errors import BadRequest, Infeasible, MissingExtra
+from nutdamp.files.examples import example_text
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude
+from nutdamp.schedule import Pulse, Schedule
+from nutdamp.spacecraft import Attitude, Channel, Disturbance, Inertia, Spacecraft, Thruster
+
+PROMISED = 1e-8
+"""rad; for the direction of the axes and of H, and for the rates relative to |ω|."""
+
+FOUND = 1e-11
+"""The same as found with room for other compilers; more means that something has become worse."""
+
+BODIES = {
+    "prolate": ((120.0, 120.0, 80.0), 3.0),
+    "oblate": ((80.0, 80.0, 120.0), 3.0),
+    "reversed": ((120.0, 120.0, 80.0), -3.0),
+    "oblate reversed": ((80.0, 80.0, 120.0), -3.0),
+    "triaxial": ((120.0, 100.0, 80.0), 3.0),
+    "triaxial oblate": ((80.0, 100.0, 130.0), -2.0),
+    "pencil": ((100.0, 100.0, 2.0), 20.0),
+}
+
+
+@pytest.fixture(autouse=True)
+def _installed(request: pytest.FixtureRequest) -> None:
+    if request.node.get_closest_marker("basilisk"):
+        pytest.importorskip(
+            "Basilisk", reason="NOT CHECKED against Basilisk, which is not installed: pip install 'nutdamp[verify]'"
+        )
+
+
+def spinner(name: str, theta: float = math.radians(5.0), *, thrusters: bool = True) -> Spacecraft:
+    moments, spin = BODIES[name]
+    transverse = 0.5 * (moments[0] + moments[1])
+    omega = moments[2] * abs(spin) * math.tan(theta) / transverse
+    torque = transverse * omega  # about a second of firing takes the nutation out
+    directions = {"+1": (1, 0, 0.1), "-1": (-1, 0, 0), "+2": (0, 1, 0), "-2": (0, -1, -0.1)}
+    channels = [
+        Channel(channel, (Thruster(channel, torque * np.array(direction, dtype=float), max_on_time=2.0),))
+        for channel, direction in directions.items()
+    ]
+    return Spacecraft(
+        name=name,
+        inertia=Inertia(moments),
+        omega0=np.array([omega * math.cos(0.7), omega * math.sin(0.7), spin]),
+        channels=tuple(channels) if thrusters else (),
+    )
+
+
+def reference(flown: Flight, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and quaternions at ``times``, after a jump where there is one."""
+    legs = [next(leg for leg in reversed(flown.legs) if leg.start <= time) for time in times]
+    rows = [leg.path.motion(np.array([time])) for leg, time in zip(legs, times, strict=True)]
+    return np.array([rates[0] for rates, _ in rows]), np.array([quaternion[0] for _, quaternion in rows])
+
+
+def difference(spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight) -> float:
+    """Largest difference from the flown motion: directions of H and of all body axes in rad, rates over |ω|."""
+    rates, quaternion = reference(flight.flown(spacecraft, schedule, until), found.t)
+    moments = np.asarray(spacecraft.inertia.moments)
+    worst = [np.linalg.norm(rates - found.rates, axis=1) / np.linalg.norm(rates, axis=1)]
+    for mine, theirs in [(rates * moments, found.rates * moments), *((axis, axis) for axis in np.eye(3))]:
+        worst.append(
+            attitude.angle_between(attitude.rotate(quaternion, mine), attitude.rotate(found.quaternion, theirs))
+        )
+    return float(np.max(worst))
+
+
+def overlapping() -> Schedule:
+    """Pulses at times that no clock of nanoseconds knows: overlapping, one within another, one with axial torque."""
+    return Schedule(
+        (
+            pulse(1.0 / 3.0, 0.1 * math.pi, 20.0, -5.0, 0.0),
+            pulse(0.5, 0.3, 0.0, 15.0, 30.0),
+            pulse(math.e, 1.234567890123, 3.0, 4.0, -20.0),
+            pulse(math.e + 0.1, 1e-10, 1000.0, 0.0, 0.0),
+        )
+    )
+
+
+def pulse(t: float, on_time: float, *torque: float) -> Pulse:
+    return Pulse(t, on_time, "by hand", np.array(torque) * on_time, np.array(torque))
+
+
+@pytest.mark.basilisk
+@spread("scheme", ["two-pulse", "four-pulse"], quick=1)
+@spread("name", BODIES, quick=5)
+def test_plans_with_real_widths(name: str, scheme: str) -> None:
+    body = spinner(name)
+    schedule = schemes.schedule(scheme, body, schemes.Options())
+    assert schedule.pulses
+    assert all(one.on_time > 0.0 for one in schedule)
+    until = schedule.end + body.inertial_period
+    found = fly(body, schedule, until)
+    assert difference(body, schedule, until, found) <= min(PROMISED, FOUND)
+
+
+@pytest.mark.basilisk
+def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
+    body = read_spacecraft(example_text(), "example")
+    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+    until = schedule.end + body.inertial_period
+    found = fly(body, schedule, until)
+    assert capfd.readouterr() == ("", "")
+    assert difference(body, schedule, until, found) <= FOUND
+    assert found.t[0] == 0.0
+    assert found.t[-1] == until
+    assert np.all(np.diff(found.t) > 0.0)
+    assert {edge for one in schedule for edge in (one.start, one.end)} <= set(found.t)
+    assert set(np.linspace(0.0, until, 50)) <= set(found.t)
+    assert np.all(found.quaternion[:, 0] >= 0.0)
+    assert np.linalg.norm(found.quaternion, axis=1) == pytest.approx(1.0, abs=1e-14)
+    assert found.rates.shape == (len(found.t), 3)
+    # What the plan is for: the nutation is gone and H is back, by a simulator that knows nothing of the plan.
+    last = found.rates[-1] * body.inertia.moments
+    assert math.hypot(last[0], last[1]) / last[2] < 1e-8
+    start = attitude.rotate(body.initial.quaternion, body.initial.rates * np.array(body.inertia.moments))
+    assert attitude.angle_between(start, attitude.rotate(found.quaternion[-1], last)) < 1e-8
+
+
+@pytest.mark.basilisk
+@pytest.mark.parametrize("name", BODIES)
+def test_ideal_impulses_of_a_steerable_torquer(name: str) -> None:
+    body = spinner(name, thrusters=False)
+    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+    assert [one.on_time for one in schedule] == [0.0, 0.0]
+    until = schedule.end + body.inertial_period
+    assert difference(body, schedule, until, fly(body, schedule, until)) <= FOUND
+
+
+@pytest.mark.basilisk
+@pytest.mark.parametrize("name", BODIES)
+def test_ideal_impulses_about_every_axis_at_any_time(name: str) -> None:
+    body = spinner(name)
+    kicks = [(0.0, (5.0, 0.0, 3.0)), (1.1, (0.0, -4.0, 0.0)), (1.1, (1.0, 2.0, -30.0)), (4.0, (0.0, 7.0, 0.0))]
+    schedule = Schedule(tuple(Pulse(t, 0.0, "by hand", np.array(impulse)) for t, impulse in kicks))
+    found = fly(body, schedule, 4.0)
+    assert difference(body, schedule, 4.0, found) <= FOUND
+    assert found.rates[0] == pytest.approx(body.initial.rates + kicks[0][1] / np.array(body.inertia.moments))
+
+
+@pytest.mark.basilisk
+@pytest.mark.parametrize("name", BODIES)
+def test_overlapping_pulses_off_the_nanosecond_grid(name: str) -> None:
+    body = spinner(name)
+    assert difference(body, overlapping(), 8.0, fly(body, overlapping(), 8.0)) <= FOUND
+
+
+@pytest.mark.basilisk
+def test_flight_that_ends_within_a_pulse() -> None:
+    body = spinner("prolate")
+    found = fly(body, overlapping(), 2.5)
+    assert found.t[-1] == 2.5
+    assert difference(body, overlapping(), 2.5, found) <= FOUND
+    at_once = fly(body, overlapping(), 0.0)
+    assert at_once.t.tolist() == [0.0]
+    assert at_once.rates[0] == pytest.approx(body.initial.rates, rel=1e-15)
+    assert at_once.quaternion[0] == pytest.approx(body.initial.quaternion, abs=1e-15)
+
+
+@pytest.mark.basilisk
+@pytest.mark.parametrize("quaternion", [(0, 1, 0, 0), (0, 0, 0, -1), (-0.5, 0.5, -0.5, 0.5), (1e-9, 0.6, 0.0, -0.8)])
+def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, float, float]) -> None:
+    axes = attitude.matrix(np.array([math.cos(0.2), math.sin(0.2) * 0.6, math.sin(0.2) * 0.8, 0.0]))
+    body = spinner("triaxial")
+    turned = np.array(quaternion) / np.linalg.norm(quaternion)
+    body = replace(body, inertia=Inertia(body.inertia.moments, axes), attitude=Attitude(turned))
+    assert difference(body, overlapping(), 5.0, fly(body, overlapping(), 5.0)) <= FOUND
+
+
+@pytest.mark.basilisk
+@spread("name", BODIES, quick=1)
+@spread(
+    "disturbances",
+    [
+        (Disturbance(0.02 - 0.05j), Disturbance(0.0, axial=-0.1)),
+        (Disturbance(0.05 + 0.02j, rate=-3.0), Disturbance(0.01j, rate=0.7, axial=0.02), Disturbance(0.03 + 0j)),
+    ],
+    quick=1,
+    ids=["constant", "turning"],
+)
+def test_disturbances(name: str, disturbances: tuple[Disturbance, ...]) -> None:
+    body = replace(spinner(name), disturbances=disturbances)
+    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+    until = schedule.end + 1.0
+    assert difference(body, schedule, until, fly(body, schedule, until)) <= FOUND
+
+
+@pytest.mark.basilisk
+def test_error_falls_with_the_step() -> None:
+    body = spinner("triaxial", math.radians(20.0))
+    schedule = Schedule((pulse(4.0, 4.0, 10.0, 0.0, 5.0),))
+    flights = [fly(body, schedule, 12.0, step=step, samples=2) for step in (0.5, 0.25, 0.125)]
+    assert [found.step for found in flights] == [0.5, 0.25, 0.125]
+    coarse, middle, fine = (difference(body, schedule, 12.0, found) for found in flights)
+    assert coarse > 1e-7
+    assert middle < coarse / 50.0  # the seventh or eighth order would give 128 or 256
+    assert fine < middle / 50.0
+
+
+@pytest.mark.basilisk
+def test_error_of_turning_torques_falls_with_the_fourth_power_of_the_step() -> None:
+    body = replace(spinner("triaxial"), disturbances=(Disturbance(0.5 + 0.2j, rate=2.0),))
+    flights = [fly(body, Schedule(), 10.0, step=step, samples=2) for step in (0.1, 0.05, 0.025)]
+    coarse, middle, fine = (difference(body, Schedule(), 10.0, found) for found in flights)
+    assert coarse < 1e-4
+    assert middle == pytest.approx(coarse / 16.0, rel=0.2)
+    assert fine == pytest.approx(middle / 16.0, rel=0.2)
+
+
+@pytest.mark.basilisk
+def test_body_at_rest() -> None:
+    body = replace(spinner("triaxial"), omega0=np.zeros(3), attitude=Attitude(np.array([0.6, 0.0, 0.8, 0.0])))
+    found = fly(body, Schedule(), 3.0, samples=3)
+    assert np.all(found.rates == 0.0)
+    assert np.all(found.quaternion == found.quaternion[0])
+
+
+def test_missing_basilisk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "Basilisk", None)
+    with pytest.raises(MissingExtra, match=r"flying with Basilisk needs the extra 'verify'") as missing:
+        fly(spinner("prolate"), Schedule(), 1.0)
+    assert missing.value.extra == "verify"
+
+
+def test_dissipation_is_refused_before_basilisk_is_requested(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "Basilisk", None)
+    with pytest.raises(Infeasible, match="without energy dissipation"):
+        fly(replace(spinner("prolate"), dissipation=600.0), Schedule(), 1.0)
+
+
+@pytest.mark.parametrize(("until", "step"), [(-1.0, None), (math.nan, None), (math.inf, None), (1.0, 0.0), (1.0, -0.1)])
+def test_times_that_cannot_be(until: float, step: float | None) -> None:
+    with pytest.raises(BadRequest):
+        fly(spinner("prolate"), Schedule(), until, step=step)
+
+
+def test_a_flight_too_long_for_basilisk_is_refused_at_once() -> None:
+    """It has a fixed step, so the count of steps is known before."""
+    with pytest.raises(Infeasible, match="more than 200000 steps"):
+        fly(spinner("prolate"), Schedule(), 1e7)

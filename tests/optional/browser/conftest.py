@@ -1,0 +1,55 @@
+"""A browser for the tests of pages: playwright with Chromium, Chrome or Edge."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """A running browser."""
+    from support.browser_finder import browser as found
+
+    why = "NOT CHECKED in a browser: "
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
+    )
+    executable = found()
+    if executable is None:
+        pytest.skip(f"{why}no Chromium, Chrome or Edge is installed")
+    root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=executable, args=root)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def browse(chromium: Any) -> Callable[..., Any]:
+    """Opens a file in a new tab; whatever the browser complains of or fetches from elsewhere fails the test.
+
+    ``browse(path, width=1400, scheme="light", **context)`` is entered with ``with``.
+    """
+
+    @contextmanager
+    def opened(path: Path, width: int = 1400, scheme: str = "light", **options: Any) -> Iterator[Any]:
+        said: list[str] = []
+        context = chromium.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True, **options
+        )
+        page = context.new_page()
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in ("file:", "data:") else 0)
+        page.goto(path.as_uri())
+        yield page
+        context.close()
+        assert said == []
+
+    return opened

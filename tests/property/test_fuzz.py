@@ -1,0 +1,261 @@
+"""Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no NaN, a proper exit.
+
+Files are drawn from fixed seeds and run through the command line within this process.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+import traceback
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+from support.planner import Planner
+from support.process import within
+
+from nutdamp import schemes
+
+SEEDS, BLOCKS, QUICK = 600, 24, range(2000, 2020)
+"""Spacecraft that run with the slow tests, in how many blocks, and others that run always."""
+STATUSES = (0, 2, 3, 4)
+SCHEMES = ("one-pulse", "two-pulse", "four-pulse", "half-cone", "rhumb-line")
+CLASSIC, AIMED = SCHEMES[:3], SCHEMES[3:]
+EPOCH = "{epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}"
+INTERNAL = re.compile(r"internal error|Traceback|[a-z]Warning:|pydantic|scipy|numpy|HiGHS|linprog")
+SCRIPTED = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
+"""What a page does not show."""
+
+NOT_A_NUMBER = re.compile(r"(?<![\w.])[-+]?(nan|inf|infinity)(?!\w)", re.IGNORECASE)
+
+
+def spacecraft(rng: np.random.Generator) -> dict[str, Any]:
+    """A valid spacecraft file as a dictionary, often with something unusual in it."""
+
+    def chance(share: float) -> bool:
+        return bool(rng.random() < share)
+
+    A = float(10.0 ** rng.uniform(-1.0, 4.0))
+    ratio = float(
+        rng.choice(
+            [rng.uniform(0.2, 1.9), 1.0, 1.0 + 1e-12, 1.0 - 1e-9, 1.0 + 1e-4, 2.0, 0.01], p=[0.6, *[0.4 / 6] * 6]
+        )
+    )
+    spin = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-2.0, 1.0))
+    degrees = float(rng.choice([0.0, 1e-7, 0.5, 5.0, 30.0, 70.0, 89.9], p=[0.06, 0.04, 0.2, 0.43, 0.2, 0.06, 0.01]))
+    body: dict[str, Any] = {"name": "fuzz", "inertia": {"A": A, "C": ratio * A}}
+    if chance(0.15):
+        split = float(rng.choice([1e-10, 0.01, 0.2]))
+        moments = [A * (1.0 + split), A * (1.0 - split), min(ratio, 1.5) * A]
+        stable = not moments[1] <= moments[2] <= moments[0]
+        if stable and moments[2] <= moments[0] + moments[1] and moments[0] <= moments[1] + moments[2]:
+            body["inertia"] = {"tensor": np.diag(moments).tolist()}
+    body["state"] = {"spin": spin, "nutation": f"{degrees} deg", "phase": float(rng.uniform(-3.0, 3.0))}
+    if chance(0.2):
+        body["attitude"] = {"quaternion": rng.normal(size=4).tolist(), "frame": "EME2000"}
+        if chance(0.7):
+            body["attitude"]["epoch"] = "2026-03-01T12:00:00Z"
+    strength = (
+        ratio * A * spin * spin * math.tan(math.radians(max(min(degrees, 80.0), 0.1))) * 10.0 ** rng.uniform(-2, 2)
+    )
+    thrusters: list[dict[str, Any]] = []
+    for number in range(int(rng.choice([0, 1, 2, 4, 8], p=[0.1, 0.15, 0.2, 0.45, 0.1]))):
+        torque = rng.normal(size=3) * np.array([1.0, 1.0, rng.choice([0.0, 0.3, 10.0], p=[0.7, 0.2, 0.1])])
+        if chance(0.7):
+            angle = 0.5 * math.pi * number
+            torque = np.array([math.cos(angle), math.sin(angle), 0.0])
+        one: dict[str, Any] = {"name": f"T{number}", "torque": (strength * torque).tolist()}
+        if chance(0.6):
+            one |= {"isp": 220, "lever_arm": 0.8}
+        if chance(0.3):
+            one |= {"min_on_time": 0.01 / abs(spin), "max_on_time": float(rng.choice([0.1, 1.0])) / abs(spin)}
+        thrusters.append(one)
+    if thrusters:
+        body["thrusters"] = thrusters
+    if chance(0.15):
+        body["steerable"] = {} if chance(0.3) else {"torque": strength}
+    period = 2.0 * math.pi / abs(spin)
+    limits: dict[str, Any] = (
+        {"horizon": period * float(rng.choice([1e-6, 0.01, 1.0, 5.0, 20.0, 100.0, 1e6]))} if chance(0.5) else {}
+    )
+    for key, share, value in (
+        ("tick", 0.15, 1e-3 * period),
+        ("gap", 0.15, 0.1 * period),
+        ("earliest", 0.1, 0.004 * min(period, limits.get("horizon", period))),
+        ("max_pulses", 0.15, int(rng.integers(1, 6))),
+        ("blackout", 0.1, [[0.3 * period, 0.6 * period], [0.5 * period, 2.0 * period]]),
+    ):
+        if chance(share):
+            limits[key] = value
+    if limits:
+        body["limits"] = limits
+    if chance(0.15):
+        body["dissipation"] = {"time_constant": period * float(10.0 ** rng.uniform(-0.5, 4.0))}
+    if chance(0.15):
+        small = 1e-3 * strength
+        body["disturbances"] = [{"name": "leak", "torque": [small, 0.0, float(rng.choice([0.0, 0.1 * small]))]}]
+    if chance(0.4):
+        body["requirement"] = {"nutation": "0.5 deg", "momentum_shift": "1 deg"}
+    if chance(0.3):
+        body["mass"] = 100.0
+    if chance(0.25) and "attitude" not in body:
+        body["goal"] = {"tilt": f"{rng.choice([0.0, degrees, 3.0, 60.0, 179.9, 179.999999])} deg", "azimuth": 0.0}
+    elif chance(0.1):
+        body["goal"] = {"spin": spin * float(rng.choice([1.0, 1.01, 0.8]))}
+    if chance(0.7):
+        body["dispersions"] = {
+            "A": {"normal": "1 %"},
+            "omega0": {"normal": 1e-3 * abs(spin)},
+            "timing": {"uniform": "5 ms"},
+        }
+        if thrusters:
+            body["dispersions"]["thrust"] = {"normal": "2 %"}
+    return body
+
+
+def scheme_of(seed: int) -> str:
+    """The scheme of a seed, in rotation; optimal, which takes longest, less often."""
+    return "optimal" if seed % 25 == 0 else SCHEMES[seed % len(SCHEMES)]
+
+
+def commands(seed: int, body: dict[str, Any]) -> Iterator[list[str]]:
+    """What is done with the spacecraft of a seed: a plan of a scheme, and two or more other commands, all in rotation.
+
+    The numbers of the rotations have no common factor with that of the schemes, so that each command meets each scheme.
+    """
+    scheme, axis = scheme_of(seed), "tilt" in body.get("goal", {})
+    chosen = ["f.yaml", "--scheme", scheme]
+    if scheme in AIMED and not axis and seed % 7:
+        chosen += ["--target", f"{(0, 40, 140)[seed % 3]}deg,{(10, 2, 80)[seed // 3 % 3]}deg"]
+    placed = () if axis or "epoch" in body.get("attitude", {}) else ("--set", f"attitude={EPOCH}")
+    unusual: tuple[list[str], ...] = (
+        [],
+        ["--with-disturbances"],
+        ["--coarse"],
+        ["--literal"],
+        ["--free-axis"],
+        ["--per-turn", "2"],
+        [],
+    )
+    yield ["plan", *chosen, *unusual[seed // 5 % 7], "--json", "-"]
+    apm = ["export", *chosen, *placed, "--format", "apm", "-o", "f.apm"]
+    others: tuple[tuple[list[str], ...], ...] = (
+        (["simulate", *chosen, "--samples", "20", "--json", "-"],),
+        (["simulate", *chosen, "--samples", "20", "--flown", "--csv", "-"],),
+        (["simulate", *chosen, "--samples", "20", "--flown", "--until", "100s", "--json", "-"],),
+        (["check", "f.yaml", "--json", "-"], ["check", "f.yaml"]),
+        (["disperse", *chosen, "--samples", "100", "--json", "-"],),
+        (["export", *chosen, *placed, "--format", ("stk", "aem", "basilisk", "json")[seed // 13 % 4]],),
+        (apm, ["import", "apm", "f.apm", "--schedule", "f.csv"], ["simulate", "f.yaml", "--schedule", "f.csv"]),
+        (["plan", "f.yaml", *(part for one in CLASSIC for part in ("--scheme", one))],),
+        (["simulate", "f.yaml", "--scheme", "none", "--samples", "20", "--json", "-"],),
+        (["disperse", *chosen, "--case", "3"],),
+        (["plan", *chosen, "--csv", "-"], ["plan", *chosen, "--set", "limits.max_pulses=3"]),
+        (["plan", *chosen], ["simulate", *chosen, "--samples", "20"]),
+        (["plan", *chosen, *([] if scheme == "optimal" else ["--robust"]), "--json", "-"],),
+    )
+    yield from others[seed % len(others)]
+    yield from others[(seed // 3 + 4) % len(others)]
+    if seed % 11 == 0:
+        yield ["verify", *chosen, "--json", "-"]
+    if seed % 23 == 0:
+        yield ["report", *chosen, "-o", "f.html"]
+    if seed % 199 == 3:
+        yield ["animate", *chosen, "-o", "f.gif", "--seconds", "0.2", "--fps", "5", "--width", "320"]
+    if seed % 249 == 7:
+        yield ["trade", "f.yaml", "--points", "1", "--allow", "any", "--json", "-"]
+    if seed % 97 == 0:
+        yield ["explain", ("", scheme, "17", "file", "units", "nutation")[seed // 97 % 6]]
+
+
+def not_json(name: str) -> NoReturn:
+    raise ValueError(f"{name} in it")
+
+
+def faults(seed: int, folder: Path, planner: Planner) -> list[str]:
+    """What is wrong with the commands of one seed; empty where all is well."""
+    planner.kept.clear()
+    for old in folder.iterdir():
+        old.unlink()
+    body = spacecraft(np.random.default_rng(seed))
+    (folder / "f.yaml").write_text(json.dumps(body, indent=1), encoding="utf-8")
+    wrong = []
+    for arguments in commands(seed, body):
+        if arguments[0] == "import" and not (folder / "f.apm").exists():
+            break
+        arguments = [part for part in arguments if part]
+        try:
+            done = within(folder, *arguments)
+        except Exception:  # a bug: the other seeds are tried all the same
+            problem, said = "an error that is no message", traceback.format_exc()
+        else:
+            problem, said = problem_of(arguments, done, folder), done.stderr
+        if problem:
+            wrong.append(f"seed {seed}: nutdamp {' '.join(arguments)}: {problem}\n{said[-1500:]}")
+    return wrong
+
+
+def problem_of(arguments: list[str], done: subprocess.CompletedProcess[str], folder: Path) -> str:
+    """What is wrong with what one command printed; empty where nothing is."""
+    files = [one for one in folder.iterdir() if one.suffix in (".csv", ".apm")]
+    pages = [SCRIPTED.sub("", one.read_text(encoding="utf-8")) for one in folder.glob("*.html")]
+    texts = [done.stdout, done.stderr, *(one.read_text(encoding="utf-8") for one in files), *pages]
+    shown = done.stderr + ("" if "basilisk" in arguments else done.stdout)  # that format is a script
+    internal = INTERNAL.search(shown)
+    if done.returncode not in STATUSES or internal:
+        return f"status {done.returncode}, {internal.group() if internal else 'no text from within'}"
+    if done.returncode == 2 and "f.yaml:" in done.stderr and ": warning" not in done.stderr:
+        return "the file is not valid"
+    if any(NOT_A_NUMBER.search(text) for text in texts):
+        return "not a number in the output"
+    written = done.returncode == 0 or (arguments[0] == "plan" and done.returncode != 2)
+    if arguments[-2:] == ["--json", "-"] and (written or done.stdout):
+        try:
+            json.loads(done.stdout, parse_constant=not_json)
+        except ValueError as reason:
+            return f"not JSON: {reason}"
+    return ""
+
+
+@pytest.fixture
+def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
+    """The commands of a seed share its schedules: to find them takes most of the time."""
+    one = Planner()
+    monkeypatch.setattr(schemes, "schedule", one.schedule)
+    return one
+
+
+@pytest.fixture(autouse=True)
+def _short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Independent integrations give up sooner than a user's do: those of a thousand turns take most of the time."""
+    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 20_000)
+    monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
+
+
+@pytest.mark.deep
+def test_ordinary_and_degenerate_spacecraft_get_results_or_reasons(tmp_path: Path, planner: Planner) -> None:
+    seeds = [seed for seed in QUICK if seed % 25]
+    assert [one for seed in seeds for one in faults(seed, tmp_path, planner)] == []
+    assert planner.calls > 0
+
+
+def test_every_command_meets_every_scheme() -> None:
+    met: Counter[tuple[str, str]] = Counter()
+    for seed in range(SEEDS):
+        for arguments in commands(seed, spacecraft(np.random.default_rng(seed))):
+            met.update((arguments[0], part) for part in arguments if part in (*SCHEMES, "optimal"))
+    for name, least in {"plan": 24, "simulate": 3, "disperse": 2, "export": 2, "verify": 2, "report": 1}.items():
+        for scheme in (*SCHEMES, "optimal"):
+            assert met[name, scheme] >= least, (name, scheme)
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_hundreds_of_spacecraft_get_results_or_reasons(block: int, tmp_path: Path, planner: Planner) -> None:
+    assert [one for seed in range(block, SEEDS, BLOCKS) for one in faults(seed, tmp_path, planner)] == []

@@ -1,0 +1,234 @@
+"""Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless loops."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import FrameType
+
+import numpy as np
+from support import reference
+
+from nutdamp.comparison import Comparison
+from nutdamp.compliance import Left
+from nutdamp.flight import Residual
+from nutdamp.planning import Plan
+from nutdamp.presentation import verdicts
+from nutdamp.recommendation import recommend
+from nutdamp.schedule import Pulse, Schedule
+from nutdamp.spacecraft import (
+    Attitude,
+    Channel,
+    Goal,
+    Inertia,
+    Limits,
+    Requirement,
+    Spacecraft,
+    Steerable,
+    Thruster,
+    Vector,
+)
+
+
+def spinner(
+    A: float = 120.0,
+    C: float = 80.0,
+    spin: float = 3.0,
+    degrees: float = 5.0,
+    phase: float = 0.7,
+    *,
+    moments: tuple[float, float, float] | None = None,
+    channels: tuple[Channel, ...] = (),
+    steerable: Steerable | None = None,
+    limits: Limits | None = None,
+    requirement: Requirement | None = None,
+    mass: float | None = None,
+    attitude: Attitude | None = None,
+) -> Spacecraft:
+    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; the example of the physics sheet by default."""
+    moments = moments or (A, A, C)
+    mean = 0.5 * (moments[0] + moments[1])
+    omega = moments[2] * abs(spin) * math.tan(math.radians(degrees)) / mean
+    rates = np.array([omega * math.cos(phase), omega * math.sin(phase), spin])
+    return Spacecraft(
+        "test", Inertia(moments), rates, mass, attitude, channels, steerable, requirement, limits or Limits()
+    )
+
+
+def aimed(spacecraft: Spacecraft, tilt: float, azimuth: float) -> Spacecraft:
+    """With a target axis ``tilt`` degrees from H at t = 0 and ``azimuth`` degrees about it."""
+    axis = spacecraft.direction_in_n(math.radians(tilt), math.radians(azimuth))
+    return replace(spacecraft, goal=replace(spacecraft.goal, axis=axis))
+
+
+def off_target(spacecraft: Spacecraft, made: Schedule) -> float:
+    """Angle of H from the target by the reference integrator, rad; for bodies without an attitude in the file."""
+    outcome = Outcome(spacecraft, made)
+    return reference.angle(reference.momentum(spacecraft.inertia.moments, outcome.motion), spacecraft.target_axis)
+
+
+def channel(
+    name: str,
+    *torque: float,
+    min_on_time: float = 0.0,
+    max_on_time: float = math.inf,
+    isp: float | None = None,
+    thrust: float | None = None,
+    force: tuple[float, float, float] | None = None,
+) -> Channel:
+    """One thruster that is a channel of its own."""
+    push = None if force is None else np.array(force, dtype=float)
+    turn = np.array(torque, dtype=float)
+    return Channel(name, (Thruster(name, turn, push, thrust, isp, min_on_time, max_on_time),))
+
+
+def cross(torque: float, *, min_on_time: float = 0.0, max_on_time: float = math.inf) -> tuple[Channel, ...]:
+    """The thrusters of Magnus 1970: +1, -1, +2, -2."""
+    directions = {
+        "+1": (torque, 0.0, 0.0),
+        "-1": (-torque, 0.0, 0.0),
+        "+2": (0.0, torque, 0.0),
+        "-2": (0.0, -torque, 0.0),
+    }
+    return tuple(
+        channel(name, *direction, min_on_time=min_on_time, max_on_time=max_on_time)
+        for name, direction in directions.items()
+    )
+
+
+def fan(count: int, torque: float, first: float = 0.3) -> tuple[Channel, ...]:
+    """``count`` channels with evenly spread transverse directions."""
+    angles = [first + 2 * math.pi * index / count for index in range(count)]
+    return tuple(
+        channel(f"T{index}", torque * math.cos(angle), torque * math.sin(angle), 0.0)
+        for index, angle in enumerate(angles)
+    )
+
+
+def pulse(t: float, on_time: float, impulse: Vector, name: str = "T") -> Pulse:
+    """A rectangular pulse, or with no on-time an ideal impulse."""
+    return Pulse(t, on_time, name, impulse, None if on_time == 0.0 else impulse / on_time)
+
+
+def events(made: Schedule | tuple[Pulse, ...]) -> list[reference.Push | reference.Kick]:
+    """What the reference integrator flies for a schedule."""
+    return [
+        reference.Kick(pulse.t, pulse.impulse)
+        if pulse.torque is None or pulse.on_time == 0.0
+        else reference.Push(pulse.start, pulse.end, pulse.torque)
+        for pulse in made
+    ]
+
+
+class Outcome:
+    """How a schedule ends by the reference integrator: angles in rad."""
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        moments = spacecraft.inertia.moments
+        sense = math.copysign(1.0, spacecraft.spin)
+        rotation = reference.frame_n(moments, spacecraft.omega0)
+        self.motion = reference.fly(moments, spacecraft.omega0, events(made), made.end, rotation)
+        self.nutation = reference.nutation(moments, self.motion.rates, sense)
+        before = reference.momentum(moments, reference.Motion(spacecraft.omega0, rotation))
+        self.shift = reference.angle(before, reference.momentum(moments, self.motion))
+        self.spin: float = float(self.motion.rates[2])
+
+
+def transverse(vector: Vector) -> complex:
+    """v1 + i v2."""
+    return complex(vector[0], vector[1])
+
+
+@contextmanager
+def within(calls: int) -> Iterator[None]:
+    """Fails, rather than hangs, where the body calls more functions than that, of Python or of C.
+
+    Calls are counted, not seconds: it is the same on a busy machine.
+    """
+    made = 0
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal made
+        made += event in ("call", "c_call")
+        if made > calls:
+            sys.setprofile(None)
+            raise AssertionError(f"not done within {calls} calls")
+
+    previous = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        yield
+    finally:
+        sys.setprofile(previous)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged(Plan):
+    """A plan whose flown residual is given, and the spin at its end where that is not the one at t = 0."""
+
+    ended: Residual | None = None
+    ended_spin: float | None = None
+
+    @property
+    def flown(self) -> Residual | None:
+        return self.ended
+
+    @property
+    def left(self) -> Left | None:
+        spin = self.spacecraft.spin if self.ended_spin is None else self.ended_spin
+        return None if self.ended is None else Left(self.ended.nutation, self.ended.axis_error, spin)
+
+
+def judged(
+    name: str,
+    nutation: float,
+    *,
+    shift: float = 0.0,
+    impulse: float = 1.0,
+    propellant: float | None = None,
+    end: float = 1.0,
+    required: Requirement | None = None,
+    goal: Goal | None = None,
+    spin: float | None = None,
+    pulses: int = 1,
+) -> Plan:
+    """A plan for 5° of nutation that leaves so much, flown; angles in degrees.
+
+    Its pulses share impulse and propellant.
+    """
+    spacecraft = replace(spinner(requirement=required), goal=goal or Goal())
+    share = None if propellant is None else propellant / max(pulses, 1)
+    each = np.array([impulse / max(pulses, 1), 0.0, 0.0])
+    fired = tuple(Pulse(end * (one + 1) / pulses, 0.0, "T", each, propellant=share) for one in range(pulses))
+    theta, turned = math.radians(nutation), math.radians(shift)
+    ended = Residual(theta, theta, 0.0, turned, turned)
+    return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)
+
+
+def chosen(*plans: Plan) -> str | None:
+    """Which of the plans is recommended."""
+    best = recommend(plans).plan
+    return None if best is None else best.scheme
+
+
+def said(*plans: Plan) -> str:
+    """The reason for it."""
+    return verdicts.reason(Comparison(plans[0].spacecraft, plans))
+
+
+def warned(*plans: Plan) -> str:
+    """What is warned of."""
+    return " ".join(verdicts.warnings(Comparison(plans[0].spacecraft, plans)))
+
+
+INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
+HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
+BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
+POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))
+"""A target 0.2 rad = 11.46° from H at t = 0."""
+
+COUNTS = 0.05
+"""Degrees that count as damped: 1 % of the 5° of `judged` plans."""

@@ -1,0 +1,137 @@
+"""Dispersed spacecraft with schedules for the tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from support.builders import spinner
+
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.draws import BLOCK, Draws
+from nutdamp.dispersion.study import Study
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft, Steerable, Thruster
+from nutdamp.tolerances import Dispersions, Tolerance
+
+
+def normal(size: float, *, relative: bool = False) -> Tolerance:
+    """A normal tolerance, absolute by default."""
+    return Tolerance("normal", size, relative)
+
+
+def jet(name: str, position: tuple[float, ...], force: tuple[float, ...], isp: float = 220.0) -> Thruster:
+    """A thruster that is known by position and force."""
+    return Thruster(
+        name,
+        np.cross(position, force),
+        np.array(force, dtype=float),
+        math.hypot(*force),
+        isp,
+        position=np.array(position, dtype=float),
+    )
+
+
+JETS = (
+    jet("T1", (0.0, 0.3, 0.8), (0.0, -10.0, 0.0)),
+    jet("T2", (-0.3, 0.1, 0.8), (9.0, 0.5, 1.0)),  # an axial torque too
+)
+"""Two thrusters near the forward end; the second has a torque about every axis."""
+
+
+def everything(scale: float = 1.0, names: tuple[str, ...] = ("T1", "T2")) -> Dispersions:
+    """All tolerances there are, at usual sizes times ``scale``."""
+    return Dispersions(
+        A=normal(0.02 * scale, relative=True),
+        C=normal(0.02 * scale, relative=True),
+        omega0=(normal(0.002 * scale),) * 3,
+        thrust=dict.fromkeys(names, normal(0.03 * scale, relative=True)),
+        thrust_per_pulse=normal(0.01 * scale, relative=True),
+        thrust_direction=dict.fromkeys(names, normal(0.01 * scale)),
+        position=dict.fromkeys(names, normal(0.005 * scale)),
+        timing=Tolerance("uniform", 0.005 * scale),
+        timing_offset=Tolerance("triangular", 0.01 * scale),
+        attitude=normal(0.004 * scale),
+    )
+
+
+def with_jets(
+    *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
+) -> Model:
+    """Three pulses of two thrusters, the last of both together, with every tolerance."""
+    channels = (*(Channel(one.name, (one,)) for one in JETS), Channel("both", JETS))
+    body = spinner(moments=moments, spin=spin, channels=channels)
+    first, second, both = channels
+    pulses = (channel_pulse(first, 0.9, 0.4), channel_pulse(second, 2.1, 0.7), channel_pulse(both, 3.2, 0.2))
+    return Model(replace(body, dispersions=everything(scale)), Schedule(pulses))
+
+
+def sinking(model: Model, time_constant: float = 15.0) -> Model:
+    """The same with energy dissipation."""
+    return Model(replace(model.spacecraft, dissipation=time_constant), model.schedule)
+
+
+def steered(
+    *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
+) -> Model:
+    """Two pulses of a steerable torquer, one of them early, and an ideal impulse."""
+    torquer = Steerable(20.0, 220.0, 0.8)
+    body = spinner(moments=moments, spin=spin, steerable=torquer)
+    pulses = (
+        steerable_pulse(torquer, 0.3, 0.4, on_time=0.4),
+        steerable_pulse(torquer, 1.9, -2.0, on_time=0.3),
+        replace(steerable_pulse(Steerable(), 1.92, 1.0, impulse=3.0), channel="steerable"),
+    )
+    tolerances = everything(scale, ("steerable",))
+    return Model(replace(body, dispersions=tolerances), Schedule(pulses))
+
+
+def exact_two_pulse(scale: float, **tolerances: object) -> Study:
+    """The exact two-pulse by ideal impulses, which leaves nothing, dispersed a little."""
+    from nutdamp import planning
+
+    body = spinner(limits=Limits(earliest=1.0))  # a pulse at t = 0 could only be late
+    plan = planning.plan(body, "two-pulse")
+    requested = replace(everything(scale, ("steerable",)), **tolerances)  # type: ignore[arg-type]
+    return Study(Model(replace(body, dispersions=requested), plan.pulses), seed=11)
+
+
+def first_cases(study: Study, count: int) -> dict[str, np.ndarray]:
+    """Draws of the first cases, by input, (n,)."""
+    assert count <= BLOCK
+    draws, _ = study.source().block(0)
+    return {name: np.array(np.broadcast_to(draw, BLOCK)[:count]) for name, draw in draws.items()}
+
+
+def one_of(draws: Draws | Mapping[str, np.ndarray], case: int) -> dict[str, float]:
+    """The deviations of one case."""
+    return {name: float(np.asarray(draw)[case]) for name, draw in draws.items()}
+
+
+def body_of(model: Model) -> tuple[Spacecraft, tuple[Pulse, ...], Inertia]:
+    """What a model is made of."""
+    return model.spacecraft, model.schedule.pulses, model.spacecraft.inertia
+
+
+FILE = """\
+name: Dispersed
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+steerable: {torque: 60 N m, isp: 220 s, lever_arm: 1 m}
+limits: {earliest: 1 s}
+requirement: {nutation: 0.6 deg, momentum_shift: 0.4 deg, probability: 60 %}
+dispersions:
+  A: {normal: 1 %}
+  C: {normal: 1 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  thrust_per_pulse: {normal: 1 %}
+  thrust_direction: {normal: 0.5 deg}
+  timing: {uniform: 5 ms}
+  timing_offset: {bias: 2 ms}
+  position: {normal: 5 mm}
+  attitude: {normal: 0.2 deg}
+"""
+"""A spacecraft file with most kinds of dispersions."""

@@ -1,0 +1,132 @@
+"""Spinners that are commanded by blocks, and their flight by an integrator that shares nothing with the planner."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from support import reference
+from support.builders import aimed, cross, spinner
+
+from nutdamp.commands import Block
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import Commands, Limits, Spacecraft, SunSensor
+
+Array = NDArray[np.float64]
+
+FILE = """
+name: Spinner
+mass: 300 kg
+inertia: {A: 120 kg m^2, C: 180 kg m^2}
+state: {spin: 12 rpm, nutation: 0 deg}
+attitude: {epoch: 1998-01-07T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+thrusters:
+  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, max_on_time: 2 s}
+sun: epoch
+sun_sensor: {azimuth: 35 deg}
+commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, every: [1, 2]}
+limits: {horizon: 1200 s}
+requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
+"""
+"""A spinner that is commanded by blocks, as a file."""
+
+
+def commanded(body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 500, widths: int = 40) -> Spacecraft:
+    """The body with a Sun, a sensor, and blocks of delays and widths in steps of a spin turn over ``grid``."""
+    turn = 2.0 * math.pi / abs(body.spin)
+    commands = Commands(
+        turn / grid, turn * (1.0 - 1.0 / grid), np.arange(4.0, 4.0 + widths) * (turn / 400), 255, (1, 2)
+    )
+    return replace(
+        body,
+        sun=sun / np.linalg.norm(sun),
+        sun_sensor=SunSensor(azimuth),
+        commands=commands,
+        limits=Limits(horizon=600.0 * turn),
+    )
+
+
+def some_body(seed: int, *, target: bool = True) -> Spacecraft:
+    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away; the Sun is not near its axis."""
+    rng = np.random.default_rng(seed)
+    A, spin = 100.0, rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 3.0)
+    C = A * rng.choice([rng.uniform(0.4, 0.85), rng.uniform(1.15, 1.9)])
+    turn = rng.uniform(1.0, 60.0)
+    torque = C * spin**2 * math.radians(turn) * rng.uniform(0.15, 1.0)
+    body = spinner(A, C, spin, rng.choice([0.0, 0.0, 0.3]), rng.uniform(0.0, 6.0), channels=cross(torque))
+    while True:
+        sun = rng.normal(size=3)
+        sun /= np.linalg.norm(sun)
+        aim = aimed(body, turn, rng.uniform(0.0, 360.0))
+        ends = [float(attitude.angle_between(sun, axis)) for axis in (aim.momentum, aim.target_axis)]
+        if min(*ends, *(math.pi - end for end in ends)) > 0.4:
+            return commanded(aim if target else body, sun, rng.uniform(-3.0, 3.0))
+
+
+def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[reference.Motion, list[float]]:
+    """The motion after the last pulse, and when each began: Euler's equations, Sun pulses as their roots."""
+    moments = np.asarray(body.inertia.moments)
+    torques = {one.name: one.torque for one in body.channels}
+    assert body.sun is not None
+    assert body.sun_sensor is not None
+    sun, mark = body.sun, body.sun_sensor.azimuth
+    state = np.concatenate([body.omega0, attitude.matrix(body.initial.quaternion).ravel()])
+    now, passed, last, starts = 0.0, 0, -math.inf, []
+    turn = 2.0 * math.pi / abs(body.spin)
+
+    def slope(_: float, y: Array, torque: Array) -> Array:
+        w, rotation = y[:3], y[3:].reshape(3, 3)
+        cross_ = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        return np.concatenate([(torque - cross_ @ (moments * w)) / moments, (rotation @ cross_).ravel()])
+
+    def behind(y: Array) -> float:
+        """Sine of the angle by which the Sun is past the sensor, and positive cosine near it."""
+        seen = y[3:].reshape(3, 3).T @ sun
+        return float(math.cos(mark) * seen[1] - math.sin(mark) * seen[0])
+
+    def before(y: Array) -> bool:
+        seen = y[3:].reshape(3, 3).T @ sun
+        return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
+
+    def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
+        """Sun pulses on the way; ``state`` and ``now`` go on, to the first one where it ``stops`` there."""
+        nonlocal state, now
+        found = solve_ivp(
+            slope, (now, until), state, method="DOP853", rtol=1e-11, atol=1e-13, args=(torque,), dense_output=True
+        )
+        at = found.sol
+        assert at is not None
+        grid = np.linspace(now, until, max(int(48 * (until - now) / turn), 4) + 1)
+        values = [behind(at(t)) for t in grid]
+        roots = [
+            brentq(lambda t: behind(at(t)), *edge, xtol=1e-13)
+            for edge, pair in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
+            if pair[0] * pair[1] < 0.0 and before(at(edge[0]))
+        ]
+        stop = next((root for root in roots if root > last + 0.3 * turn), until) if stops else until
+        state, now, roots = at(stop), stop, [root for root in roots if root <= stop]
+        return [float(root) for root in roots]
+
+    none, due = np.zeros(3), {}
+    for block in blocks:
+        due.update({block.first + k * block.every: block for k in range(block.count)})
+    while due:
+        for root in move(now + 0.05 * turn, none, stops=True) if min(due) > passed else []:
+            if root > last + 0.3 * turn:
+                passed, last = passed + 1, root
+        if passed >= min(due):
+            block = due.pop(min(due))
+            starts.append(last + block.delay)
+            seen = move(starts[-1], none) if starts[-1] > now else []
+            assert now <= starts[-1] + 1e-12
+            seen += move(starts[-1] + block.width, torques[block.channel])
+            for root in seen:
+                if root > last + 0.3 * turn:
+                    passed, last = passed + 1, root
+    return reference.Motion(state[:3], state[3:].reshape(3, 3)), starts

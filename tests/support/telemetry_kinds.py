@@ -1,0 +1,274 @@
+"""Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files, flown by DOP853."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from support import reference
+
+import nutdamp
+from nutdamp.epoch import Epoch
+from nutdamp.estimation.record import GYROS, Record
+from nutdamp.files.telemetry_csv import read_telemetry
+from nutdamp.physics import attitude
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft import Spacecraft
+
+Array = NDArray[np.float64]
+
+KINDS = (
+    ("omega_12",),
+    ("omega_123",),
+    ("omega_123", "fired"),
+    ("omega_1",),
+    ("radec",),
+    ("axis",),
+    ("omega_123", "radec"),
+    ("omega_12", "axis"),
+    ("acceleration",),
+    ("acceleration", "omega_3"),
+    ("omega_123", "sun_times"),
+    ("omega_12", "sun_column"),
+    ("axis", "sun_times"),
+)
+"""Columns of the records, in turn."""
+
+EPOCH = "2026-03-01T12:00:00Z"
+BIAS, TILT, ATTITUDE = math.radians(0.02), math.radians(1.0), math.radians(0.3)
+"""Standard deviations of gyro biases, of tilts of sensors, and of the attitude of the file."""
+
+FARTHEST = math.cos(math.radians(25.0))
+"""Cosine of the angle of the Sun from the axis, at most: nutations are half of that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Telemetry:
+    """A file, the record of a body that differs from it, and the true values of what may be estimated."""
+
+    spacecraft: Spacecraft
+    record: Record
+    truth: dict[str, float]
+    kind: str
+
+
+def file_of(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
+    """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes round the sensor."""
+    body, prolate = _any_file(draw, seed)
+    again, up = np.random.default_rng([18, seed]), np.array([0.0, 0.0, 1.0])
+    assert body.sun is not None
+    while abs(float(attitude.rotate(body.initial.quaternion, up) @ body.sun)) > FARTHEST:
+        facing = again.normal(size=4)
+        body = body.with_(attitude={"quaternion": (facing / np.linalg.norm(facing)).tolist()})
+        assert body.sun is not None
+    return body, prolate
+
+
+def _any_file(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
+    prolate = bool(draw.uniform() < 0.6)
+    C = 120.0 * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.7))
+    spin = (-1.0 if draw.uniform() < 0.5 else 1.0) * draw.uniform(0.8, 4.0)
+    facing = draw.normal(size=4)
+    return nutdamp.load(
+        {
+            "name": f"kind {seed}",
+            "inertia": {"A": 120.0, "C": C},
+            "state": {
+                "spin": spin,
+                "nutation": f"{draw.uniform(1.0, 12.0)} deg",
+                "phase": f"{draw.uniform(-180, 180)} deg",
+            },
+            "attitude": {
+                "quaternion": (facing / np.linalg.norm(facing)).tolist(),
+                "epoch": EPOCH,
+                "frame": "EME2000",
+            },
+            "sun": "epoch",
+            "sun_sensor": {"azimuth": "35 deg"},
+            "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
+            "loop": {
+                "sensor": {"kind": "accelerometer", "rate": "10 Hz", "position": ["0.8 m", 0, 0], "axis": [0, 0, 1]},
+                "law": "four-pulse",
+                "start": "0.5 deg",
+                "stop": "0.05 deg",
+            },
+            "dispersions": {
+                "A": {"normal": "0.5 %"},
+                "C": {"normal": "0.5 %"},
+                "omega0": {"normal": "0.3 deg/s"},
+                "thrust": {"normal": "3 %"},
+                "attitude": {"normal": "0.3 deg"},
+            },
+        }
+    ), prolate
+
+
+def telemetry(folder: Path, seed: int) -> Telemetry:
+    """The record of number ``seed``, of the kind whose turn it is, through a CSV file in ``folder``."""
+    draw = np.random.default_rng([17, seed])
+    kind = KINDS[seed % len(KINDS)]
+    body, prolate = file_of(draw, seed)
+    A, C = 120.0 * (1.0 + 0.005 * draw.normal()), body.inertia.C * (1.0 + 0.005 * draw.normal())
+    rates = body.omega0 + math.radians(0.3) * draw.normal(size=3)
+    turn = np.array([*(ATTITUDE * draw.normal(size=2)), draw.uniform(-1.0, 1.0)])
+    if kind in (("radec",), ("axis",)):  # which do not show how the body is turned about the axis
+        turn[2] = 0.0
+    truth = {"A": A, "C": C, "C/A": C / A} | {f"omega_{at + 1}": float(one) for at, one in enumerate(rates)}
+    truth |= {f"attitude_{at + 1}": float(one) for at, one in enumerate(turn)}
+    growing = draw.uniform() < 0.4 and "fired" not in kind
+    truth["growth"] = draw.uniform(0.0005, 0.003) * (1.0 if prolate else -1.0) if growing else 0.0
+    size = float(np.hypot(*turn[:2]))
+    tilted = np.array([math.cos(0.5 * size), *(math.sin(0.5 * size) / size * turn[:2]), 0.0])
+    turned = np.array([math.cos(0.5 * turn[2]), 0.0, 0.0, math.sin(0.5 * turn[2])])
+    quaternion = attitude.multiply(body.initial.quaternion, attitude.multiply(tilted, turned))
+    period = 2.0 * math.pi / abs(1.0 - C / A) / abs(rates[2])
+    length, count = draw.uniform(4.0, 12.0) * period, int(draw.integers(200, 500))
+    times: Array = np.linspace(0.0, length, count).round(6)
+    fired = _fired(draw, body, length) if "fired" in kind else Schedule()
+    flight = _Flight((A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length)
+    columns = _columns(draw, kind, body, flight, times, truth)
+    path, sun = folder / f"{seed}.csv", None
+    utc = draw.uniform() < 0.3
+    begin = Epoch.parse(EPOCH)
+    stamps = [begin.plus(float(one)).text if utc else f"{one:.6f}" for one in times]
+    rows = [",".join(["utc" if utc else "t_s", *columns])]
+    for at, stamp in enumerate(stamps):
+        rows.append(
+            ",".join([stamp, *("" if math.isnan(one[at]) else repr(float(one[at])) for one in columns.values())])
+        )
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    if "sun_times" in kind:
+        sun = folder / f"{seed}-sun.csv"
+        seen = flight.sun(body, length) + 10.0 ** draw.uniform(-4, -2.5) * draw.normal(
+            size=len(flight.sun(body, length))
+        )
+        seen = seen[(draw.uniform(size=len(seen)) > 0.05) & (seen > 0.0)]
+        sun.write_text("t_s\n" + "".join(f"{one:.6f}\n" for one in seen), encoding="utf-8")
+    return Telemetry(body, read_telemetry(path, body, sun, fired)[0], truth, "+".join(kind))
+
+
+def _fired(draw: np.random.Generator, body: Spacecraft, length: float) -> Schedule:
+    pulses = zip(body.channels, (0.3, 0.65), strict=True)
+    return Schedule(tuple(channel_pulse(one, share * length, draw.uniform(0.3, 0.8)) for one, share in pulses))
+
+
+class _Flight:
+    """The true motion at any times, through the pulses."""
+
+    def __init__(
+        self,
+        moments: tuple[float, float, float],
+        start: reference.Motion,
+        truth: dict[str, float],
+        draw: np.random.Generator,
+        fired: Schedule,
+        length: float,
+    ) -> None:
+        """Draws thrust factors and delays of the channels of ``fired`` into ``truth``."""
+        self.moments, self.growth = moments, truth["growth"]
+        self.begins = [(0.0, start, np.zeros(3))]
+        for pulse in fired:
+            factor, late = 1.0 + 0.03 * draw.normal(), 0.05 * draw.normal()
+            truth |= {f"thrust {pulse.channel}": factor, f"delay {pulse.channel}": late}
+            assert pulse.torque is not None
+            for time, torque in ((pulse.start + late, factor * pulse.torque), (pulse.end + late, np.zeros(3))):
+                self.begins.append((time, self.at(np.array([time]))[0], torque))
+        self.length = length
+
+    def at(self, times: Array) -> list[reference.Motion]:
+        """The motion at rising times."""
+        found: list[reference.Motion] = []
+        ends = [one[0] for one in self.begins[1:]] + [math.inf]
+        for (begin, start, torque), end in zip(self.begins, ends, strict=True):
+            inside = times[(times > begin) & (times <= end)] - begin
+            found += [start] * int(begin == 0.0 and bool(len(times)) and times[0] == 0.0)
+            if not len(inside):
+                continue
+            found += (
+                reference.sinking(self.moments, start, torque, inside, self.growth)
+                if self.growth
+                else reference.coast(self.moments, start, torque, inside)
+            )
+        return found
+
+    def sun(self, body: Spacecraft, length: float) -> Array:
+        """When the Sun passes the azimuth of the sensor, s."""
+        assert body.sun is not None
+        assert body.sun_sensor is not None
+        times = np.linspace(0.0, length, math.ceil(length * abs(body.spin) / (2.0 * math.pi) * 80))
+        seen = np.array([one.rotation.T @ body.sun for one in self.at(times)])
+        angle = np.unwrap(np.arctan2(seen[:, 1], seen[:, 0])) - body.sun_sensor.azimuth
+        turns = -math.copysign(1.0, body.spin) * angle / (2.0 * math.pi)
+        spline = CubicSpline(times, turns)
+        whole = np.arange(math.ceil(turns[0]), math.floor(turns[-1]) + 1)
+        return np.array([spline.solve(float(one), extrapolate=False)[0] for one in whole])
+
+
+def _columns(
+    draw: np.random.Generator,
+    kind: tuple[str, ...],
+    body: Spacecraft,
+    flight: _Flight,
+    times: Array,
+    truth: dict[str, float],
+) -> dict[str, Array]:
+    """Columns with noise, outliers, steps and gaps; what their sensors are off goes into ``truth``."""
+    motions, made = flight.at(times), {}
+    rates = np.array([one.rates for one in motions])
+    noise = 10.0 ** draw.uniform(-2.5, -1.3) * math.pi / 180.0
+    sense = math.copysign(1.0, body.spin)
+    if any(one.startswith("omega") for one in kind):
+        tilt, bias = TILT * draw.normal(size=2), BIAS * draw.normal(size=3)
+        shown = rates - np.cross(np.array([*tilt, 0.0]), rates) + bias
+        which = next(one for one in kind if one.startswith("omega")).removeprefix("omega_")
+        if "3" not in which or which == "3":  # without misalignment, which is no parameter then
+            shown = rates + bias
+        truth |= {f"misalignment_{at + 1}": float(one) for at, one in enumerate(tilt)}
+        truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
+        unit, factor = ("rad_s", 1.0) if draw.uniform() < 0.5 else ("deg_s", 180.0 / math.pi)
+        for number in which:
+            values = _spoilt(draw, shown[:, int(number) - 1], noise)
+            made[f"omega_{number}_{unit}"] = values * factor
+    if "acceleration" in kind:
+        step, arm = 1e-5, np.array([0.8, 0.0, 0.0])
+        near = np.array([one.rates for one in flight.at(np.sort(np.concatenate([times + 0.0, times + 2.0 * step])))])
+        middle = 0.5 * (near[1::2] + near[::2])
+        change = (near[1::2] - near[::2]) / (2.0 * step)
+        truth["bias_acceleration"] = 0.002
+        felt = (np.cross(change, arm) + np.cross(middle, np.cross(middle, arm)))[:, 2] + 0.002
+        made["acceleration_m_s2"] = _spoilt(draw, felt, 0.3 * noise)
+    if "radec" in kind or "axis" in kind:
+        wobble = TILT * draw.normal(size=2)
+        truth |= {"wobble_1": float(wobble[0]), "wobble_2": float(wobble[1])}
+        along = np.array([wobble[1], -wobble[0], 1.0])
+        axis = sense * np.array([one.rotation @ along / np.linalg.norm(along) for one in motions])
+        axis = axis + noise * draw.normal(size=axis.shape)
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        axis[draw.uniform(size=len(axis)) < draw.choice([0.0, 0.1, 0.3])] = math.nan
+        made |= (
+            dict(zip(("axis_x", "axis_y", "axis_z"), axis.T, strict=True))
+            if "axis" in kind
+            else {
+                "axis_ra_deg": np.degrees(np.arctan2(axis[:, 1], axis[:, 0])) % 360.0,
+                "axis_dec_deg": np.degrees(np.arcsin(axis[:, 2])),
+            }
+        )
+    if "sun_column" in kind:
+        seen = flight.sun(body, float(times[-1]))
+        made["sun_pulse"] = np.zeros(len(times))
+        made["sun_pulse"][np.searchsorted(times, seen)] = 1.0
+    return made
+
+
+def _spoilt(draw: np.random.Generator, values: Array, noise: float) -> Array:
+    shown = values + noise * draw.normal(size=len(values))
+    outliers = draw.uniform(size=len(values)) < draw.choice([0.0, 0.02])
+    shown = np.where(outliers, shown + noise * draw.choice([-1.0, 1.0], len(values)) * 100.0, shown)
+    if draw.uniform() < 0.3:
+        step = draw.uniform(0.5, 1.5) * noise
+        shown = np.rint(shown / step) * step
+    return np.asarray(np.where(draw.uniform(size=len(values)) < draw.choice([0.0, 0.2]), math.nan, shown))

@@ -1,0 +1,117 @@
+"""Moments of UTC: exact, with leap seconds, read and written as ISO 8601."""
+
+from __future__ import annotations
+
+import datetime
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import orekit
+
+from nutdamp.epoch import FIRST_DAY, LEAP_DAYS, Epoch
+
+
+def test_the_leap_seconds_are_those_of_another_list() -> None:
+    lines = orekit.tai_utc().splitlines()
+    assert len(lines) == 28
+    julian = [float(line.split("=JD")[1].split()[0]) for line in lines]
+    assert [day + 1 for day in LEAP_DAYS] == [round(day - 1721424.5) for day in julian[1:]]
+    assert round(julian[0] - 1721424.5) == FIRST_DAY
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00.000000000"),
+        ("2026-03-01T12:00", "2026-03-01T12:00:00.000000000"),
+        ("2026-060T12:00:00.25", "2026-03-01T12:00:00.250000000"),
+        ("2024-366T00:00:00", "2024-12-31T00:00:00.000000000"),
+        ("2026-03-01T12:00:00.1234567894", "2026-03-01T12:00:00.123456789"),
+        ("2026-12-31T23:59:59.9999999999", "2027-01-01T00:00:00.000000000"),
+        ("2016-12-31T23:59:59.9999999999", "2016-12-31T23:59:60.000000000"),
+        ("2016-12-31T23:59:60.5", "2016-12-31T23:59:60.500000000"),
+        ("2017-01-01T02:59:60+03:00", "2016-12-31T23:59:60.000000000"),
+        ("2026-03-01T00:30:00+02:00", "2026-02-28T22:30:00.000000000"),
+        ("2026-02-28T20:00:00-05:30", "2026-03-01T01:30:00.000000000"),
+        ("1972-01-01T00:00:00", "1972-01-01T00:00:00.000000000"),
+    ],
+)
+def test_texts(text: str, written: str) -> None:
+    assert Epoch.parse(text).text == written
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("yesterday", "no epoch"),
+        ("2026-02-29T00:00:00", "day"),
+        ("2025-366T00:00:00", "no such day"),
+        ("2026-000T00:00:00", "no such day"),
+        ("2026-03-01T24:00:00", "time of day"),
+        ("2026-03-01T12:60:00", "time of day"),
+        ("2026-03-01T23:59:60", "time of day"),
+        ("2016-12-31T23:58:60", "time of day"),
+        ("2016-12-31T23:59:61", "time of day"),
+        ("1971-12-31T23:59:59", "before 1972"),
+        ("2026-03-01 12:00:00", "no epoch"),
+        ("2026-03-01T12:00:00,5", "no epoch"),
+    ],
+)
+def test_texts_that_are_none(text: str, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        Epoch.parse(text)
+
+
+def test_seconds_pass_a_leap_second_one_by_one() -> None:
+    start = Epoch.parse("2016-12-31T23:59:58.5")
+    texts = [start.plus(step).text for step in range(4)]
+    assert [text.partition("T")[2] for text in texts] == [
+        "23:59:58.500000000",
+        "23:59:59.500000000",
+        "23:59:60.500000000",
+        "00:00:00.500000000",
+    ]
+    assert Epoch.parse(texts[3]).since(start) == 3.0
+
+
+@given(
+    st.datetimes(min_value=datetime.datetime(1972, 1, 1), max_value=datetime.datetime(2100, 1, 1)),
+    st.floats(min_value=0.0, max_value=1e6),
+)
+def test_nothing_is_lost_but_the_last_digit(moment: datetime.datetime, seconds: float) -> None:
+    epoch = Epoch.parse(moment.isoformat())
+    later = epoch.plus(seconds)
+    assert later.elapsed - epoch.elapsed == Fraction(seconds)
+    assert abs(Epoch.parse(later.text).elapsed - later.elapsed) <= Fraction(1, 2 * 10**9)
+    assert Epoch.parse(later.text).text == later.text
+
+
+@given(st.datetimes(min_value=datetime.datetime(2017, 1, 1), max_value=datetime.datetime(2100, 1, 1)))
+def test_without_leap_seconds_it_is_the_calendar(moment: datetime.datetime) -> None:
+    since = Epoch.parse(moment.isoformat()).elapsed - Epoch.parse("2017-01-01T00:00:00").elapsed
+    assert since == Fraction((moment - datetime.datetime(2017, 1, 1)) // datetime.timedelta(microseconds=1), 10**6)
+
+
+@pytest.mark.parametrize(
+    ("exact", "shown"),
+    [
+        ("2026-03-01T12:00:00.1239", "2026-03-01T12:00:00.124"),
+        ("2026-03-01T12:00:00.1234", "2026-03-01T12:00:00.123"),
+        ("2026-03-01T12:00:59.99951", "2026-03-01T12:01:00.000"),
+        ("2026-12-31T23:59:59.9996", "2027-01-01T00:00:00.000"),
+        ("2016-12-31T23:59:59.9996", "2016-12-31T23:59:60.000"),
+        ("2016-12-31T23:59:60.9996", "2017-01-01T00:00:00.000"),
+    ],
+)
+def test_fewer_digits_are_rounded_not_cut(exact: str, shown: str) -> None:
+    assert Epoch.parse(exact).rounded(3) == shown
+
+
+@given(st.floats(min_value=0.0, max_value=1e6), st.integers(1, 9))
+def test_a_rounded_moment_is_at_most_half_its_last_digit_off(seconds: float, digits: int) -> None:
+    moment = Epoch.parse("2016-12-25T00:00:00").plus(seconds)
+    text = moment.rounded(digits)
+    assert abs(Epoch.parse(text).elapsed - moment.elapsed) <= Fraction(1, 2 * 10**digits)
+    assert len(text) == len("2016-12-25T00:00:00.") + digits

@@ -1,0 +1,99 @@
+"""Flights of trial schedules: flown anew from the first pulse that has changed, and the same to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.builders import pulse, spinner
+from support.places import CASES
+from test_flight import schedules, symmetric_spinners, triaxial_spinners
+
+from nutdamp import dynamics, flight, planning, work
+from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.errors import Infeasible
+from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.flight import Flight
+from nutdamp.schedule import Schedule
+from nutdamp.spacecraft import Spacecraft
+
+TORQUE = np.array([3.0, -2.0, 0.5])
+
+
+def bits(flown: Flight) -> list[bytes]:
+    """All that a flight gives: legs, motion along them and how it ends."""
+    times = np.linspace(0.0, flown.legs[-1].end, 50)
+    legs = [repr((one.start, one.end, one.completed, one.jump, one.completed_at_end)).encode() for one in flown.legs]
+    settled = flown.settled
+    return [*legs, *(part.tobytes() for part in (*flown.motion(times), settled.rates, settled.quaternion))]
+
+
+def train(count: int, moved: int | None = None) -> Schedule:
+    """So many pulses, one every 4 s; the one with the number ``moved`` comes later and is longer."""
+    pulses = [(4.0 * n + 1.0, 0.5) if n != moved else (4.0 * n + 1.2, 0.7) for n in range(count)]
+    return Schedule(tuple(pulse(t, on, on * TORQUE) for t, on in pulses))
+
+
+@pytest.mark.deep
+@given(
+    st.one_of(symmetric_spinners(), triaxial_spinners()),
+    st.sampled_from([0.0, 200.0]),
+    st.lists(st.one_of(schedules(), schedules(ideal=True)), min_size=2, max_size=3),
+)
+@settings(max_examples=40, deadline=None)
+def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, every: list[Schedule]) -> None:
+    body = replace(body, dissipation=constant) if constant else body
+    remembering = make_dynamics(body).remembering()
+    mixed = [Schedule((*one.pulses, *other.pulses)) for one in every for other in every]
+    for made in (*every, *mixed, *every):
+        assert bits(flight.flown(body, made, dynamics=remembering)) == bits(flight.flown(body, made))
+
+
+@pytest.mark.parametrize("moved", [0, 3, 7])
+def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -> None:
+    body = spinner(moments=(100.0, 120.0, 80.0))
+    remembering = make_dynamics(body).remembering()
+    flight.flown(body, train(8), dynamics=remembering)
+    with work.budget("trial", 1e9) as trial:
+        flown = flight.flown(body, train(8, moved), dynamics=remembering)
+    assert bits(flown) == bits(flight.flown(body, train(8, moved)))
+    changed = [leg for leg in flown.legs if leg.end > 4.0 * moved + 0.75]  # a leg for each coast, pulse, and the end
+    assert len(changed) == 2 * (8 - moved) + 1
+    integrated = [leg for leg in changed if leg.end > leg.start]
+    steps = sum(leg.path.steps for leg in integrated)
+    expected = len(changed) * dynamics.LEG + len(integrated) * dynamics.PULSE + steps * dynamics.STEP
+    assert trial.done == pytest.approx(expected)
+
+
+def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
+    body = spinner(moments=(100.0, 120.0, 80.0))
+    remembering = make_dynamics(body).remembering()
+    path, _ = remembering.path(body.initial, 0.0, 50.0, most=1000)
+    assert remembering.path(body.initial, 0.0, 50.0, most=path.steps)[0] is path
+    with pytest.raises(Infeasible):
+        remembering.path(body.initial, 0.0, 50.0, most=path.steps - 1)
+
+
+def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dynamics, "REMEMBERED", 3)
+    body = spinner()
+    remembering = make_dynamics(body).remembering()
+    for made in (train(2), train(2, 1), train(2, 0)):
+        assert bits(flight.flown(body, made, dynamics=remembering)) == bits(flight.flown(body, made))
+    assert remembering.known is not None
+    assert 0 < len(remembering.known) <= 3
+
+
+@pytest.mark.parametrize("name", ["geo-dissipation", "tensor-microsat"])
+def test_plans_are_the_same_for_much_less_work(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    body = load_spacecraft(CASES / f"{name}.yaml")
+    with work.budget("remembered", 1e9) as remembered:
+        made = planning.plan(body, "two-pulse").pulses
+    monkeypatch.setattr(Dynamics, "remembering", lambda one: one)
+    with work.budget("whole", 1e9) as whole:
+        same = planning.plan(body, "two-pulse").pulses
+    assert [(one.t, one.on_time) for one in made] == [(one.t, one.on_time) for one in same]
+    assert 0.0 < remembered.done < 0.75 * whole.done

@@ -1,0 +1,343 @@
+"""Torque-free motion of triaxial bodies: against two integrators, conserved quantities, limits and separatrix."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Sequence
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.special import ellipj, ellipk
+from support import reference
+from support.cases import spread
+
+from nutdamp.physics import attitude, cones, rates, triaxial
+
+Array = NDArray[np.float64]
+START = np.array([0.5, -0.5, 0.5, 0.5])
+DEGREE = math.pi / 180
+
+part = st.floats(0.05, 1.0)
+# I1 = y² + z² and round of a mass distribution: the triangle inequality holds, flat discs and equal moments included.
+bodies = st.tuples(part, part, part | st.just(0.0)).map(lambda p: np.array([p[1] + p[2], p[2] + p[0], p[0] + p[1]]))
+# Squares of the smallest rates must not vanish, or the tests could not tell how large |ω| is.
+rate = st.floats(-3.0, 3.0).map(lambda x: x if abs(x) > 1e-100 else 0.0)
+turns = st.lists(rate, min_size=3, max_size=3).map(np.array)
+
+
+def taylor_terms(
+    coupling: tuple[Decimal, Decimal, Decimal], state: list[Decimal], step: Decimal, with_attitude: bool
+) -> list[list[Decimal]]:
+    """Terms of the Taylor series of rates and quaternion over one step of half a radian, to order 30."""
+    series = [[value] for value in state]
+
+    def of(i: int, j: int) -> Decimal:
+        """Last coefficient of the product of two series."""
+        return sum(map(operator.mul, series[i], reversed(series[j])), Decimal(0))
+
+    for k in range(30):
+        f = step / (k + 1)
+        following = [f * coupling[0] * of(1, 2), f * coupling[1] * of(2, 0), f * coupling[2] * of(0, 1)]
+        if with_attitude:
+            following += [
+                -f / 2 * (of(4, 0) + of(5, 1) + of(6, 2)),
+                f / 2 * (of(3, 0) + of(5, 2) - of(6, 1)),
+                f / 2 * (of(3, 1) + of(6, 0) - of(4, 2)),
+                f / 2 * (of(3, 2) + of(4, 1) - of(5, 0)),
+            ]
+        for terms, value in zip(series, following, strict=False):
+            terms.append(value)
+    return series
+
+
+def to_forty_digits(
+    moments: Sequence[float], rates0: Sequence[float], times: Array, with_attitude: bool
+) -> tuple[Array, Array]:
+    """Rates (n, 3) and attitudes (n, 4) by Taylor series of Euler's equations in decimal numbers of 40 digits.
+
+    Attitudes from `START`; zeros without them, which saves three quarters of the work.
+    """
+    track = []
+    with localcontext() as context:
+        context.prec = 40
+        i1, i2, i3 = (Decimal(moment) for moment in moments)
+        coupling = ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)
+        state = [Decimal(float(rate)) for rate in rates0]
+        state += [Decimal(float(q) if with_attitude else 0) for q in START]
+        now = Decimal(0)
+        for time in times.tolist():
+            steps = math.ceil((time - float(now)) * math.hypot(*rates0) / 0.5)
+            step = (Decimal(time) - now) / steps
+            for _ in range(steps):
+                state = [sum(terms, Decimal(0)) for terms in taylor_terms(coupling, state, step, with_attitude)]
+            now = Decimal(time)
+            track.append([float(value) for value in state])
+    result = np.array(track)
+    return result[:, :3], result[:, 3:]
+
+
+def turned(first: Array, second: Array) -> float:
+    """Largest angle between two tracks of unit quaternions, rad."""
+    return 2 * float(np.min([np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)], 0).max())
+
+
+def extremes(moments: Sequence[float] | Array, rates0: Sequence[float] | Array) -> tuple[float, float]:
+    """Least and largest nutation angle."""
+    least, largest = triaxial._extreme_cones(moments, rates0)
+    return least.nutation, largest.nutation
+
+
+def off(first: Array, second: Array) -> float:
+    """Largest distance of two tracks of rates, as a part of |ω|."""
+    return float(np.linalg.norm(first - second, axis=1).max() / np.linalg.norm(second, axis=1).max())
+
+
+def test_jacobi_functions_are_those_of_scipy() -> None:
+    u = np.linspace(-20.0, 20.0, 401)
+    for m in (0.0, 1e-12, 0.1, 0.5, 0.9, 0.999):
+        theirs = ellipj(u, m)
+        for ours, their in zip(triaxial._jacobi(u, 1.0 - m), theirs[:3], strict=True):
+            assert ours == pytest.approx(their, abs=5e-14)
+        assert triaxial._quarter(1.0 - m) == pytest.approx(float(ellipk(m)), rel=1e-14)
+
+
+@pytest.mark.deep
+def test_hundred_periods_to_every_digit() -> None:
+    moments, rates0 = [1.0, 1.5, 2.375], [0.5, -0.25, 0.75]
+    times = np.linspace(0.0, 100.0, 11)[1:] * triaxial.nutation_period(moments, rates0)
+    track, _ = to_forty_digits(moments, rates0, times, with_attitude=False)
+    assert off(triaxial.free_rates(moments, rates0, times), track) < 2e-13
+    _, attitudes = to_forty_digits(moments, rates0, 0.2 * times, with_attitude=True)
+    assert turned(triaxial.free_attitude(moments, rates0, START, 0.2 * times), attitudes) < 4e-13
+
+
+@spread("nudge", [1e-2, -1e-4, 1e-8, -1e-12, 2.0**-52, -(2.0**-52)], quick=1)
+def test_near_the_separatrix(nudge: float) -> None:
+    """3·1·ω3² = 1.5·0.5·ω1² on it."""
+    moments, rates0 = [1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)]
+    period = triaxial.nutation_period(moments, rates0)
+    times = np.linspace(0.0, 3.0, 31)[1:] * period
+    track, _ = to_forty_digits(moments, rates0, times, with_attitude=False)
+    assert off(triaxial.free_rates(moments, rates0, times), track) < 1e-12
+    assert 20.0 < period < 500.0
+
+
+@spread("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, 1), (1, 0, -1)], quick=2)
+def test_on_the_separatrix(signs: tuple[int, int, int]) -> None:
+    moments, rates0 = [1.5, 2.0, 3.0], [0.5 * signs[0], 0.375 * signs[1], 0.25 * signs[2]]
+    times = np.linspace(0.0, 80.0, 21)[1:]
+    track, attitudes = to_forty_digits(moments, rates0, times, with_attitude=True)
+    assert off(triaxial.free_rates(moments, rates0, times), track) < 1e-14
+    assert turned(triaxial.free_attitude(moments, rates0, START, times), attitudes) < 1e-13
+    assert triaxial.nutation_period(moments, rates0) == math.inf
+    assert extremes(moments, rates0)[1] == pytest.approx(math.pi / 2, rel=1e-15)
+    # It ends in a spin about the middle axis and stays there.
+    end = triaxial.free_rates(moments, rates0, [1e4])[0]
+    assert abs(end[[0, 2]]).max() < 1e-300
+    assert moments[1] * abs(end[1]) == pytest.approx(np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14)
+
+
+@spread("moments", [(2.0, 3.0, 4.0), (4.0, 3.0, 2.0), (3.0, 4.0, 2.0), (1.0, 1.9, 1.8), (2.0, 2.0, 3.0)], quick=1)
+@spread("rates0", [(0.3, 0.2, 1.0), (0.3, -0.2, -1.0), (-1.0, 0.1, 0.3), (0.3, 1.0, 0.2)], quick=8)
+def test_against_dop853(moments: tuple[float, float, float], rates0: tuple[float, float, float]) -> None:
+    times = np.linspace(0.0, 60.0, 13)[1:]
+    theirs = reference.coast(moments, reference.Motion(np.array(rates0), attitude.matrix(START)), np.zeros(3), times)
+    track = triaxial.free_rates(moments, rates0, times)
+    attitudes = triaxial.free_attitude(moments, rates0, START, times)
+    assert off(track, np.array([motion.rates for motion in theirs])) < 1e-11
+    for motion, quaternion in zip(theirs, attitudes, strict=True):
+        assert reference.turned(motion.rotation, attitude.matrix(quaternion)) < 1e-11
+
+
+@settings(max_examples=60)
+@given(moments=bodies, rates0=turns, late=st.floats(0.0, 300.0))
+def test_any_motion_obeys_eulers_equations(moments: Array, rates0: Array, late: float) -> None:
+    """From any point of the track a radian on by DOP853: so short that no separatrix magnifies its errors."""
+    size = float(np.linalg.norm(rates0))
+    if size < 1e-3:
+        size = 1e-3
+    times = np.array([late, late + 1.0]) / size
+    track = triaxial.free_rates(moments, rates0, times)
+    attitudes = triaxial.free_attitude(moments, rates0, START, times)
+    start = reference.Motion(track[0], attitude.matrix(attitudes[0]))
+    end = reference.coast(moments.tolist(), start, np.zeros(3), times[1:] - times[0])[0]
+    assert end.rates == pytest.approx(track[1], abs=1e-12 * size)
+    assert reference.turned(end.rotation, attitude.matrix(attitudes[1])) < 2e-12
+
+
+@settings(max_examples=200)
+@given(moments=bodies, rates0=turns)
+def test_energy_and_angular_momentum_stay(moments: Array, rates0: Array) -> None:
+    size = float(np.linalg.norm(rates0))
+    times = np.linspace(0.0, 1000.0, 41) / max(size, 1e-3)
+    track = triaxial.free_rates(moments, rates0, times)
+    attitudes = triaxial.free_attitude(moments, rates0, START, times)
+    assert track[0] == pytest.approx(rates0, abs=1e-15 * size)
+    assert np.square(track) @ moments == pytest.approx(np.square(rates0) @ moments, rel=1e-13, abs=1e-290)
+    momentum = attitude.rotate(attitudes, track * moments)
+    expected = attitude.rotate(START, rates0 * moments)
+    assert np.linalg.norm(momentum - expected, axis=1).max() <= 1e-13 * np.linalg.norm(expected)
+    assert turned(attitudes[:1], START[None, :]) < 1e-15
+    assert np.linalg.norm(attitudes, axis=1) == pytest.approx(1.0, abs=1e-15)
+
+
+@settings(max_examples=200)
+@given(moments=bodies, rates0=turns)
+def test_the_period_is_one(moments: Array, rates0: Array) -> None:
+    """After half of it the transverse rates have changed sign, after the whole nothing differs."""
+    period = triaxial.nutation_period(moments, rates0)
+    if math.isinf(period):
+        return
+    half, whole, many = triaxial.free_rates(moments, rates0, np.array([0.5, 1.0, 50.0]) * period)
+    size = float(np.linalg.norm(rates0))
+    assert whole == pytest.approx(rates0, abs=1e-13 * size)
+    assert many == pytest.approx(rates0, abs=1e-12 * size)
+    assert np.abs(half) == pytest.approx(np.abs(rates0), abs=1e-13 * size)
+    assert sum(abs(now - then) <= 1e-12 * size for now, then in zip(half, rates0, strict=True)) >= 1
+    mirrored = [abs(now + then) <= 1e-12 * size for now, then in zip(half, rates0, strict=True)]
+    assert sum(mirrored) >= 2
+
+
+@settings(max_examples=100)
+@given(moments=bodies, rates0=turns)
+def test_extremes_of_the_nutation_angle(moments: Array, rates0: Array) -> None:
+    if not rates0.any():
+        return
+    least, largest = extremes(moments, rates0)
+    period = triaxial.nutation_period(moments, rates0)
+    size = max(float(np.linalg.norm(rates0)), 1e-3)
+    times = np.linspace(0.0, min(period, 200.0 / size), 401)
+    momentum = triaxial.free_rates(moments, rates0, times) * moments
+    sense = math.copysign(1.0, rates0[2])
+    angles = attitude.angle_between(momentum, np.array([0.0, 0.0, sense]))
+    assert least <= angles.min() + 1e-7
+    assert angles.max() <= largest + 1e-7
+    if period * size < 200.0:
+        assert angles.min() == pytest.approx(least, abs=2e-2)
+        assert angles.max() == pytest.approx(largest, abs=2e-2)
+
+
+def test_extremes_where_they_are_reached() -> None:
+    """With ω1 = 0 and with ω2 = 0 the motion about axis 3 is at an extreme; small angles keep all digits."""
+    for moments in ([2.0, 3.0, 4.0], [4.0, 3.0, 2.0]):
+        for scale in (0.1, 1e-9):
+            rates0 = [scale, 0.0, -1.0]
+            quarter = 0.25 * triaxial.nutation_period(moments, rates0)
+            later = triaxial.free_rates(moments, rates0, [quarter])[0]
+            assert abs(later[0]) < 1e-15
+            ends = sorted(
+                math.atan2(math.hypot(moments[0] * w[0], moments[1] * w[1]), moments[2] * abs(w[2]))
+                for w in (rates0, later)
+            )
+            assert extremes(moments, rates0) == pytest.approx(ends, rel=1e-13)
+    # Motion about axis 1 turns axis 3, here the largest, over.
+    least, largest = extremes([2.0, 3.0, 4.0], [1.0, 0.0, 0.1])
+    assert least == pytest.approx(math.atan2(2.0, 0.4))
+    assert largest == pytest.approx(math.pi - least)
+
+
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+@pytest.mark.parametrize("axial", [80.0, 160.0, 239.0])
+def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
+    first = 120.0
+    omega0, times = 0.3 - 0.2j, np.linspace(0.0, 50.0, 51)
+    ideal, _ = rates.impulse_sum(times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0))
+    arc = attitude.arc(first, axial, START, omega0, spin, times)
+    for apart in (1e-6, 1e-9, 1e-12, 0.0):
+        moments, rates0 = [first, first * (1.0 + apart), axial], [omega0.real, omega0.imag, spin]
+        track = triaxial.free_rates(moments, rates0, times)
+        assert np.abs(track[:, 0] + 1j * track[:, 1] - ideal).max() < 1e-12 + 100 * apart
+        assert np.abs(track[:, 2] - spin).max() < 1e-14 + 10 * apart
+        assert turned(triaxial.free_attitude(moments, rates0, START, times), arc) < 1e-12 + 1000 * apart
+        close = pytest.approx(cones.body_period(first, axial, spin), rel=1e-15 + 5 * apart)
+        assert triaxial.nutation_period(moments, rates0) == close
+        least, largest = extremes(moments, rates0)
+        angle = cones.nutation_angle(first, axial, abs(omega0), spin)
+        assert (least, largest) == pytest.approx((angle, angle), rel=1e-14 + 10 * apart)
+        rate = triaxial.body_nutation_rate(moments, spin)
+        assert rate == pytest.approx((first - axial) / first * spin, rel=1e-15 + 5 * apart)
+
+
+@spread("apart", [1e-3, 1e-6, 1e-12, 2.0**-52], quick=1)
+def test_nearly_a_sphere_and_nearly_equal_to_the_spin_axis(apart: float) -> None:
+    times = np.array([5.0, 20.0])
+    for moments in ([1.0, 1.0 + apart, 1.0 + 2 * apart], [1.0, 1.5, 1.5 * (1 + apart)], [1.5 * (1 + apart), 1.0, 1.5]):
+        for rates0 in ([0.5, 0.25, 1.0], [1e-9, 0.25, 1.0]):
+            track, attitudes = to_forty_digits(moments, rates0, times, with_attitude=True)
+            assert off(triaxial.free_rates(moments, rates0, times), track) < 1e-14
+            assert turned(triaxial.free_attitude(moments, rates0, START, times), attitudes) < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("moments", "rates0"),
+    [
+        ((2.0, 3.0, 4.0), (0.0, 0.0, -2.0)),
+        ((2.0, 3.0, 4.0), (0.0, 2.0, 0.0)),
+        ((2.0, 3.0, 4.0), (-2.0, 0.0, 0.0)),
+        ((2.0, 3.0, 4.0), (0.0, 0.0, 0.0)),
+        ((3.0, 3.0, 3.0), (1.0, 2.0, -3.0)),
+        ((2.0, 2.0, 3.0), (1.0, 2.0, 0.0)),
+        ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0)),
+    ],
+)
+def test_rates_that_stay(moments: tuple[float, float, float], rates0: tuple[float, float, float]) -> None:
+    times = np.linspace(0.0, 100.0, 11)
+    assert triaxial.free_rates(moments, rates0, times) == pytest.approx(np.tile(rates0, (11, 1)), rel=1e-15)
+    size = math.hypot(*rates0)
+    axis = np.array(rates0) / size if size else np.zeros(3)
+    half = 0.5 * size * times[:, None]
+    about = attitude.multiply(START, np.hstack([np.cos(half), np.sin(half) * axis]))
+    assert turned(triaxial.free_attitude(moments, rates0, START, times), about) < 2e-13
+    assert len(set(extremes(moments, rates0))) == 1
+
+
+def test_period_has_its_limits() -> None:
+    moments = [120.0, 100.0, 80.0]
+    small = 2 * math.pi / abs(triaxial.body_nutation_rate(moments, -3.0))
+    assert triaxial.nutation_period(moments, [0.0, 0.0, -3.0]) == pytest.approx(small, rel=1e-15)
+    assert triaxial.nutation_period(moments, [1e-9, 1e-9, -3.0]) == pytest.approx(small, rel=1e-15)
+    assert triaxial.nutation_period(moments, [0.3, 0.3, -3.0]) > small * 1.001
+    for rates0 in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
+        assert triaxial.nutation_period(moments, rates0) == math.inf
+    assert triaxial.nutation_period([2.0, 2.0, 2.0], [1.0, 1.0, 1.0]) == math.inf
+    assert triaxial.nutation_period([2.0, 3.0, 3.0], [0.0, 1.0, 1.0]) == math.inf
+
+
+def test_body_nutation_rate_of_unequal_transverse_moments() -> None:
+    moments, spin = (120.0, 100.0, 80.0), 3.0
+    rate = triaxial.body_nutation_rate(moments, spin)
+    assert rate == pytest.approx(0.775, abs=5e-4)
+    assert (110.0 - 80.0) / 110.0 * spin == pytest.approx(0.818, abs=5e-4)  # what the mean would give
+    # In the flight of a small nutation ω1 crosses zero twice each turn.
+    times = np.linspace(0.0, 20 * math.pi / rate, 2001)
+    flown = triaxial.free_rates(moments, [1e-4, 0.0, spin], times)
+    assert flown[:, 0] == pytest.approx(1e-4 * np.cos(rate * times), abs=1e-10)
+    # ... and turns backwards (-aω3 with a ω3 > 0): ω2 falls first.
+    assert flown[1, 1] < 0
+    assert triaxial.body_nutation_rate(moments, -spin) == -rate
+    assert triaxial.body_nutation_rate((80.0, 100.0, 120.0), spin) < 0
+    assert triaxial.body_nutation_rate((100.0, 80.0, 80.0), spin) == 0
+    assert triaxial.body_nutation_rate((80.0, 80.0, 80.0), spin) == 0
+    assert triaxial.body_nutation_rate((100.0, 80.0, 80.0 * (1 + 1e-15)), spin) == 0
+    with pytest.raises(ValueError, match="middle moment"):
+        triaxial.body_nutation_rate((120.0, 80.0, 100.0), spin)
+
+
+def test_units_do_not_matter() -> None:
+    """Powers of two only shift exponents, even far out of the usual range."""
+    moments, rates0, times = np.array([2.0, 3.0, 4.0]), np.array([0.3, 0.2, 1.0]), np.linspace(0.0, 50.0, 6)
+    plain = triaxial.free_rates(moments, rates0, times)
+    heavy, slow = 2.0**600, 2.0**-400
+    assert np.array_equal(triaxial.free_rates(moments * heavy, rates0 * slow, times / slow), plain * slow)
+    assert np.array_equal(
+        triaxial.free_attitude(moments * heavy, rates0 * slow, START, times / slow),
+        triaxial.free_attitude(moments, rates0, START, times),
+    )
+    assert triaxial.nutation_period(moments, rates0 * slow) * slow == triaxial.nutation_period(moments, rates0)
+    assert triaxial.free_rates(moments, rates0, np.zeros(0)).shape == (0, 3)
+    assert triaxial.free_attitude(moments, rates0, START, np.zeros(0)).shape == (0, 4)
