@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 from support.builders import channel, cross, spinner
-from support.cases import deep, weekly
+from support.cases import deep
 from support.golden import check_text
 from support.optimal import flies
 from support.places import case
@@ -212,7 +212,6 @@ def test_the_solver_prints_nothing_whoever_used_it_before(caller: str) -> None:
         deep("crash-literal-sphere-goal"),
         "crash-calm-target-short-horizon",
         "crash-max-on-time-1e-9-hang",
-        weekly("optimal-highs-2"),
     ],
 )
 def test_what_is_out_of_reach_has_a_reason_without_a_word_of_the_solver(name: str) -> None:
