@@ -251,7 +251,7 @@ BOUND = made("ideal", 0.0, 0.1, required=BOTH)
 
 def fired(cost: float, *blocks: Block) -> Plan:
     """Real pulse widths, perhaps sent as command blocks."""
-    one = made("real", 0.1, cost, 0.3, end=4.0, required=BOTH)
+    one = made("real", 0.1, cost, 0.15, end=4.0, required=BOTH)
     wide = tuple(replace(each, on_time=0.1, torque=10.0 * each.impulse) for each in one.pulses)
     return replace(one, schedule=Schedule(wide, blocks=blocks))
 
