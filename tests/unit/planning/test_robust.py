@@ -1,31 +1,34 @@
-"""Robust planning: the choice goes by what dispersed cases leave, and says what that costs."""
+"""Robust planning: the choice goes by what dispersed cases leave; most plans fly few of them."""
 
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 from support.builders import cross, judged, spinner
+from support.cases import deep, weekly
 from support.checker import violations
+from support.golden import refused
 from support.single_case import flown_outputs
 
-from nutdamp import planning, robust
+import nutdamp
+from nutdamp import planning, robust, screening
 from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
 from nutdamp.decision import Cases
 from nutdamp.dispersion import study_of
+from nutdamp.dispersion.cases import DispersedCases
+from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import BadRequest
-from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.presentation import robust_verdicts
-from nutdamp.presentation.robust_tables import front_screen
+from nutdamp.planning import Plan
 from nutdamp.schemes import CLASSIC, Options, four_pulse
 from nutdamp.screening import Candidate
-from nutdamp.spacecraft import Goal, Requirement, Spacecraft, Thruster
+from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft
 from nutdamp.tolerances import Dispersions, Tolerance
 
 SAMPLES = 2_048
@@ -40,90 +43,88 @@ def normal(size: float) -> Tolerance:
 
 
 def dispersed(
-    dispersions: Dispersions,
+    dispersions: Dispersions | None = EXACT,
     requirement: Requirement | None = None,
-    degrees: float = 5.0,
     moments: tuple[float, float, float] | None = None,
 ) -> Spacecraft:
-    channels = cross(8.0, max_on_time=2.0)
     known = tuple(
         replace(one, thrusters=tuple(replace(thruster, thrust=10.0, isp=220.0) for thruster in one.thrusters))
-        for one in channels
+        for one in cross(8.0, max_on_time=2.0)
     )
-    body = spinner(channels=known, requirement=requirement, degrees=degrees, moments=moments)
-    return replace(body, dispersions=dispersions)
+    return replace(spinner(channels=known, requirement=requirement, moments=moments), dispersions=dispersions)
 
 
-def planned(body: Spacecraft, names: tuple[str, ...] = CLASSIC) -> robust.RobustComparison:
-    compared = compare(body, names)
-    return robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
+def planned(
+    body: Spacecraft, *names: str, samples: int = SAMPLES, trials: int | None = None
+) -> robust.RobustComparison:
+    compared = compare(body, names or CLASSIC)
+    return robust.compare(compared, robust.attempts(compared)[:trials], samples=samples)
+
+
+def best(found: robust.RobustComparison) -> Candidate:
+    assert found.chosen is not None
+    return found.chosen
+
+
+def share(body: Spacecraft, plan: Plan, seed: int = robust.SEED, samples: int = SAMPLES) -> float:
+    """Of the cases those that comply."""
+    return run(Results(study_of(body, plan.pulses, seed=seed), samples)).met_fraction or 0.0
 
 
 def test_a_thruster_that_cannot_be_trusted_is_left_out() -> None:
     """Nominally four-pulse fires the untrusted channel; the robust plan does without, and tells what that takes."""
-    usual = planning.plan(dispersed(EXACT), "four-pulse").pulses
-    untrusted = usual.pulses[0].channel
-    body = dispersed(replace(EXACT, thrust={untrusted: normal(0.3)}))
-    found = planned(body, ("four-pulse",))
-    assert found.chosen is not None
+    untrusted = planning.plan(dispersed(), "four-pulse").pulses.pulses[0].channel
+    found = planned(dispersed(replace(EXACT, thrust={untrusted: normal(0.3)})), "four-pulse")
     assert found.usual is not None
-    assert untrusted in {pulse.channel for pulse in found.usual.plan.pulses}
-    assert untrusted not in {pulse.channel for pulse in found.chosen.plan.pulses}
-    assert found.chosen.nutation < 0.3 * found.usual.nutation
     assert found.cost is not None
-    more, less = found.chosen.plan.pulses, found.usual.plan.pulses
-    assert more.propellant is not None
-    assert less.propellant is not None
-    assert found.cost.propellant == pytest.approx(more.propellant - less.propellant)
+    more, less = best(found).plan.pulses, found.usual.plan.pulses
+    assert [untrusted in {pulse.channel for pulse in pulses} for pulses in (less, more)] == [True, False]
+    assert best(found).nutation < 0.3 * found.usual.nutation
+    assert found.cost.propellant == pytest.approx((more.propellant or 0.0) - (less.propellant or 0.0))
+    assert found.cost.impulse == pytest.approx(more.total_impulse - less.total_impulse)
     assert found.cost.end == pytest.approx(more.end - less.end)
-    assert found.cost.nutation < 0.0
+    assert found.cost.nutation == best(found).left - found.usual.left < 0.0
 
 
 @pytest.mark.deep
-def test_what_is_best_for_the_estimate_stays_where_nothing_is_better() -> None:
-    found = planned(dispersed(EXACT))
-    assert found.chosen is found.usual
-    assert found.comparison.recommended is not None
-    assert found.chosen is not None
-    assert found.chosen.plan is found.comparison.recommended
+def test_where_nothing_is_better_the_plan_recommended_for_nominal_values_stays_of_many_that_keep_the_limits() -> None:
+    body = dispersed()
+    found = planned(body)
+    assert best(found) is found.usual
+    assert best(found).plan is found.comparison.recommended
+    plans, kinds = [one.plan for one in found.candidates], set()
+    assert len(plans) > 10
+    for one in plans:
+        assert one.spacecraft is body
+        assert violations(body, one.pulses) == []
+        assert one.flown is not None
+        assert one.flown.nutation < body.nutation
+        kinds.add(tuple((pulse.channel, round(pulse.start, 6)) for pulse in one.pulses))
+    assert len(kinds) == len(plans), "none comes twice"
+    variants = {
+        scheme: " ".join(one.variant for one in found.candidates if one.plan.scheme == scheme) for scheme in CLASSIC
+    }
+    assert all(text in variants["two-pulse"] for text in ("as planned", "from ", " then "))
+    assert all(text in variants["four-pulse"] for text in ("as planned", "from ", "without "))
+    least = min(one.left for one in found.candidates)
+    close = [one.plan.pulses.cost for one in found.candidates if one.left <= 1.05 * least]
+    assert len(close) == found.equals
+    assert best(found).plan.pulses.cost <= min(close) * 1.001
 
 
-@pytest.mark.deep
-def test_the_figures_of_a_candidate_are_those_of_flights_one_by_one() -> None:
+@pytest.mark.parametrize("moments", [weekly(None), deep((122.0, 118.0, 80.0))])
+def test_the_figures_of_a_candidate_are_those_of_flights_one_by_one(moments: tuple[float, float, float] | None) -> None:
     """The nutation that 90 % of 200 cases do not exceed, flown singly through real widths."""
-    body = dispersed(Dispersions(A=normal(0.02), thrust_per_pulse=normal(0.05)), Requirement(None, None, 0.9))
-    found = planned(body, ("four-pulse",))
+    spread = Dispersions(A=normal(0.02), thrust_per_pulse=normal(0.05))
+    body = dispersed(spread, Requirement(None, None, 0.9), moments)
+    found = planned(body, "four-pulse", trials=1)
     assert found.probability == 0.9
     candidate = next(one for one in found.candidates if one.variant == "as planned")
     study = study_of(body, candidate.plan.pulses, seed=found.seed)
-    flown = [flown_outputs(study.model, study.draws_of(case))[0] for case in range(200)]
-    # The sampling error of the 90 % quantile of 200 cases is about a tenth.
-    assert float(np.quantile(flown, 0.9)) == pytest.approx(candidate.nutation, rel=0.25)
-
-
-@pytest.mark.deep
-def test_variants_keep_the_limits_and_come_once() -> None:
-    body = dispersed(EXACT)
-    plans = [one.plan for one in planned(body).candidates]
-    assert len(plans) > 10
-    assert {plan.scheme for plan in plans} == set(CLASSIC)
-    kinds = set()
-    for plan in plans:
-        assert plan.spacecraft is body
-        assert violations(body, plan.pulses) == []
-        assert plan.flown is not None
-        assert plan.flown.nutation < body.nutation
-        kinds.add(tuple((pulse.channel, round(pulse.start, 6)) for pulse in plan.pulses))
-    assert len(kinds) == len(plans)
-
-
-def test_variants_are_other_alignments_later_starts_and_fewer_channels() -> None:
-    found = planned(dispersed(EXACT), ("two-pulse", "four-pulse")).candidates
-    variants = {scheme: [one.variant for one in found if one.plan.scheme == scheme] for scheme in CLASSIC}
-    for text in ("as planned", "from ", " then "):
-        assert any(text in variant for variant in variants["two-pulse"])
-    for text in ("as planned", "from ", "without "):
-        assert any(text in variant for variant in variants["four-pulse"])
+    flown = [flown_outputs(study.model, study.draws_of(case))[0] for case in range(100)]
+    # The sampling error of the 90 % quantile of 100 cases is about a seventh.
+    assert float(np.quantile(flown, 0.9)) == pytest.approx(candidate.nutation, rel=0.35)
+    assert study.outputs_of(study.draws_of(3))[0] == pytest.approx(flown[3], abs=1e-10)
 
 
 HASTE = """\
@@ -142,27 +143,17 @@ dispersions:
 """Phases of late pulses are wrong by an error of C that grows with time."""
 
 
+@pytest.mark.weekly
 def test_the_earliest_end_is_a_candidate() -> None:
-    """No robust plan complies less often than the same search for the earliest end, and the trade has that plan too."""
+    """No robust plan complies less often than the same search for the earliest end."""
     body = read_spacecraft(HASTE, "haste.yaml")
-    soonest = planning.plan(body, "optimal", Options(least="time"))
-    alone = run(Results(study_of(body, soonest.pulses), SAMPLES)).met_fraction
-    found = planned(body, ("four-pulse", "optimal"))
-    assert found.chosen is not None
-    assert found.chosen.met is not None
-    assert alone is not None
-    assert found.chosen.met >= alone > 0.4
-    compared = compare(body, ("four-pulse", "optimal"))
-    front = robust.front(robust.compare(compared, robust.trials_of_front(compared, 2), samples=SAMPLES, whole=True))
-    assert max(one.met or 0.0 for one in front) >= alone
-    with (console := Console(width=140)).capture() as screen:
-        console.print(front_screen(found))
-    assert "No point meets the requirement: 5" in screen.get()
+    alone = share(body, planning.plan(body, "optimal", Options(least="time")))
+    assert (best(planned(body, "four-pulse", "optimal")).met or 0.0) >= alone > 0.4
 
 
 def test_how_far_it_is_can_be_watched() -> None:
-    compared = compare(dispersed(EXACT), ("four-pulse",))
-    trials, reported = robust.attempts(compared), list[int]()
+    compared = compare(dispersed(), ("four-pulse",))
+    trials, reported = robust.attempts(compared)[:3], list[int]()
     robust.compare(compared, trials, reported.append, samples=SAMPLES)
     assert reported[: len(trials)] == list(range(len(trials)))
     assert set(reported[len(trials) :]) <= {len(trials)}
@@ -171,28 +162,23 @@ def test_how_far_it_is_can_be_watched() -> None:
 @pytest.mark.deep
 def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
     """Four pulses of the example cost less, but turn H more; two pulses bring it back."""
-    example = read_spacecraft(example_text(), "example.yaml")
-    body = replace(example, dispersions=Dispersions(thrust_per_pulse=normal(0.001)))
+    body = replace(nutdamp.example(), dispersions=Dispersions(thrust_per_pulse=normal(0.001)))
     for shift, scheme in ((5.0, "four-pulse"), (0.1, "two-pulse")):
         requested = Requirement(math.radians(0.5), math.radians(shift), 0.99)
-        found = planned(replace(body, requirement=requested), ("four-pulse", "two-pulse"))
-        assert found.chosen is not None
-        assert found.chosen.plan.scheme == scheme
-        assert found.chosen.met == 1.0
-        assert found.meets_requirement
+        found = planned(replace(body, requirement=requested), "four-pulse", "two-pulse")
+        assert (best(found).plan.scheme, best(found).met, found.meets_requirement) == (scheme, 1.0, True)
 
 
 @pytest.mark.deep
 def test_the_plan_chosen_flies_cases_that_are_new_to_the_choice() -> None:
-    example = read_spacecraft(example_text(), "example.yaml")
-    found = planned(example, ("two-pulse",))
-    assert found.chosen is not None
+    example = nutdamp.example()
+    found = planned(example, "two-pulse", trials=1)
     assert found.fresh is not None
     assert found.fresh.cases.seed != found.seed
-    again = run(Results(study_of(example, found.chosen.plan.pulses, seed=found.fresh.cases.seed), found.samples))
+    again = run(Results(study_of(example, best(found).plan.pulses, seed=found.fresh.cases.seed), found.samples))
     assert (found.fresh.met, found.fresh.interval) == (again.met_fraction, again.interval)
-    assert found.fresh.met != found.chosen.met
-    assert planned(replace(example, requirement=None), ("two-pulse",)).fresh is None
+    assert found.fresh.met != best(found).met
+    assert planned(replace(example, requirement=None), "two-pulse", trials=1).fresh is None
 
 
 LUCKY = """
@@ -215,22 +201,20 @@ dispersions:
 """The cheapest plan with which 95 % of the first cases comply does so in 94.7 % of others."""
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_next() -> None:
     body = read_spacecraft(LUCKY, "lucky.yaml")
-    found = planned(body, ("optimal",))
-    assert found.chosen is not None
+    found = planned(body, "optimal")
     assert found.fresh is not None
     assert found.decision is not None
-    assert found.decision.cases == found.chosen.cases, "as disperse has it"
+    assert found.decision.cases == best(found).cases, "as disperse has it"
     assert found.meets_requirement
     assert found.fresh.met >= found.probability
-    spent = found.chosen.plan.pulses.cost
+    spent = best(found).plan.pulses.cost
     seemed = [one for one in found.candidates if (one.met or 0.0) >= 0.95 and one.plan.pulses.cost < 0.999 * spent]
     assert seemed
     for one in seemed:
-        again = run(Results(study_of(body, one.plan.pulses, seed=robust.FRESH), found.samples))
-        assert (again.met_fraction or 0.0) < found.probability
+        assert share(body, one.plan, robust.FRESH, found.samples) < found.probability
     # Where there is no other plan, the new cases decide.
     lucky = seemed[0]
     alone = robust._checked(replace(found, chosen=lucky, candidates=(lucky,)), [lucky])
@@ -244,41 +228,34 @@ def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_ne
 
 
 @pytest.mark.deep
-def test_the_plan_in_which_most_cases_comply() -> None:
+def test_the_plan_in_which_most_cases_comply_by_real_widths() -> None:
     """Whatever the nominal plan costs; of those within the sampling error of the best the cheapest."""
     narrow = Requirement(math.radians(0.4), math.radians(0.3))
     body = dispersed(Dispersions(A=normal(0.01), thrust_per_pulse=normal(0.02)), narrow)
-    found = planned(body)
-    shares = [one.met for one in found.candidates if one.met is not None]
-    assert len(shares) == len(found.candidates)
+    found = planned(body, "two-pulse", "four-pulse")
+    shares = [one.met or 0.0 for one in found.candidates]
     assert 0.05 < max(shares) < 0.997
-    assert found.chosen is found.candidates[0]
+    assert best(found) is found.candidates[0]
+    assert best(found).met == share(body, best(found).plan)
     error = 3.0 * math.sqrt(max(shares) * (1.0 - max(shares)) / found.samples)
-    assert found.chosen.met is not None
-    assert found.chosen.met >= max(shares) - error
-    surely = [one for one in found.candidates if one.met is not None and one.met >= max(shares) - error / 3.0]
-    assert found.chosen.plan.pulses.cost <= 1.001 * min(one.plan.pulses.cost for one in surely)
+    assert (best(found).met or 0.0) >= max(shares) - error
+    surely = [one for one in found.candidates if (one.met or 0.0) >= max(shares) - error / 3.0]
+    assert best(found).plan.pulses.cost <= 1.001 * min(one.plan.pulses.cost for one in surely)
     assert found.meets_requirement is False
 
 
-def test_each_share_is_that_of_the_real_widths() -> None:
+def test_the_share_is_that_of_the_real_widths() -> None:
     """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
-    body = dispersed(Dispersions(A=normal(0.002)), Requirement(None, math.radians(0.7)))
-    compared = compare(body, ("four-pulse",))
-    found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
-    for one in found.candidates:
-        results = run(Results(study_of(body, one.plan.pulses), found.samples))
-        assert one.met == results.met_fraction
-    assert found.candidates[0].met == 1.0
+    compared = compare(dispersed(requirement=Requirement(None, math.radians(0.7))), ("four-pulse",))
+    assert best(robust.compare(compared, robust.attempts(compared)[:1], samples=500)).met == 1.0
 
 
 @pytest.mark.deep
 def test_the_spin_is_part_of_the_requirement_in_every_case() -> None:
     """Cases whose spin misses the goal by more than 0.1 % do not comply: ω3 is known to 0.1 % here, one sigma."""
     body = dispersed(Dispersions(omega0=(None, None, normal(0.001))))
-    found = planned(replace(body, goal=Goal(spin=body.spin)), ("two-pulse",))
-    assert found.chosen is not None
-    assert found.chosen.met == pytest.approx(math.erf(1.0 / math.sqrt(2.0)), abs=0.01)
+    found = planned(replace(body, goal=Goal(spin=body.spin)), "two-pulse")
+    assert best(found).met == pytest.approx(math.erf(1.0 / math.sqrt(2.0)), abs=0.01)
 
 
 def test_a_scheme_with_a_bug_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,71 +263,117 @@ def test_a_scheme_with_a_bug_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
         raise ZeroDivisionError
 
     monkeypatch.setattr(four_pulse, "schedule", broken)
-    found = planned(dispersed(EXACT), ("two-pulse", "four-pulse"))
-    assert {one.plan.scheme for one in found.candidates} == {"two-pulse"}
+    assert robust.attempts(compare(dispersed(), ("four-pulse",))) == []
 
 
-def test_less_propellant_among_equals() -> None:
-    found = planned(dispersed(EXACT))
-    assert found.chosen is not None
-    least = min(one.left for one in found.candidates)
-    close = [one.plan.pulses.cost for one in found.candidates if one.left <= 1.05 * least]
-    assert len(close) == found.equals
-    assert found.chosen.plan.pulses.cost <= min(close) * 1.001
+def candidate(impulse: float, left: float = 0.0, met: float | None = None, end: float = 1.0) -> Candidate:
+    """A plan of so many N m s, whose angle left (rad) and share of 1,000 cases met are given."""
+    levels = {Part.NUTATION: left, Part.SHIFT: 0.0}
+    return Candidate(judged("plan", 0.0, impulse=impulse, end=end), "as planned", Cases(1_000, 1, met, 0.997, levels))
 
 
-def of_given(cheap: tuple[float, float | None], dear: tuple[float, float | None]) -> robust.RobustComparison:
-    """Two plans of 1 and 2 N m s, whose angle left (rad) and share of 1,000 cases met are given."""
-    plans = judged("cheap", 0.0, impulse=1.0), judged("dear", 0.0, impulse=2.0)
-    body = plans[0].spacecraft
-    candidates = []
-    for plan, (left, met) in zip(plans, (cheap, dear), strict=True):
-        levels = {Part.NUTATION: left, Part.SHIFT: 0.0}
-        candidates.append(Candidate(replace(plan, spacecraft=body), "as planned", Cases(1_000, 1, met, 0.997, levels)))
-    return robust.ranked(Comparison(body, plans), candidates, 1_000, 0.997)
+def ranked(usual: Candidate, *given: Candidate) -> robust.RobustComparison:
+    body = usual.plan.spacecraft
+    for one in given:
+        one.plan = replace(one.plan, spacecraft=body)
+    return robust.ranked(Comparison(body, (usual.plan,)), given, 1_000, 0.997)
 
 
 @pytest.mark.parametrize(
-    ("cheap", "dear", "best"),
+    ("cheap", "dear", "chosen", "equals"),
     [
-        ((1.04, None), (1.0, None), "cheap"),  # angles count as equal within 5 %
-        ((1.06, None), (1.0, None), "dear"),
-        ((1.0, 0.885), (1.0, 0.9), "cheap"),  # the 95 % interval of 900 in 1,000 cases begins at 0.880
-        ((1.0, 0.875), (1.0, 0.9), "dear"),
+        ((1.04, None), (1.0, None), 0, 2),  # angles count as equal within 5 %
+        ((1.06, None), (1.0, None), 1, 1),
+        ((1.0, 0.885), (1.0, 0.9), 0, 2),  # the 95 % interval of 900 in 1,000 cases begins at 0.880
+        ((1.0, 0.875), (1.0, 0.9), 1, 1),
     ],
 )
 def test_candidates_count_as_equal_within_the_sampling_error_and_no_further(
-    cheap: tuple[float, float | None], dear: tuple[float, float | None], best: str
+    cheap: tuple[float, float | None], dear: tuple[float, float | None], chosen: int, equals: int
 ) -> None:
-    found = of_given(cheap, dear)
-    assert found.chosen is not None
-    assert found.chosen.plan.scheme == best
-    assert found.equals == (2 if best == "cheap" else 1)
+    given = candidate(1.0, *cheap), candidate(2.0, *dear)
+    found = ranked(given[0], *given)
+    assert (best(found), found.equals) == (given[chosen], equals)
 
 
-@pytest.mark.deep
-def test_a_real_tensor_is_flown() -> None:
-    body = dispersed(Dispersions(A=normal(0.01)), moments=(122.0, 118.0, 80.0))
-    found = planned(body, ("four-pulse",))
-    (candidate, *_) = found.candidates
-    study = study_of(body, candidate.plan.pulses, seed=found.seed)
-    assert study.outputs_of(study.draws_of(3))[0] == pytest.approx(
-        flown_outputs(study.model, study.draws_of(3))[0], abs=1e-10
-    )
-    assert found.chosen is not None
+@pytest.mark.parametrize("recommended", [0, 1])
+def test_of_plans_that_cost_the_same_the_one_recommended_for_nominal_values(recommended: int) -> None:
+    """Both comply as often but for the sampling error; the other one ends earlier, but differs in nothing else."""
+    given = candidate(1.0, met=0.895, end=2.0), candidate(1.0, met=0.9)
+    found = ranked(given[recommended], *given)
+    assert (best(found), found.equals) == (given[recommended], 2)
 
 
-def test_nothing_feasible() -> None:
-    body = dispersed(EXACT)
-    weak = tuple(replace(one, thrusters=(Thruster(one.name, one.thrusters[0].torque * 1e-9),)) for one in body.channels)
-    found = planned(replace(body, channels=weak, limits=replace(body.limits, horizon=1e-3)))
-    assert found.chosen is None
-    assert found.cost is None
-    assert robust_verdicts.robust_reason(found) == "no scheme is feasible"
-    assert found.meets_requirement is None
+@pytest.mark.parametrize(
+    ("bounds", "hopeful"),
+    [
+        # Surely enough comply with the second: dearer plans are out, cheaper ones only where they cannot reach 95 %.
+        ([(1.0, 0.90, 0.94), (2.0, 0.96, 0.98), (2.001, 0.9, 0.97), (3.0, 0.99, 1.0), (1.5, 0.90, 0.96)], {1, 2, 4}),
+        # Perhaps enough comply with the first: none is out but what is worse than the sampling error allows.
+        ([(1.0, 0.90, 0.96), (2.0, 0.80, 0.897), (2.0, 0.5, 0.6)], {0, 1}),
+        # With none enough comply.
+        ([(1.0, 0.60, 0.70), (2.0, 0.65, 0.75), (2.0, 0.5, 0.6)], {0, 1}),
+    ],
+)
+def test_only_what_cannot_be_chosen_flies_no_more_cases(
+    bounds: list[tuple[float, float, float]], hopeful: set[int]
+) -> None:
+    given = [candidate(impulse, met=0.5 * (low + high)) for impulse, low, high in bounds]
+    for one, (_, low, high) in zip(given, bounds, strict=True):
+        one.low, one.high = low, high
+    found = screening._hopeful(given, 20_000, 0.95)
+    assert {given.index(one) for one in found} == hopeful
 
 
-def test_without_dispersions_there_is_nothing_to_go_by() -> None:
-    compared = compare(replace(dispersed(EXACT), dispersions=None), ("four-pulse",))
-    with pytest.raises(BadRequest, match="no dispersions"):
-        robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
+@pytest.mark.parametrize(
+    "requirement",
+    [
+        weekly(Requirement(math.radians(0.5), math.radians(0.2), 0.997)),  # with none of the plans enough cases comply
+        deep(Requirement(math.radians(1.5), None, 0.95)),  # with several
+        weekly(None),
+    ],
+)
+def test_the_choice_is_that_of_all_cases_for_a_fraction_of_them(
+    requirement: Requirement | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, samples = replace(nutdamp.example(), requirement=requirement), 6_000
+    few = planned(body, "two-pulse", "four-pulse", samples=samples, trials=12)
+    monkeypatch.setattr(screening, "_hopeful", lambda candidates, *_: list(candidates))
+    every = planned(body, "two-pulse", "four-pulse", samples=samples, trials=12)
+    assert {one.cases.samples for one in every.candidates} == {samples}
+    assert [pulse.t for pulse in best(few).plan.pulses] == [pulse.t for pulse in best(every).plan.pulses]
+    assert best(few).cases == best(every).cases
+    assert few.usual is not None
+    assert few.usual.cases.samples == samples
+    flown, all_of_them = (sum(one.cases.samples for one in found.candidates) for found in (few, every))
+    assert flown < 0.7 * all_of_them
+
+
+def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
+    """The flight of the first portion goes on until the interrupt has come out."""
+    body = nutdamp.example()
+    study, begun, over = study_of(body, planning.plan(body, "two-pulse").pulses), threading.Event(), threading.Event()
+    real = study.flies
+
+    def fly(cases: DispersedCases) -> Ends:
+        begun.set()
+        over.wait(60.0)
+        return real(cases)
+
+    def interrupt(_: int) -> None:
+        assert begun.wait(60.0)
+        raise KeyboardInterrupt
+
+    vars(study)["flies"] = fly
+    with pytest.raises(KeyboardInterrupt):
+        run(Results(study, 2_048), watch=interrupt)
+    assert not over.is_set()
+    over.set()
+
+
+def test_nothing_feasible_and_nothing_dispersed() -> None:
+    found = planned(replace(dispersed(), channels=cross(1e-9), limits=Limits(horizon=1e-3)))
+    assert (found.chosen, found.cost, found.decision, found.meets_requirement) == (None, None, None, None)
+    sure = compare(dispersed(None), ("four-pulse",))
+    with refused(BadRequest, "plan.not-dispersed"):
+        robust.compare(sure, robust.attempts(sure), samples=SAMPLES)
