@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.builders import (
     BOTH,
-    COUNTS,
     HALF_A_DEGREE,
     INFEASIBLE,
     POINTING,
@@ -35,22 +34,67 @@ from nutdamp.recommendation import Gain, Ground, Standing, cheapest, recommend
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Goal, Requirement
 
-KEEP = Requirement(momentum_shift=math.radians(0.2))
-TINY = Requirement(nutation=math.radians(1e-13))
-SMALL = Requirement(nutation=math.radians(1e-6))
-SHIFTING = Requirement(nutation=math.radians(1e-13), momentum_shift=math.radians(0.1))
 SPIN = Goal(spin=3.0)
+PERIOD = spinner().inertial_period
 
 
-def made(
-    name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: object
-) -> Plan:
-    return judged(name, nutation, propellant=cost, shift=shift, end=end, **more)  # type: ignore[arg-type]
+def angle(nutation: float | None = None, shift: float | None = None) -> Requirement:
+    return Requirement(*(None if one is None else math.radians(one) for one in (nutation, shift)))
 
 
-def small(name: str, nutation: float, cost: float) -> Plan:
-    """For a body of 0.02° of nutation."""
-    return replace(made(name, nutation, cost), spacecraft=spinner(degrees=0.02))
+GIVEN: dict[str, dict[str, Any]] = {
+    "": {},
+    "0.02°": {"degrees": 0.02},
+    "target": {"goal": POINTING},  # 11.46° off: 1 % of the turn is 0.1146°
+    "spin": {"goal": SPIN},
+    "both": {"required": BOTH},
+    "half": {"required": HALF_A_DEGREE},
+    "keep": {"required": angle(None, 0.2)},
+    "tiny": {"required": angle(1e-13)},
+    "small": {"required": angle(1e-6)},
+    "still": {"required": angle(1e-13, 0.1)},
+}
+
+# What is tested | what is given: the requirement or goal | the best, what decided | plans: name, nutation left in deg,
+# propellant, shift of H in deg, end, spin; ! breaks a cone, ? is infeasible.
+RULE = """
+infeasible plans are passed over                |        | a ONLY        | ? 0; a 3
+one per cent of the 5° is as good as nothing    |        | thrifty COST  | thrifty 0.0495 0.1; clean 1e-12 0.2
+more is not                                     |        | clean ONLY    | thrifty 0.0505 0.1; clean 1e-12 0.2
+however cheap                                   |        | clean ONLY    | thrifty 4.9 0.001; clean 1e-12 0.2
+0.001° counts as damped whatever the initial    | 0.02°  | thrifty COST  | thrifty 0.00099 0.1; clean 0 0.2
+above it does not                               | 0.02°  | clean ONLY    | thrifty 0.00101 0.1; clean 0 0.2
+what keeps the cones                            |        | damps ONLY    | !thrifty 0 0.1; damps 0 0.2
+but not what damps less                         |        | !thrifty ONLY | !thrifty 0 0.1; keeps 3 0.2
+of those that all break them                    |        | !thrifty COST | !thrifty 0 0.1; !dear 0 0.2
+the target must be reached too                  | target | there ONLY    | beside 0 0.1 0.12; there 0 0.2 0.11
+within 1 % of the turn                          | target | near COST     | near 0 0.1 0.114; there 0 0.2 0.11
+where nothing damps, least nutation             |        | four LEFT     | two 4.9 4; four 2.5 81; one 3.7 4
+where nothing reaches the target, least of both | target | near LEFT     | a 0 - 9; near 4 - 3; b 6 - 1
+what meets the requirement                      | both   | meeting ONLY  | drifting 0.01 0.1 0.3; meeting 0.4 0.5 0.1
+which says what is enough                       | half   | thrifty COST  | thrifty 0.4 0.1; clean 0 0.2
+what it does not bound must be damped           | keep   | damping ONLY  | idle 4.9 0; damping 0.01 0.5 0.1
+or at least be less                             | keep   | worse LEFT    | idle 4.9 0; worse 3 0.5 0.1
+where none meets it, least nutation             | half   | two LEFT      | one 0.7 0.1; two 0.6 9
+where all damp, nearest to it                   | both   | near NEAREST  | far 1e-12 0.1 3.5; near 5e-12 0.2 0.25
+within a thousandth of it                       | both   | cheap COST    | near 5e-6 0.2 0.25; cheap 5e-6 0.1 0.2501
+not beyond                                      | both   | near NEAREST  | near 5e-6 0.2 0.25; cheap 5e-6 0.1 0.251
+so with nutation                                | small  | cheap COST    | near 5e-6 0.2 0.25; cheap 5.0005e-6 0.1 0.25
+1e-7° are no rounding                           | small  | near NEAREST  | near 5e-6 0.2 0.25; cheap 5.1e-6 0.1 0.25
+of what leaves but rounding the cheapest        | tiny   | noisy COST    | quiet 3e-13 0.2; noisy 2e-12 0.1
+also where another part is missed               | still  | cheap COST    | dear 1e-13 0.2 0.3; cheap 0 0.1 0.3
+equal costs: the earlier end                    |        | early END     | late 0 12.6312 1 28; early 0 12.6323 1 15
+less shift first                                |        | b SHIFT       | late 0 12.6312 1 28; early 0 12.6323 1 15; b 0 12.633 0.5 90
+then the end                                    |        | c SHIFT_END   | a 0 12.6312 1 28; d 0 12.6323 1 15; b 0 12.633 0.5 90; c 0 12.633 0.5 80
+half a thousandth is equal                      |        | early END     | late 0 1 0 9; early 0 1.0005
+two are not                                     |        | late COST     | late 0 1 0 9; early 0 1.002
+shifts within half a nanoradian                 |        | early END     | late 0 1 0 9; early 0 1 2.9e-8
+no further                                      |        | late SHIFT    | late 0 1 0 9; early 0 1 1.2e-7
+where a propellant is not known the impulse     |        | early END     | late 0 0.1 0 9; early 0 -
+the spin is part of the requirement             | spin   | right ONLY    | cheap 0 0.1 0 1 3.01; right 0 0.2
+a missed spin                                   | spin   | cheap ONLY    | cheap 0 0.1 0 1 3.01
+"""  # noqa: E501
+CASES = [[cell.strip() for cell in line.split("|")] for line in RULE.strip().splitlines()]
 
 
 class Straying(Judged):
@@ -61,114 +105,36 @@ class Straying(Judged):
         return False
 
 
-def straying(name: str, nutation: float, cost: float) -> Plan:
-    one = made(name, nutation, cost)
-    assert isinstance(one, Judged)
-    return Straying(one.spacecraft, name, one.schedule, ended=one.ended)
+def made(
+    name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: Any
+) -> Plan:
+    degrees = more.pop("degrees", 5.0)
+    one = judged(name, nutation, propellant=cost, shift=shift, end=end, **more)
+    if degrees != 5.0:
+        one = replace(one, spacecraft=spinner(degrees=degrees))
+    if name.startswith("!"):
+        assert isinstance(one, Judged)
+        return Straying(one.spacecraft, name, one.schedule, ended=one.ended)
+    return INFEASIBLE if name == "?" else one
 
 
-CLEAN = made("clean", 1e-12, 0.2)
-LATE, EARLY = made("late", 0.0, 12.6312, 1.0, 28.0), made("early", 0.0, 12.6323, 1.0, 15.0)
-"""12.6312 g against 12.6323 g: both print as 12.63 g, and one ends in half the time."""
-STILL = made("still", 0.0, 12.6330, 0.5, 90.0)
-THERE = made("there", 1e-12, 0.2, 0.11, goal=POINTING)
-"""Of a target 11.46° off; 1 % of the turn is 0.1146°."""
-NEAR = {required: made("near", 5e-6, 0.2, 0.25, required=required) for required in (BOTH, SMALL)}
-
-BEST: dict[str, tuple[str, Ground, Sequence[Plan]]] = {
-    "infeasible plans are passed over": ("a", Ground.ONLY, [INFEASIBLE, made("a", 3.0)]),
-    "one per cent of the 5° is as good as nothing": (
-        "thrifty", Ground.COST, [made("thrifty", 0.99 * COUNTS, 0.1), CLEAN]
-    ),
-    "more is not": ("clean", Ground.ONLY, [made("thrifty", 1.01 * COUNTS, 0.1), CLEAN]),
-    "however cheap": ("clean", Ground.ONLY, [made("thrifty", 4.9, 0.001), CLEAN]),
-    "below a thousandth of a degree it counts as damped": (
-        "thrifty", Ground.COST, [small("thrifty", 0.99e-3, 0.1), small("clean", 0.0, 0.2)]
-    ),
-    "above it does not": ("clean", Ground.ONLY, [small("thrifty", 1.01e-3, 0.1), small("clean", 0.0, 0.2)]),
-    "what keeps the cones": ("damps", Ground.ONLY, [straying("thrifty", 0.0, 0.1), made("damps", 0.0, 0.2)]),
-    "but not what damps less": ("thrifty", Ground.ONLY, [straying("thrifty", 0.0, 0.1), made("keeps", 3.0, 0.2)]),
-    "of those that all break them": ("thrifty", Ground.COST, [straying("thrifty", 0.0, 0.1), straying("b", 0.0, 0.2)]),
-    "the target must be reached too": (
-        "there", Ground.ONLY, [made("beside", 1e-12, 0.1, 0.12, goal=POINTING), THERE]
-    ),
-    "within 1 % of the turn": ("near", Ground.COST, [made("near", 1e-12, 0.1, 0.114, goal=POINTING), THERE]),
-    "where nothing damps, least nutation": (
-        "four", Ground.LEFT, [made("two", 4.9, 4.0), made("four", 2.5, 81.0), made("one", 3.7, 4.0)]
-    ),
-    "where nothing reaches the target, least of both": (
-        "near",
-        Ground.LEFT,
-        [made(name, left, None, off, goal=POINTING) for name, left, off in (("a", 0, 9), ("near", 4, 3), ("b", 6, 1))],
-    ),
-    "what meets the requirement": (
-        "meeting",
-        Ground.ONLY,
-        [made("drifting", 0.01, 0.1, 0.3, required=BOTH), made("meeting", 0.4, 0.5, 0.1, required=BOTH)],
-    ),
-    "which says what is enough": (
-        "thrifty", Ground.COST, [made(*one, required=HALF_A_DEGREE) for one in (("thrifty", 0.4, 0.1), ("b", 0.0, 0.2))]
-    ),
-    "what it does not bound must be damped": (
-        "damping",
-        Ground.ONLY,
-        [made("idle", 4.9, 0.0, required=KEEP), made("damping", 0.01, 0.5, 0.1, required=KEEP)],
-    ),
-    "or at least be less": (
-        "worse", Ground.LEFT, [made("idle", 4.9, 0.0, required=KEEP), made("worse", 3.0, 0.5, 0.1, required=KEEP)]
-    ),
-    "where none meets it, least nutation": (
-        "two", Ground.LEFT, [made(*one, required=HALF_A_DEGREE) for one in (("one", 0.7, 0.1), ("two", 0.6, 9.0))]
-    ),
-    "where all damp, nearest to it": (  # rounding does not decide, and least nutation is not claimed
-        "near",
-        Ground.NEAREST,
-        [made("far", 1e-12, 0.1, 3.5, required=BOTH), made("near", 5e-12, 0.2, 0.25, required=BOTH)],
-    ),
-    "within a thousandth of it": (
-        "cheap", Ground.COST, [NEAR[BOTH], made("cheap", 5e-6, 0.1, 0.2501, required=BOTH)]
-    ),
-    "not beyond": ("near", Ground.NEAREST, [NEAR[BOTH], made("cheap", 5e-6, 0.1, 0.251, required=BOTH)]),
-    "so with nutation": ("cheap", Ground.COST, [NEAR[SMALL], made("cheap", 5.0005e-6, 0.1, 0.25, required=SMALL)]),
-    "1e-7° are no rounding": ("near", Ground.NEAREST, [NEAR[SMALL], made("cheap", 5.1e-6, 0.1, 0.25, required=SMALL)]),
-    "of what leaves but rounding the cheapest": (
-        "noisy", Ground.COST, [made("quiet", 3e-13, 0.2, required=TINY), made("noisy", 2e-12, 0.1, required=TINY)]
-    ),
-    "also where another part is missed": (
-        "cheap",
-        Ground.COST,
-        [made("dear", 1e-13, 0.2, 0.3, required=SHIFTING), made("cheap", 0.0, 0.1, 0.3, required=SHIFTING)],
-    ),
-    "equal costs: the earlier end": ("early", Ground.END, [LATE, EARLY]),
-    "less shift first": ("still", Ground.SHIFT, [LATE, EARLY, STILL]),
-    "then the end": ("sooner", Ground.SHIFT_END, [LATE, EARLY, STILL, made("sooner", 0.0, 12.633, 0.5, 80.0)]),
-    "not for a thousandth more": ("late", Ground.COST, [LATE, made("dearer", 0.0, 12.6312 * 1.0011)]),
-    "half a thousandth is equal": ("b", Ground.END, [made("a", 0.0, 1.0, end=9.0), made("b", 0.0, 1.0005)]),
-    "two are not": ("a", Ground.COST, [made("a", 0.0, 1.0, end=9.0), made("b", 0.0, 1.002)]),
-    "shifts within a nanoradian": (
-        "b", Ground.END, [made("a", 0.0, end=9.0), made("b", 0.0, shift=math.degrees(0.5e-9))]
-    ),
-    "no further": ("a", Ground.SHIFT, [made("a", 0.0, end=9.0), made("b", 0.0, shift=math.degrees(2e-9))]),
-    "where a propellant is not known the impulse": (
-        "b", Ground.COST, [judged("a", 0.0, impulse=3.0, propellant=0.1), judged("b", 0.0, impulse=2.0)]
-    ),
-    "the spin is part of the requirement": (
-        "right", Ground.ONLY, [made("cheap", 0.0, 0.1, goal=SPIN, spin=3.01), made("right", 0.0, 0.2, goal=SPIN)]
-    ),
-    "a missed spin": ("cheap", Ground.ONLY, [made("cheap", 0.0, 0.1, goal=SPIN, spin=3.01)]),
-}  # fmt: skip
+def plans_of(given: str, text: str) -> list[Plan]:
+    plans = []
+    for name, *rest in (one.split() for one in text.split(";")):
+        numbers = [None if one == "-" else float(one) for one in rest]
+        plans.append(made(name, *numbers[:4], **GIVEN[given], spin=dict(enumerate(numbers)).get(4)))  # type: ignore[arg-type]
+    return plans
 
 
-@pytest.mark.parametrize("name", BEST)
-def test_the_plan_to_fly_and_what_decided(name: str) -> None:
-    best, ground, plans = BEST[name]
-    found = recommend(plans)
+@pytest.mark.parametrize(("what", "given", "decided", "plans"), CASES, ids=[row[0] for row in CASES])
+def test_the_plan_to_fly_and_what_decided(what: str, given: str, decided: str, plans: str) -> None:
+    those = plans_of(given, plans)
+    found, (best, ground) = recommend(those), decided.split()
     assert found.plan is not None
-    assert (found.plan.scheme, found.ground) == (best, ground)
+    assert (found.plan.scheme, found.ground) == (best, Ground[ground])
     assert found.standing is found.plan.standing
-    assert found.count == sum(
-        one.standing is found.standing and one.kept == found.plan.kept for one in plans if one.feasible
-    )
+    equals = [one for one in those if one.feasible and one.standing is found.standing and one.kept == found.plan.kept]
+    assert found.count == len(equals)
 
 
 def test_nothing_feasible_recommends_nothing() -> None:
@@ -179,21 +145,13 @@ def test_nothing_feasible_recommends_nothing() -> None:
 
 def test_the_words_for_what_decided_and_for_what_is_missed() -> None:
     """One of each ground and standing; what is missed names the part, what is left, and what may be."""
-    names = [
-        "above it does not",
-        "where nothing damps, least nutation",
-        "where nothing reaches the target, least of both",
-        "or at least be less",
-        "where none meets it, least nutation",
-        "where all damp, nearest to it",
-        "of what leaves but rounding the cheapest",
-        "less shift first",
-        "then the end",
-        "where a propellant is not known the impulse",
-        "a missed spin",
-    ]
-    lines = [f"{said(*BEST[name][2])}. {warned(*BEST[name][2])}" for name in names]
-    check_text("plan.reasons", "\n".join((said(INFEASIBLE) + warned(INFEASIBLE), *lines)))
+    lines = [said(INFEASIBLE) + warned(INFEASIBLE)]
+    for what, given, decided, plans in CASES:
+        those = plans_of(given, plans)
+        if not decided.endswith("COST") or what.startswith(("of what", "where")):
+            lines.append(f"{what}: {said(*those)}. {warned(*those)}")
+    for part, some in (("chosen", lines[:10]), ("nearest", lines[10:])):
+        check_text(f"plan.reasons-{part}", "\n".join(some))
 
 
 @pytest.mark.parametrize(
@@ -242,7 +200,6 @@ def test_optimal_keeps_a_spin_without_a_channel_for_it() -> None:
     assert planning.plan(replace(spinner(channels=cross(20.0)), goal=SPIN), "optimal").meets_requirement is True
 
 
-PERIOD = spinner().inertial_period
 MANY = made("many", 0.0, 0.1, pulses=10)
 SHIFTED, SLOW = made("cheap", 0.0, 12.0, 1.8), made("late", 0.0, 0.1, end=100.0)
 ALONE = made("cheap", 0.0, 12.0, 0.11, goal=POINTING)

@@ -19,7 +19,7 @@ from nutdamp import planning, robust, screening
 from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
 from nutdamp.decision import Cases
-from nutdamp.dispersion import study_of
+from nutdamp.dispersion import SEED, study_of
 from nutdamp.dispersion.cases import DispersedCases
 from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.study import Results, run
@@ -66,7 +66,7 @@ def best(found: robust.RobustComparison) -> Candidate:
     return found.chosen
 
 
-def share(body: Spacecraft, plan: Plan, seed: int = robust.SEED, samples: int = SAMPLES) -> float:
+def share(body: Spacecraft, plan: Plan, seed: int = SEED, samples: int = SAMPLES) -> float:
     """Of the cases those that comply."""
     return run(Results(study_of(body, plan.pulses, seed=seed), samples)).met_fraction or 0.0
 

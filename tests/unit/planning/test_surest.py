@@ -298,12 +298,7 @@ def gained(seed: int) -> float:
 
 
 @pytest.mark.weekly
-@pytest.mark.parametrize("seed", [0, 11])
-def test_never_worse_than_the_best_of_schemes_and_variants(seed: int) -> None:
-    assert gained(seed) >= -0.005
-
-
-@pytest.mark.weekly
-def test_of_thirty_random_spacecraft_clearly_more_cases_comply_with_most() -> None:
+def test_of_thirty_random_spacecraft_no_fewer_cases_comply_with_any_and_clearly_more_with_most() -> None:
     gains = [gained(seed) for seed in range(30)]
+    assert min(gains) >= -0.005
     assert sum(gain > 0.03 for gain in gains) >= 20

@@ -244,15 +244,6 @@ def test_no_rigorous_bound_is_told_where_none_is_known_to_hold(other: Spacecraft
     assert made.pulses.bounds.first_order is not None
 
 
-@pytest.mark.deep
-def test_optimal_with_a_free_axis_is_not_below_its_bound() -> None:
-    for seed in range(2):
-        body = layout(np.random.default_rng(1000 + seed), axial=0.1 * (seed % 2))
-        made = plan(body, "optimal", OptimalOptions(free_axis=True))
-        if made.pulses.bounds is not None and made.pulses.bounds.rigorous is not None:
-            assert made.pulses.total_impulse >= made.pulses.bounds.rigorous * (1.0 - TIGHT)
-
-
 def test_ticks_count_what_they_leave() -> None:
     """Pulses on coarse ticks leave something; the bound is of schedules that leave as much."""
     body = replace(SPINNER, limits=Limits(horizon=60.0, tick=0.02))

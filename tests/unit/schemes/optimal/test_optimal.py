@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares, linprog
-from scipy.spatial.transform import Rotation
+from scipy.optimize import linprog
 from support import reference
 from support.builders import Outcome, channel, cross, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
-from support.optimal import as_found, flies, random_layout
+from support.optimal import flies, random_layout
 
-from nutdamp.compliance import SAME_COST
 from nutdamp.planning import plan
 from nutdamp.remarks import infeasibility, remarks
 from nutdamp.schemes.optimal.linear_program import Program, Solution
@@ -149,94 +147,9 @@ def test_an_impossible_deadline_says_what_to_relax(horizon: float, names: str, k
     check_text(f"plan.{key}", infeasibility(plan(body(120.0, 80.0, 3.0, horizon, names), "optimal")))
 
 
-@spread("seed", range(16), quick=1, deep=2)
+@spread("seed", range(200), quick=1, deep=2)
 def test_random_layouts_are_planned(seed: int) -> None:
-    flies(random_layout(seed), left=1e-5, dearest=1.03)
-
-
-@pytest.mark.weekly
-@pytest.mark.parametrize("seed", range(16, 200))
-def test_many_random_layouts_are_planned(seed: int) -> None:
-    flies(random_layout(seed), left=1e-5, dearest=1.25)
-
-
-KNOWN = {
-    9: 0.0005683514790203955,
-    17: 0.0015252966350810253,
-    109: 5.7688437020970824e-05,
-    111: 0.0001805874376459324,
-    116: 0.0012134310937840607,
-    130: 0.00027772812193374363,
-    131: 0.00044437928732715036,
-    138: 0.002253543083145223,
-    153: 0.0027131339413776203,
-}
-"""Propellant, kg, of layouts as commit b69e7e0 plans them: by linear programs alone, which another solver solved."""
-
-
-@pytest.mark.deep
-@spread("seed", KNOWN, quick=2, deep=0)
-def test_layouts_cost_no_more_than_by_linear_programs_alone(seed: int) -> None:
-    """The schedule found, and the one that ends earlier and is taken in its place, within what counts as equal."""
-    made = plan(random_layout(seed), "optimal")
-    with as_found():
-        found = plan(random_layout(seed), "optimal")
-    assert found.pulses.cost_in("kg") <= KNOWN[seed] * (1.0 + 1e-9)
-    assert made.pulses.cost_in("kg") <= found.pulses.cost_in("kg") * (1.0 + SAME_COST)
-    assert (made.end, len(made)) <= (found.end, len(found))
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize(
-    ("seed", "degrees", "tries"), [(0, 1.0, 25), *(weekly(*one, 150) for one in ((1, 3.0), (2, 5.0), (3, 1.0)))]
-)
-def test_no_flown_schedule_of_a_brute_search_is_cheaper(seed: int, degrees: float, tries: int) -> None:
-    """Two to four ideal impulses at random moments, each made exact by its own solver, against the plan."""
-    rng = np.random.default_rng(100 + seed)
-    horizon = float(rng.uniform(2.0, 8.0))
-    spacecraft = spinner(120.0, 80.0, 3.0, degrees, channels=cross(STRONG), limits=Limits(horizon=horizon))
-    cheapest = math.inf
-    for _ in range(tries):
-        count = int(rng.integers(2, 5))
-        cost = exact_impulses(spacecraft, rng.choice(4, count), np.sort(rng.uniform(0, horizon, count)))
-        cheapest = min(cheapest, cost)
-    assert cheapest < 1.5 * spacecraft.least_impulse  # the search is not blind
-    assert flies(spacecraft).pulses.total_impulse <= cheapest * 1.001
-
-
-def exact_impulses(spacecraft: Spacecraft, which: np.ndarray, times: np.ndarray) -> float:
-    """Impulse of a schedule that ends without nutation and with H where it was, found from these moments; or inf.
-
-    The motion is that of the exact arcs (physics sheet), written here once more; four unknowns at least are solved for.
-    """
-    inertia, horizon, count = spacecraft.inertia, spacecraft.horizon, len(which)
-    directions = np.array([spacecraft.channels[index].torque / STRONG for index in which])
-
-    def left(x: np.ndarray) -> np.ndarray:
-        rotation = reference.frame_n(inertia.moments, spacecraft.omega0)
-        rates, now = spacecraft.omega0.copy(), 0.0
-        for t, strength, direction in zip(x[:count], x[count:], directions, strict=True):
-            rotation, rates = coasted(inertia.moments, rotation, rates, t - now)
-            rates, now = rates + direction * strength / inertia.A, t
-        momentum = rotation @ (np.asarray(inertia.moments) * rates)
-        return np.array([rates[0], rates[1], momentum[0] / 240, momentum[1] / 240])
-
-    start = np.concatenate([times, np.full(count, spacecraft.least_impulse / count)])
-    upper = np.repeat([horizon, 10 * spacecraft.least_impulse], count)
-    found = least_squares(left, np.clip(start, 1e-6, upper - 1e-6), bounds=(0.0, upper), xtol=1e-12, max_nfev=40)
-    if np.linalg.norm(found.fun) > 1e-8 or np.any(np.diff(found.x[:count]) < 0.0):
-        return math.inf
-    return float(found.x[count:].sum())
-
-
-def coasted(
-    moments: tuple[float, float, float], rotation: np.ndarray, rates: np.ndarray, time: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """R(t) = Rot(H t/A) R Rot3(a ω3 t)."""
-    A, _, C = moments
-    momentum = rotation @ (np.asarray(moments) * rates)
-    about_axis = Rotation.from_rotvec([0.0, 0.0, (A - C) / A * rates[2] * time]).as_matrix()
-    return Rotation.from_rotvec(momentum * time / A).as_matrix() @ rotation @ about_axis, about_axis.T @ rates
+    flies(random_layout(seed), left=1e-5, dearest=1.03 if seed < 16 else 1.25)
 
 
 def with_goal(
