@@ -136,8 +136,9 @@ def _fits(value: object, kind: Any) -> bool:
     if get_origin(kind) is UnionType:
         return any(_fits(value, part) for part in parts)
     if _array(kind):
+        numbers: Any = value
         sized = isinstance(value, Sequence) or getattr(value, "ndim", 0) == 1
-        return sized and len(value) == 3 and all(map(is_number, value))
+        return sized and len(numbers) == 3 and all(map(is_number, numbers))
     if get_origin(kind) is tuple:
         return isinstance(value, tuple) and all(_fits(one, parts[0]) for one in value)
     return is_number(value) if kind is float else isinstance(value, kind)

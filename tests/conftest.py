@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -62,7 +62,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--cpu", type=int, default=0, help="list the N test functions that take most CPU time")
 
 
-_cpu: Counter[str] = Counter()
+_cpu: dict[str, float] = defaultdict(float)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -78,8 +78,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """What takes longest, where that is asked for; what could not be checked here is said aloud, once a reason."""
     if most := terminalreporter.config.getoption("cpu"):
-        terminalreporter.write_line(f"{_cpu.total():8.2f} s of CPU in {len(_cpu)} functions (of this process)")
-        for name, spent in _cpu.most_common(most):
+        terminalreporter.write_line(f"{sum(_cpu.values()):8.2f} s of CPU in {len(_cpu)} functions (of this process)")
+        for name, spent in sorted(_cpu.items(), key=lambda entry: -entry[1])[:most]:
             terminalreporter.write_line(f"{spent:8.2f} s  {name}")
     skipped = terminalreporter.stats.get("skipped", [])
     reasons = {str(report.longrepr[2]) for report in skipped if isinstance(report.longrepr, tuple)}

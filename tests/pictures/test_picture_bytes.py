@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from support import places
 from support.builders import cross, spinner
 
 from nutdamp import planning
@@ -52,7 +53,7 @@ def digest() -> str:
 @pytest.mark.deep
 def test_another_process_makes_the_same_bytes() -> None:
     """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
-    folders = [str(Path(__file__).parents[1]), str(Path(__file__).parent)]
+    folders = [str(places.TESTS), str(Path(__file__).parent)]
     code = f"import sys; sys.path[:0] = {folders}; import {__name__}; print({__name__}.digest())"
     environment = {**os.environ, "PYTHONHASHSEED": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)

@@ -2,8 +2,8 @@
 
     python tests/support/mutants.py PACKAGE [TESTS …] [--number 20] [--seed 1] [--marks "not weekly"] [--budget 20]
 
-PACKAGE is a folder or module below nutdamp/ (``physics``, ``schemes/optimal``, ``planning.py``; ``.`` for all). TESTS are
-files or folders, by default all that pytest collects. Needs Python 3.12 or newer (`sys.monitoring`) on Linux or macOS.
+PACKAGE is a folder or module below nutdamp/ (``physics``, ``schemes/optimal``, ``planning.py``; ``.`` for all). TESTS
+are files or folders, by default all that pytest collects. Needs Python 3.12 or newer (`sys.monitoring`) and forks.
 
 The tests run once, to see which lines each executes. Then every mutant gets a fork of that session: the code of the
 functions that it changes is replaced, what tests and nutdamp have cached is cleared, and the tests of its line run, the
@@ -70,19 +70,19 @@ class Mutant:
 def changes(node: ast.AST) -> Iterator[ast.AST]:
     """The nodes that may stand in the place of ``node``."""
     changed: Any = copy.deepcopy(node)
-    match changed:
-        case ast.BinOp() | ast.BoolOp() | ast.AugAssign() if type(changed.op) in SWAPS:
+    match node:
+        case ast.BinOp() | ast.BoolOp() | ast.AugAssign() if type(node.op) in SWAPS:
             changed.op = SWAPS[type(changed.op)]()
             yield changed
-        case ast.Compare() if type(changed.ops[0]) in SWAPS:
+        case ast.Compare() if type(node.ops[0]) in SWAPS:
             changed.ops[0] = SWAPS[type(changed.ops[0])]()
             yield changed
         case ast.UnaryOp(op=ast.Not() | ast.USub()):
             yield changed.operand
-        case ast.Constant(value=bool()):
-            yield ast.Constant(not changed.value)
-        case ast.Constant(value=int() | float()):
-            yield ast.Constant(changed.value + 1)
+        case ast.Constant(value=bool() as flag):
+            yield ast.Constant(not flag)
+        case ast.Constant(value=int() | float() as number):
+            yield ast.Constant(number + 1)
         case ast.If() | ast.IfExp() | ast.While():
             changed.test = ast.UnaryOp(ast.Not(), changed.test)
             yield changed
@@ -196,7 +196,7 @@ class Session:
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Instead of pytest's loop."""
-        monitoring = sys.monitoring
+        monitoring: Any = vars(sys)["monitoring"]
         monitoring.use_tool_id(monitoring.COVERAGE_ID, "mutants")
         monitoring.register_callback(monitoring.COVERAGE_ID, monitoring.events.LINE, self._line)
         monitoring.set_events(monitoring.COVERAGE_ID, monitoring.events.LINE)
@@ -221,7 +221,7 @@ class Session:
     def _line(self, code: CodeType, line: int) -> Any:
         if code.co_filename in self.files and (code.co_filename, line) in self.wanted:
             self.lines.add((code.co_filename, line))
-        return sys.monitoring.DISABLE
+        return vars(sys)["monitoring"].DISABLE
 
     def _mutate(self) -> None:
         running: dict[int, tuple[int, int]] = {}
@@ -283,7 +283,7 @@ def main() -> int:
     options.add_argument("--budget", type=float, default=20.0)
     options.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     asked = options.parse_args()
-    if sys.version_info < (3, 12):
+    if "monitoring" not in vars(sys):
         sys.exit("mutants.py needs Python 3.12 or newer: sys.monitoring tells which lines a test executes")
     mutants = draw(asked.package, asked.number, asked.seed)
     session = Session(mutants, asked.budget, asked.jobs, os.dup(1))

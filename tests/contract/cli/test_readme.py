@@ -58,7 +58,7 @@ def test_the_picture_is_there() -> None:
 def test_the_library_examples_are_those_that_are_run(index: int, name: str) -> None:
     shown = re.findall(r"```python\n(.+?)```", TEXT, re.DOTALL)
     assert len(shown) == 2
-    assert (ROOT / "tests" / name).read_text(encoding="utf-8").endswith(shown[index])
+    assert (ROOT / "tests" / "support" / name).read_text(encoding="utf-8").endswith(shown[index])
 
 
 def test_the_sweep_takes_at_most_ten_lines() -> None:

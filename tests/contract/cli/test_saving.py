@@ -81,7 +81,7 @@ from nutdamp.files import {module}
 
 made = {module}.{function}
 
-def deep(*given, **named):
+def slow(*given, **named):
     os.kill(os.getpid(), signal.SIGTERM)
     return made(*given, **named)
 

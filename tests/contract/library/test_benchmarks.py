@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import places
 
 from nutdamp.dispersion.inputs import list_inputs
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import plan
 
-FOLDER = Path(__file__).parent / "benchmarks"
+FOLDER = places.TESTS / "benchmarks"
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from support import places
+
 CLOCKS = re.compile(r"\btimeout *=|\bperf_counter\b|\bmonotonic\b|\btime\.time\b|\bprocess_time\b|\bsetitimer\b")
-MEASURING = {"benchmarks"}
+MEASURING = {"benchmarks", "mutants.py"}
 
 
 def test_no_test_looks_at_a_clock() -> None:
-    root = Path(__file__).parent
-    sources = [path for path in root.rglob("*.py") if path != Path(__file__) and path.parent.name not in MEASURING]
+    root = places.TESTS
+    sources = [path for path in root.rglob("*.py") if path != Path(__file__) and not MEASURING & set(path.parts)]
     found = [
         f"{path.relative_to(root)}:{number}: {line.strip()}"
         for path in sources

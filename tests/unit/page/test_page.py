@@ -7,10 +7,10 @@ import hashlib
 import math
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support import places
 from support.cases import spread
 from support.markup import Node, parsed
 from support.pages import plain_page
@@ -31,7 +31,7 @@ from nutdamp.schemes import CLASSIC
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
-PAGE = Path(__file__).parents[2] / "nutdamp" / "presentation" / "page"
+PAGE = places.ROOT / "nutdamp" / "presentation" / "page"
 
 NASTY = """# </pre><script>alert(1)</script> and `ticks` ``` in a comment
 name: '<b>&"|*'

@@ -103,7 +103,7 @@ def test_without_dispersions_no_cases_are_missed() -> None:
 def test_where_nothing_is_required_the_verdict_does_not_say_met(target: float | None) -> None:
     body = replace(nutdamp.example(), requirement=None, dispersions=None)
     body = body if target is None else replace(body, goal=Goal(axis=body.direction_in_n(math.radians(target), 0.0)))
-    decided = decided_of(body, "two-pulse" if target is None else "optimal")
+    decided = decided_of(body, "two-pulse" if target is None else "half-cone")
     assert decided.met is None
     assert {line.bound.required for line in decided.lines} == {False}
     check_text(f"plan.verdict-of-{'nutation' if target is None else 'target'}", decisions.verdict(decided))

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.builders import BOTH, HALF_A_DEGREE, channel, cross, judged, spinner
 from support.cases import deep, weekly
@@ -171,6 +171,7 @@ def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_s
 @given(
     st.floats(5.0, 100.0), st.floats(1e-3, 0.5), st.floats(0.5, 20.0), st.sampled_from(CLASSIC), st.floats(0.0, 60.0)
 )
+@settings(max_examples=10)
 @pytest.mark.deep
 def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
     time_constant: float, least: float, degrees: float, scheme: str, earliest: float
@@ -181,12 +182,15 @@ def test_plans_for_a_body_that_damps_itself_leave_less_than_decay_does(
     assert made.flown is None or made.flown.nutation < idle(made.spacecraft, made.end)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_optimal_looks_within_the_time_that_there_is_where_it_begins_late() -> None:
     """Half the horizon ends before the first pulse may begin."""
     made = plan(replace(SELF_DAMPING, limits=Limits(earliest=130.0, horizon=240.0)), "optimal")
     assert made.feasible, infeasibility(made)
     assert made.pulses.pulses[0].start >= 130.0
+
+
+def test_an_earliest_time_beyond_the_horizon_is_named() -> None:
     late = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
     check_text("plan.earliest-after-horizon", infeasibility(late))
 
@@ -230,7 +234,7 @@ def test_a_longer_horizon_has_a_schedule_too_and_no_dearer_one(horizon: float) -
         weekly(cross(2.0), 6.0, False),
         weekly(cross(2.0)[:1], 2.0, False),
         weekly(cross(15.0)[:2], 2.0, False),
-        deep(cross(15.0), 1.4, False),
+        weekly(cross(15.0), 1.4, False),
         deep(cross(15.0), 1.6, True),
     ],
 )
