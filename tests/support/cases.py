@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -14,12 +15,12 @@ def spread(
 ) -> pytest.MarkDecorator:
     """As ``pytest.mark.parametrize``, of whose cases ``quick``, evenly spread, run always.
 
-    Of the others ``deep``, evenly spread (all where it is None), are marked deep, the rest weekly.
+    Of the others ``deep``, evenly spread (one in eight, where it is None), are marked deep, the rest weekly.
     """
     listed = list(values)
     always = _evenly(range(len(listed)), quick)
     others = [number for number in range(len(listed)) if number not in always]
-    in_ci = _evenly(others, len(others) if deep is None else deep)
+    in_ci = _evenly(others, math.ceil(len(others) / 8) if deep is None else deep)
     alone = isinstance(names, str) and "," not in names
     for number, case in enumerate(listed):
         if number not in always:
