@@ -50,7 +50,7 @@ __all__ = [
     "verify",
 ]
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 
 if not TYPE_CHECKING:  # or else a type checker would believe in any name

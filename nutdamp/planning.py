@@ -34,8 +34,7 @@ class Plan(views.Data, views.Tabled):
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
     that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.remarks` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
-    ``cut``: its search ended at its budget of `work`. ``margin``: sigmas of the dispersions with which `surest` made
-    it, None for plans for nominal values.
+    ``cut``: its search ended at its budget of `work`.
     """
 
     spacecraft: Spacecraft
@@ -50,7 +49,6 @@ class Plan(views.Data, views.Tabled):
     worse_at: float = 0.0
     from_file: bool = False
     cut: bool = False
-    margin: float | None = None
 
     @property
     def feasible(self) -> bool:

@@ -37,10 +37,6 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)
 """Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
-WIDEST = 1.3
-"""Largest margin of a front, over the sigmas of the probability required."""
-
-
 FRESH = 211
 """Seed of cases that nothing was chosen by."""
 
@@ -157,43 +153,17 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
     return found
 
 
-def trials_of_front(comparison: Comparison, points: int) -> list[Attempt]:
-    """What the front of propellant against probability is of: the plans compared, and ``points`` margins.
-
-    So that it has the plan with which just as many cases comply as must, those that lead to its margin too.
-    """
-    body, found = comparison.spacecraft, list[Attempt]()
-    found += [partial(list, [("as planned", base)]) for base in comparison.plans if base.failure is None]
-    for number in range(points):
-        margin = WIDEST * (number + 1) / points
-        found.append(partial(surest.plans, body, None, [margin]))
-    found.append(partial(_early, body, Options()))
-    found.append(partial(surest.plans, body))
-    return found
-
-
-def front(found: RobustComparison) -> tuple[Candidate, ...]:
-    """The candidates that no other beats in cost and in the share that complies, the cheapest first."""
-    best, kept = -1.0, []
-    for one in sorted(found.candidates, key=lambda one: (one.plan.pulses.cost, -(one.met or 0.0))):
-        if one.met is not None and one.met > best:
-            kept.append(one)
-            best = one.met
-    return tuple(kept)
-
-
 def compare(
     comparison: Comparison,
     trials: Sequence[Attempt],
     watch: Callable[[int], None] = lambda _: None,
     *,
     samples: int = SAMPLES,
-    whole: bool = False,
 ) -> RobustComparison:
     """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases of those that may be chosen, or, ``whole``, of all, see `screening`; ``watch`` is called with how
-    many trials are done, and then beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
+    ``samples`` cases of those that may be chosen, see `screening`; ``watch`` is called with how many trials are done,
+    and then beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
@@ -210,10 +180,10 @@ def compare(
                 found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
     candidates = list(found.values())
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    always = [one for one in candidates if whole or one is usual]
+    always = [one for one in candidates if one is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
     ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if whole or ranks.chosen is None else _checked(ranks, candidates)
+    return ranks if ranks.chosen is None else _checked(ranks, candidates)
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -130,18 +130,12 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Inpu
         spin=C * dspin @ mixed,
         delay=delay,
         less=(dC / C + dspin / spin) @ mixed,
-        names=tuple(one.name for one in drawn),
     )
     return found, tuple(drawn)
 
 
-def plans(
-    spacecraft: Spacecraft, options: Options | None = None, margins: Sequence[float] = ()
-) -> Iterator[tuple[str, Plan]]:
-    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required.
-
-    ``margins`` in the sigmas of the probability required; those that lead to it by default.
-    """
+def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
+    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required."""
     body = planning.known(spacecraft, schemes.options_of(schemes.SCHEMES[SCHEME], options))
     if not compliance.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
@@ -149,16 +143,7 @@ def plans(
         search = _Search(spacecraft, body)
     except Infeasible:
         return
-    if margins:
-        yield from ((name, plan) for one in margins for name, plan, _ in search.tried(one * search.sigmas))
-    else:
-        yield from search.plans()
-
-
-def program_of(plan: Plan) -> tuple[Problem, ChanceProgram]:
-    """The program by which `plans` made a plan, over all slots, and the problem that has its unit of cost."""
-    search = _Search(plan.spacecraft, planning.known(plan.spacecraft, plan.options))
-    return search.problem, search.chance
+    yield from search.plans()
 
 
 class _Search:
@@ -249,7 +234,7 @@ class _Search:
         if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
             results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
             share = results.met_fraction or 0.0
-            yield f"against dispersions, {margin:.3g} σ", replace(plan, margin=margin), share
+            yield f"against dispersions, {margin:.3g} σ", plan, share
 
     def _few(self, found: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""

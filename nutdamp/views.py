@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import singledispatch
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,11 +78,6 @@ def _missing(result: object) -> TypeError:
 
 class Shown:
     """A result that shows itself at a prompt and in notebooks."""
-
-    @property
-    def core(self) -> Self:
-        """Itself, as results that wrapped another had it."""
-        return self
 
     def __repr__(self) -> str:
         return line(self)

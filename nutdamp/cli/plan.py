@@ -102,7 +102,7 @@ def command(
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
         say(f"{path} was not written: no plan is feasible")
-    proof, unproved = _certified(compared, dispersed, chosen, [certificate, curve])
+    proof, unproved = _certified(compared, [certificate, curve])
     if proof is not None and proof.plan is not chosen:
         job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
     outputs: list[Output] = [
@@ -115,7 +115,7 @@ def command(
     ]
     if job.silent:
         job.warn(verdicts.warnings(compared))
-    job.deliver(outputs, partial(_screen, compared, dispersed, proof), unsaved=unproved)
+    job.deliver(outputs, partial(_screen, compared, dispersed), unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
@@ -187,10 +187,8 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
         raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
 
 
-def _certified(
-    compared: Comparison, dispersed: RobustComparison | None, chosen: Plan | None, paths: Sequence[str | None]
-) -> tuple[Certificate | None, list[CannotWrite]]:
-    """The certificate of the plan of optimal, or of the robust plan; where it has none, why ``paths`` are not written.
+def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certificate | None, list[CannotWrite]]:
+    """The certificate of the plan of optimal; where it has none, why ``paths`` are not written.
 
     None where no path is named.
     """
@@ -200,16 +198,8 @@ def _certified(
     from nutdamp.certificate import SCHEME, certificate
     from nutdamp.errors import CannotWrite
 
-    planned = next(one for one in compared if one.scheme == SCHEME)
     try:
-        if dispersed is None or chosen is None or chosen is planned:
-            return certificate(planned), []
-        if chosen.margin is None and dispersed.chosen is not None:
-            raise BadRequest(
-                f"the robust plan is {chosen.scheme}, {dispersed.chosen.variant}, which no program against dispersions "
-                f"made; without --robust the certificate is of {SCHEME}"
-            )
-        return certificate(chosen), []
+        return certificate(next(one for one in compared if one.scheme == SCHEME)), []
     except BadRequest as reason:
         return None, [CannotWrite(one, f"there is no certificate: {reason}") for one in files]
 
@@ -252,11 +242,11 @@ def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
     return figures.schemes_figure(compared, decided)
 
 
-def _screen(compared: Comparison, dispersed: RobustComparison | None, proof: Certificate | None) -> RenderableType:
+def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:
     if dispersed is not None:
         from nutdamp.presentation.robust_tables import robust_screen
 
-        return robust_screen(dispersed, proof)
+        return robust_screen(dispersed)
     from nutdamp.presentation.plan_tables import comparison_screen
 
     return comparison_screen(compared)

@@ -14,7 +14,6 @@ from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
 from nutdamp.cli.job import Job, Output, begin, remarks
 from nutdamp.cli.parameters import FILE, FOLDER, Bare, Named, Quantity, reading_of
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
-from nutdamp.cli.trade_robust import expect_alone, trade_robust
 from nutdamp.schemes.options import LEAST, Options
 from nutdamp.schemes.registry import OPTIMAL
 
@@ -52,7 +51,6 @@ class Allowance(Quantity):
     show_default=True,
     help="What is traded against time; impulse where propellant is unknown.",
 )
-@click.option("--robust", is_flag=True, help="Trade propellant against the share of dispersed cases that comply.")
 @partial(goal_options, several=False)
 @click.option("--csv", type=FILE, help="Write the points.")
 @click.option("--json", type=FILE, help="Write the points with their pulses.")
@@ -64,7 +62,6 @@ def command(
     allow: tuple[float, ...],
     points: int,
     least: str,
-    robust: bool,
     options: Options,
     aim: Aim,
     csv: str | None,
@@ -80,11 +77,6 @@ def command(
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
-    expect_alone(robust, allow=allow, schedules=schedules, least=least != LEAST[0])
-    if robust:
-        job = begin(spacecraft, aim=aim, quiet=quiet, csv=csv, json=json, plot=plot)
-        trade_robust(job, points, options, csv=csv, json=json, plot=plot)
-        return
     from nutdamp.files.trade_files import schedule_paths, trade_csv
     from nutdamp.fronts import numbered
     from nutdamp.remarks import CUT

@@ -1,11 +1,10 @@
 """The file of ``plan --certificate``: all that it takes to check a least cost by hand, in SI.
 
-That of a robust plan has cones, see `sure_certificate_json`. That of optimal is about the transverse impulse of a
-symmetric body of small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)}) and E2 = e^{i ω t}, where α is
-``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel of the torque (m1, m2, m3) at t
-adds E1 (m1 + i m2) to the equations nutation, E2 (m1 + i m2) to the equations shift, and m3 to the equation spin. Of
-each equation the file has the goal and the price y, and q(t) of a channel is the sum of y times what it adds, over
-``cost_per_s``.
+It is about the transverse impulse of a symmetric body of small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)})
+and E2 = e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel
+of the torque (m1, m2, m3) at t adds E1 (m1 + i m2) to the equations nutation, E2 (m1 + i m2) to the equations shift,
+and m3 to the equation spin. Of each equation the file has the goal and the price y, and q(t) of a channel is the sum of
+y times what it adds, over ``cost_per_s``.
 """
 
 from __future__ import annotations
@@ -15,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from nutdamp import __version__
-from nutdamp.certificate import Certificate, NominalCertificate, SureCertificate
-from nutdamp.files import sure_certificate_json
+from nutdamp.certificate import Certificate
 from nutdamp.schemes.optimal.columns import Burn
 
 PROVES = (
@@ -37,44 +35,23 @@ NOT_COUNTED = (
 
 def certificate_json(found: Certificate) -> dict[str, Any]:
     """The certificate as data."""
-    body, inertia, sure = found.spacecraft, found.spacecraft.inertia, isinstance(found, SureCertificate)
-    names = [one.name for one in found.program.channels]
+    body, program, proof = found.spacecraft, found.program, found.proof
+    equations = zip(found.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
+    names = [one.name for one in program.channels]
     return {
         "nutdamp": __version__,
         "certificate": 1,
-        "of": "robust plan" if sure else "optimal",
         "spacecraft": body.name,
-        "proves": sure_certificate_json.PROVES if sure else PROVES,
-        **({"not_proved": sure_certificate_json.NOT_PROVED} if sure else {}),
-        "model": sure_certificate_json.MODEL if sure else MODEL,
+        "proves": PROVES,
+        "model": MODEL,
         "not_counted": NOT_COUNTED,
-        "a": inertia.a,
+        "a": body.inertia.a,
         "spin_rad_s": body.spin,
-        "nutation_rad_s": inertia.a * body.spin,
+        "nutation_rad_s": body.inertia.a * body.spin,
         "growth_per_s": body.growth,
         "last_s": found.last,
         "windows_s": [list(span) for span in found.windows],
         "unit": found.problem.unit,
-        **_own(found),
-        "plan": {
-            "cost": found.plan.pulses.cost_in(found.problem.unit),
-            "pulses": [{"channel": one.channel, "t_s": one.t, "on_time_s": one.on_time} for one in found.plan.pulses],
-        },
-        "primer": [
-            {"t_s": times.tolist(), "q": dict(zip(names, found.primer(times).T.tolist(), strict=True))}
-            for times in found.moments()
-        ],
-    }
-
-
-def _own(found: Certificate) -> dict[str, Any]:
-    """What is of the kind of certificate."""
-    if isinstance(found, SureCertificate):
-        return sure_certificate_json.sure_json(found)
-    assert isinstance(found, NominalCertificate)
-    program, proof = found.program, found.proof
-    equations = zip(found.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
-    return {
         "equations": [{"name": name, "goal_Nms": goal + 0.0, "price": price + 0.0} for name, goal, price in equations],
         "off_Nms": program.off,
         "channels": [
@@ -90,6 +67,14 @@ def _own(found: Certificate) -> dict[str, Any]:
         "bound": proof.bound,
         "burns": [_burn(found, burn) for burn in found.burns],
         "burns_cost": found.cost,
+        "plan": {
+            "cost": found.plan.pulses.cost_in(found.problem.unit),
+            "pulses": [{"channel": one.channel, "t_s": one.t, "on_time_s": one.on_time} for one in found.plan.pulses],
+        },
+        "primer": [
+            {"t_s": times.tolist(), "q": dict(zip(names, found.primer(times).T.tolist(), strict=True))}
+            for times in found.moments()
+        ],
     }
 
 

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from nutdamp.compliance import aim
-from nutdamp.files.output import csv_text, number
-from nutdamp.files.plan_json import final_json, heading, plan_json, target_json
-from nutdamp.robust import RobustComparison, front
+from nutdamp.files.plan_json import final_json, plan_json, target_json
+from nutdamp.robust import RobustComparison
 from nutdamp.screening import Candidate
 
 
@@ -66,38 +65,11 @@ def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
     }
 
 
-HEADER = ("point", "propellant_kg", "total_impulse_Nms", "met_fraction", "end_s", "pulses", "scheme", "variant")
-
-
-def front_json(found: RobustComparison) -> dict[str, Any]:
-    """The front of ``trade --robust``, the cheapest first, with plans as ``plan --json`` gives them."""
-    numbered = enumerate(front(found), start=1)
-    return {
-        **heading(found.comparison.spacecraft),
-        "probability": found.probability,
-        "samples": found.samples,
-        "seed": found.seed,
-        "points": [{"point": at, **_candidate(one), "plan": plan_json(one.plan)} for at, one in numbered],
-    }
-
-
-def front_csv(found: RobustComparison) -> str:
-    """One row a point of the front, the cheapest first."""
-    return csv_text(HEADER, (_row(at, one) for at, one in enumerate(front(found), start=1)))
-
-
-def _row(index: int, one: Candidate) -> list[str]:
-    pulses = one.plan.pulses
-    numbers = (pulses.propellant, pulses.total_impulse, one.met, pulses.end)
-    return [str(index), *map(number, numbers), str(len(pulses)), one.plan.scheme, one.variant]
-
-
 def _candidate(one: Candidate) -> dict[str, Any]:
     plan, pulses = one.plan, one.plan.pulses
     return {
         "scheme": plan.scheme,
         "variant": one.variant,
-        "margin_sigmas": plan.margin,
         "pulses": len(pulses),
         "end_s": pulses.end,
         "total_impulse_Nms": pulses.total_impulse,

@@ -6,23 +6,22 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import compliance
-from nutdamp.certificate import Certificate, SureCertificate
 from nutdamp.planning import Plan
 from nutdamp.presentation import robust_verdicts, verdicts
 from nutdamp.presentation.decisions import KEPT, figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
-from nutdamp.presentation.text import MISSING, cost, in_degrees
+from nutdamp.presentation.text import MISSING, in_degrees
 from nutdamp.remarks import infeasibility
-from nutdamp.robust import RobustComparison, front
+from nutdamp.robust import RobustComparison
 from nutdamp.words import listed
 
 MOST_ROWS = 12
 """Candidates that the table names."""
 
 
-def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> RenderableType:
-    """Everything that ``plan --robust`` shows, and what a certificate proves."""
+def robust_screen(found: RobustComparison) -> RenderableType:
+    """Everything that ``plan --robust`` shows."""
     body, decided, reason = found.comparison.spacecraft, found.decision, robust_verdicts.robust_reason(found)
     infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
@@ -36,7 +35,7 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
         *requirement(decided),
         *(Text(one) for one in filter(None, [_fresh(found)])),
         Text(robust_verdicts.robust_cost(found)),
-        *(Text(one) for one in filter(None, [robust_verdicts.tightened(found), proved(proof)])),
+        *(Text(one) for one in filter(None, [robust_verdicts.tightened(found)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(
@@ -49,51 +48,6 @@ def robust_screen(found: RobustComparison, proof: Certificate | None = None) -> 
     if len(decided.plan.pulses):
         parts += [Text(), pulse_table(decided.plan)]
     return Group(*parts)
-
-
-def front_screen(found: RobustComparison) -> RenderableType:
-    """Everything that ``trade --robust`` shows: what it costs that more cases comply."""
-    body, rows = found.comparison.spacecraft, front(found)
-    propellant = all(one.plan.pulses.propellant is not None for one in rows)
-    heads = (
-        "point\n",
-        "propellant\ng" if propellant else "impulse\nN m s",
-        "cases that\ncomply",
-        "more than\nthe first",
-    )
-    table = columns(*heads, "ends at\ns", "pulses\n", "plan\n", text=("plan\n",))
-    for number, one in enumerate(rows, start=1):
-        pulses = one.plan.pulses
-        spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse
-        more = f"{100.0 * (pulses.cost / rows[0].plan.pulses.cost - 1.0):.1f} %"
-        cells = f"{spent:.4g}", verdicts.percent(one.met or 0.0, found.probability), more, f"{pulses.end:.3f}"
-        enough = "bold" if (one.met or 0.0) >= found.probability else ""
-        table.add_row(Text(str(number), style=enough), *cells, str(len(pulses)), f"{one.plan.scheme}, {one.variant}")
-    level, cases = verdicts.exact_percent(found.probability), f"{found.samples:,} dispersed cases of each plan"
-    heading = Text(f"What it costs that more cases comply ({level} required)", style="bold")
-    most = max((one.met or 0.0 for one in rows), default=0.0)
-    short = f"No point meets the requirement: {verdicts.percent(most, found.probability)} of cases comply at most"
-    warning = [Text(f"{short}, {level} required.", style="yellow")] if rows and most < found.probability else []
-    note = Text(
-        f"{cases}, flown through real widths, seed {found.seed}; plans that cost more with no more cases that "
-        f"comply are left out.",
-        style="dim",
-    )
-    return Group(Text(body.name, style="bold"), Text(), heading, table, *warning, note)
-
-
-def proved(found: Certificate | None) -> str:
-    """What the certificate of a robust plan proves, and what not; nothing to say of another."""
-    if not isinstance(found, SureCertificate):
-        return ""
-    unit, gap = found.problem.unit, max(found.cost / found.bound - 1.0, 0.0)
-    spent = cost(found.plan.pulses.cost_in(unit), unit)
-    return (
-        "Certificate: no firing that keeps the requirement to first order with the margin of this plan, "
-        f"{found.margin:.4g} σ, costs less than {cost(found.bound, unit)}; a firing of that program costs "
-        f"{100.0 * gap:.2g} % more, and the plan, refined on the true motion, takes {spent}. It does not prove that "
-        f"{verdicts.exact_percent(found.probability)} of cases comply."
-    )
 
 
 def _fresh(found: RobustComparison) -> str:

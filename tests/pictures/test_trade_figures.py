@@ -5,30 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.text import Annotation
-from support.builders import cross, judged, spinner
+from support.builders import cross, spinner
 from support.colours import check_colours
 from support.compared_body import BODY, compared, line
 from support.layout import check_layout, texts
 
 from nutdamp import fronts, planning
 from nutdamp.certificate import certificate
-from nutdamp.comparison import Comparison
-from nutdamp.compliance import Part
-from nutdamp.decision import Cases
 from nutdamp.planning import Plan
 from nutdamp.presentation import figures
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.text import cost
 from nutdamp.remarks import down
-from nutdamp.robust import RobustComparison
 from nutdamp.schemes.options import OptimalOptions
-from nutdamp.screening import Candidate
 from nutdamp.spacecraft import Limits, Requirement
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -165,42 +158,6 @@ def test_a_schedule_that_ends_at_once_has_its_place_on_the_axis_of_time() -> Non
     check_layout(figure)
     low, high = figure.axes[0].get_xlim()
     assert all(low < end < high for end in ends)
-
-
-# --- what it costs that more cases comply ----------------------------------------------------------------------------
-
-SHARES = (0.2, 0.99, 0.995, 0.998, 0.5)
-"""Of cases that comply, by cost; the last plan costs most and is on no front."""
-
-
-@cache
-def costed() -> Figure:
-    plans = [judged(f"plan {n}", 0.0, impulse=1.0 + 0.01 * n, required=Requirement(0.1)) for n in range(len(SHARES))]
-    levels = {Part.NUTATION: 0.1, Part.SHIFT: 0.0}
-    fared = [Candidate(plan, "", Cases(1_000, 1, met, 0.997, levels)) for plan, met in zip(plans, SHARES, strict=True)]
-    least = Comparison(plans[0].spacecraft, tuple(plans))
-    found = RobustComparison(least, tuple(fared), None, None, None, 1, False, 0.997, 1_000, 1)
-    return figures.front_figure(found)
-
-
-def test_a_cross_marks_every_plan_with_which_too_few_cases_comply() -> None:
-    (axes,) = costed().axes
-    failing = line(axes, "too few cases comply")
-    assert sorted(failing[:, 1]) == pytest.approx([20.0, 50.0, 99.0, 99.5])
-    words = {text.get_text() for text in costed().legends[0].get_texts()}
-    assert words == {"other plans", "front", "too few cases comply", "required: 99.7 %"}
-
-
-def test_the_numbers_of_a_front_keep_off_each_other_and_off_its_steps() -> None:
-    check_layout(costed())
-    (axes,) = costed().axes
-    assert [note.get_text() for note in axes.texts] == ["1", "2", "3", "4"]
-    (steps,) = (one for one in axes.lines if len(np.asarray(one.get_xdata())) == 7)
-    corners = axes.transData.transform(steps.get_xydata())
-    way = np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(corners)])
-    for note in axes.texts:
-        box = note.get_window_extent()
-        assert not box.count_contains(way), note.get_text()
 
 
 # --- the proof of the least cost -------------------------------------------------------------------------------------

@@ -15,7 +15,6 @@ from nutdamp.presentation.figures.certificate import certificate_figure
 from nutdamp.presentation.figures.dispersion import dispersion_figure
 from nutdamp.presentation.figures.export import ending, rendered, svg
 from nutdamp.presentation.figures.overview import flight_figure
-from nutdamp.presentation.figures.robust import front_figure
 from nutdamp.presentation.figures.schemes import schemes_figure
 from nutdamp.presentation.figures.trade import trade_figure
 
@@ -29,7 +28,6 @@ __all__ = [
     "dispersion_figure",
     "ending",
     "flight_figure",
-    "front_figure",
     "rendered",
     "schemes_figure",
     "shown",

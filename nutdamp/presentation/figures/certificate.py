@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.certificate import Certificate, SureCertificate
+from nutdamp.certificate import Certificate
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.figures.legends import heading, legend
 from nutdamp.presentation.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
@@ -38,13 +38,13 @@ def certificate_figure(found: Certificate) -> Figure:
     Where the plan ends early in the horizon, the time until then is drawn again below.
     """
     end, last = found.plan.pulses.end, float(found.moments()[-1][-1])
-    closer, sure = 0.0 < end < CLOSER * last, isinstance(found, SureCertificate)
+    closer = 0.0 < end < CLOSER * last
     figure = style.sheet(7.4, 6.4 if closer else 4.2)
     panels = figure.subplots(2 if closer else 1, 1, squeeze=False)[:, 0]
     periods = last / found.spacecraft.body_period
     for axes in panels:
         _draw(axes, found, 1.0 if axes is panels[-1] and closer else periods)
-    until = "as long as first order holds" if sure else "until the horizon"
+    until = "until the horizon"
     if periods > MANY:
         panels[0].set_title(f"{until}: the highest of each period")
     elif closer:
@@ -54,8 +54,7 @@ def certificate_figure(found: Certificate) -> Figure:
     panels[-1].set_xlabel("time, s")
     figure.supylabel("q: worth of a second over what it costs", fontsize=style.TICK_SIZE)
     some = f" ({MOST} of {len(found.program.channels)} channels)" if len(found.program.channels) > MOST else ""
-    margin = f"margin {found.margin:.4g} σ" if isinstance(found, SureCertificate) else "small angles"
-    least = f"first-order least ({margin}): {cost(found.bound, found.problem.unit)}"
+    least = f"first-order least (small angles): {cost(found.bound, found.problem.unit)}"
     heading(figure, found.spacecraft, f"primer curve{some}\n{least}")
     legend(figure, [panels[-1]])
     return figure

@@ -5,7 +5,6 @@ The linear program has tangents of the cones, added where its solution breaks th
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,15 +13,12 @@ from numpy.typing import NDArray
 from nutdamp import work
 from nutdamp.schemes.optimal import lp_solver
 from nutdamp.schemes.optimal.chance_model import ChanceModel, Complex, Limit, Spread, Tangent, Uncertain
-from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns, peaks
+from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns
 from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Program
 from nutdamp.spacecraft import Vector
 
 DIRECTIONS = 72
 """In which the cones of two equations are looked at."""
-
-CLOSER = 201
-"""Directions between the two beside a worst one, where it is looked at more closely."""
 
 BEGUN = 16
 """Of them, tangents to begin with, without margin."""
@@ -33,31 +29,20 @@ WORST = 3
 BEST = 200
 """Columns taken in at a time."""
 
-LOOK = 0.05
-"""Slots whose price is so far below the cost are looked at more closely where channels act at once."""
+TIGHT = 1e-3
+"""Share of a limit by which a solution may pass it."""
+
+PRICE = 1e-6
+"""Relative reduced cost below which a column does not enter."""
+
+ROUNDS = 40
+"""Of the linear program, each with more tangents or columns."""
+
+EXCESS = 10.0
+"""Cost of passing all limits by themselves, over that of all there is to do: done where hardly anything else helps."""
 
 SOME = 1e-9
 """Share of what is needed below which an on-time is rounding."""
-
-
-class Accuracy(NamedTuple):
-    """How far solutions go.
-
-    ``tight``: share of a limit by which one may pass it. ``price``: relative reduced cost below which a column does not
-    enter. ``rounds`` of the linear program, each with more tangents or columns. ``excess``: cost of passing all limits
-    by themselves, over that of all there is to do, so that this is done where hardly anything else helps. ``closer``:
-    directions and moments between those of the grids are looked at too.
-    """
-
-    tight: float
-    price: float
-    rounds: int
-    excess: float
-    closer: bool
-
-
-PLANNING = Accuracy(tight=1e-3, price=1e-6, rounds=40, excess=10.0, closer=False)
-PROVING = Accuracy(tight=1e-6, price=1e-8, rounds=400, excess=1e3, closer=True)
 
 
 class Sure(NamedTuple):
@@ -93,7 +78,7 @@ class ChanceProgram:
 
     def solve(self, margin: float) -> Sure:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
-        found = self.solved(margin, PLANNING)
+        found = self.solved(margin)
         if found is None:
             return Sure((), np.inf, np.zeros(5))
         used = found.on_times > 0.0
@@ -104,31 +89,30 @@ class ChanceProgram:
             np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
         )
 
-    def solved(self, margin: float, accuracy: Accuracy) -> Solved | None:
+    def solved(self, margin: float) -> Solved | None:
         """The solution with all that proves it; None where the linear program cannot be solved."""
         tangents = [self.model.plain(limit, u) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
         rights = np.array([self.model.right(one, margin) for one in tangents]) / self.scale
         master = lp_solver.GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-one.limit.most / self.scale] for one in tangents])
-        master.add(np.array([accuracy.excess]), excess, np.array([np.inf]))
+        master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
         found, taken = None, columns
-        for _ in range(accuracy.rounds):
+        for _ in range(ROUNDS):
             work.spend(SOLVED + COLUMN * len(columns.t))
             better = master.optimum()
             if better is None or work.exhausted():
                 break
             found, taken = better, columns
             on_times = self._on_times(columns, found.x[1:])
-            new = self._broken(columns, on_times, margin, float(found.x[0]), accuracy)
+            new = self._broken(columns, on_times, margin, float(found.x[0]))
             for one in new:
                 row = np.concatenate([[-one.limit.most / self.scale], self._coefficients(one, columns, margin)])
                 master.limit(row, self.model.right(one, margin) / self.scale)
-            priced = self._priced(tangents, found.shadows, columns, margin, accuracy)
+            priced = self._priced(tangents, found.shadows, columns, margin)
             tangents += new
-            hopeless = accuracy.closer and found.x[0] > SOME
-            if not len(priced.t) and (hopeless or not new):
+            if not len(priced.t) and not new:
                 break
             if len(priced.t):
                 self._add(master, tangents, priced, margin)
@@ -147,9 +131,7 @@ class ChanceProgram:
         """Of a tangent, for one unit of each column, over the scale."""
         return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
-    def _broken(
-        self, columns: Columns, on_times: Vector, margin: float, excess: float, accuracy: Accuracy
-    ) -> list[Tangent]:
+    def _broken(self, columns: Columns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
@@ -159,11 +141,9 @@ class ChanceProgram:
 
             def passed(directions: Complex, limit: Limit = limit, spread: Spread = spread) -> Vector:
                 along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
-                return np.asarray(along - (1.0 + excess + accuracy.tight) * limit.most)
+                return np.asarray(along - (1.0 + excess + TIGHT) * limit.most)
 
             directions = directions_of(limit, DIRECTIONS)
-            if accuracy.closer and limit.kind < 2:
-                directions = _closer(directions, passed)
             by = passed(directions)
             peaked = np.flatnonzero((by > 0.0) & (by >= np.roll(by, 1)) & (by >= np.roll(by, -1)))
             for index in peaked[np.argsort(-by[peaked])][:WORST].tolist():
@@ -196,24 +176,18 @@ class ChanceProgram:
         rows = np.array([self._coefficients(one, new, margin) for one in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
 
-    def _priced(
-        self, tangents: list[Tangent], shadows: Vector, taken: Columns, margin: float, accuracy: Accuracy
-    ) -> Columns:
+    def _priced(self, tangents: list[Tangent], shadows: Vector, taken: Columns, margin: float) -> Columns:
         """Slots that would lower the cost, the best; of channels that act at once the best moments too."""
         cost = self.cost / self.dearest
         active = [(one, price) for one, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
         worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
         worth[self.program.forbidden] = -np.inf
-        moments = self._moments(worth, active, margin, accuracy) if accuracy.closer else None
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf
-        if moments is not None:
-            worth[self.strong] = -np.inf
-        channel_, slot = np.nonzero(worth > accuracy.price)
+        channel_, slot = np.nonzero(worth > PRICE)
         if len(slot) > BEST:
             best = np.argpartition(worth[channel_, slot], -BEST)[-BEST:]
             channel_, slot = channel_[best], slot[best]
-        found = self._slots(channel_, slot)
-        return found if moments is None else found.joined(moments)
+        return self._slots(channel_, slot)
 
     def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
         """What one unit of a channel in each slot is worth by tangents and their prices."""
@@ -223,23 +197,6 @@ class ChanceProgram:
             fixed, rate, own = self.model.weights(kind, channel, active, margin)
             worth += (turned * (fixed + rate * self.program.centres + own[turn])).real
         return np.asarray(worth * (self.unit[channel] / self.scale))
-
-    def _moments(
-        self, worth: Vector, active: list[tuple[Tangent, float]], margin: float, accuracy: Accuracy
-    ) -> Columns:
-        """Moments within slots at which a channel that acts at once is ``worth`` most, and more than it costs."""
-        padded = np.pad(np.where(self.strong[:, None], worth, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
-        middle = padded[:, 1:-1]
-        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
-        within = 0.25 * self.program.width * np.arange(-2, 3)
-        times = self.program.centres[slot][:, None] + within
-        fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
-        gain = np.zeros(times.size) - self.cost[fives.channel] / self.dearest
-        for one, price in active:
-            gain += price * self._coefficients(one, fives, margin)
-        t, most = peaks(times, gain.reshape(-1, 5))
-        good = most > accuracy.price
-        return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def _slots_of(self, kind: int, channel: int) -> tuple[Complex, NDArray[np.int_]]:
         """Turns of all slots of a channel, see `ChanceModel.turns` and `ChanceModel.turn_of`; remembered."""
@@ -252,13 +209,3 @@ class ChanceProgram:
 def directions_of(limit: Limit, count: int) -> Complex:
     """Unit vectors (n,), ``count`` or the two that there are, in which a limit is looked at."""
     return np.array([1.0, -1.0], dtype=complex) if limit.kind == 2 else np.exp(2j * np.pi * np.arange(count) / count)
-
-
-def _closer(directions: Complex, passed: Callable[[Complex], Vector]) -> Complex:
-    """The directions, each peak of what ``passed`` gives of them moved to where it is highest."""
-    by, moved = passed(directions), directions.copy()
-    step = 2.0 * np.pi / len(directions)
-    for index in np.flatnonzero((by >= np.roll(by, 1)) & (by >= np.roll(by, -1))).tolist():
-        near = directions[index] * np.exp(1j * step * np.linspace(-1.0, 1.0, CLOSER))
-        moved[index] = near[int(np.argmax(passed(near)))]
-    return moved

@@ -35,7 +35,7 @@ class Uncertain:
     ``begin`` (2, d) complex N m s: by what each changes what is to be undone; ``rates`` (2, d) rad/s: the two rates.
     ``torque`` (K, d) complex and ``axial_torque`` (K, d) N m; ``late`` (K, d) s: by how much a pulse comes later.
     ``own`` (d,): whether each pulse draws it anew. ``spin`` (d,) N m s. ``delay`` (K,) s: bias of the moment. ``less``
-    (d,): by what share each makes angles smaller that are left, as H is longer then. ``names`` (d,) of the inputs.
+    (d,): by what share each makes angles smaller that are left, as H is longer then.
     """
 
     effect: Complex
@@ -49,7 +49,6 @@ class Uncertain:
     spin: Vector
     delay: Vector
     less: Vector
-    names: tuple[str, ...]
 
 
 class Limit(NamedTuple):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,31 +38,43 @@ ROUNDING = 1e-12
 """Share by which gains are lowered and prices raised, so that no bound is too high by the rounding of sums."""
 
 
-class Curve(Protocol):
-    """q of each channel over time, in stretches in which it is smooth.
-
-    ``begins`` and ``lengths`` (n,) s of the stretches, ``costs`` (channels,) per second and ``bends`` (channels,) per
-    s², which the second derivative of q does not exceed.
-    """
-
-    begins: Vector
-    lengths: Vector
-    costs: Vector
-    bends: Vector
-
-    def at(self, times: Vector, within: Vector) -> Vector:
-        """q at ``times`` (n,) s, (n, channels); each is an edge or inside of the stretch in which ``within`` lies."""
-
-    def mean(self, centres: Vector, lengths: Vector) -> Vector:
-        """Mean of q, or a little more, in stretches about ``centres`` (n,), ``lengths`` (n,) long, s; (n, channels)."""
-
-
 class Lowered(NamedTuple):
     """The best ``bound`` by prices over a ``factor``; ``gained`` is what channels on for long gain by them."""
 
     bound: float
     factor: float
     gained: float
+
+
+class SmallAngles:
+    """The curve of the ``prices`` (equations,) of one N m s each in the ``program`` of small angles.
+
+    ``begins`` and ``lengths`` (n,) s: stretches no longer than a slot; ``bends`` (channels,) per s²: what the second
+    derivative of q does not exceed.
+    """
+
+    def __init__(self, program: Program, prices: Vector) -> None:
+        self.program, self.prices, self.costs = program, prices, program.costs
+        self.torques = np.array([channel.torque for channel in program.channels])
+        self.begins, self.lengths = stretches(program, slackened(free_windows(program.spacecraft, program.end)))
+        # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
+        rates = program.influence.turning
+        bend = sum(
+            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
+            for rate in sorted(set(rates.tolist()))
+        )
+        self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
+
+    def at(self, times: Vector) -> Vector:
+        """q at ``times`` (n,) s, (n, channels)."""
+        worth = np.tensordot(self.program.influence.rows(times), self.prices, axes=(1, 0)) @ self.torques.T
+        return np.asarray(worth / self.costs)
+
+    def mean(self, centres: Vector, lengths: Vector) -> Vector:
+        """Mean of q in stretches about ``centres`` (n,) s, ``lengths`` (n,) s long, (n, channels)."""
+        lost = self.program.influence.widths(lengths)
+        worth = np.einsum("ne,nek->nk", lost * self.prices, self.program.influence.rows(centres)) @ self.torques.T
+        return np.asarray(worth / self.costs)
 
 
 def stretches(program: Program, spans: Sequence[tuple[float, float]]) -> tuple[Vector, Vector]:
@@ -78,7 +90,7 @@ def slackened(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float
     return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
 
 
-def lowered(curve: Curve, strong: NDArray[np.bool_], goal: float) -> Lowered | None:
+def lowered(curve: SmallAngles, strong: NDArray[np.bool_], goal: float) -> Lowered | None:
     """What prices prove that are worth ``goal``; None where they prove nothing. ``strong``: act within a moment."""
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
     if highest <= 0.0:
@@ -91,34 +103,7 @@ def lowered(curve: Curve, strong: NDArray[np.bool_], goal: float) -> Lowered | N
     return best if best.bound > 0.0 else None
 
 
-class SmallAngles:
-    """The curve of the ``prices`` (equations,) of one N m s each in the ``program`` of small angles."""
-
-    def __init__(self, program: Program, prices: Vector) -> None:
-        self.program, self.prices, self.costs = program, prices, program.costs
-        self.torques = np.array([channel.torque for channel in program.channels])
-        self.begins, self.lengths = stretches(program, slackened(free_windows(program.spacecraft, program.end)))
-        # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
-        rates = program.influence.turning
-        bend = sum(
-            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
-            for rate in sorted(set(rates.tolist()))
-        )
-        self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
-
-    def at(self, times: Vector, within: Vector) -> Vector:  # noqa: ARG002
-        """q at ``times`` (n,) s, (n, channels)."""
-        worth = np.tensordot(self.program.influence.rows(times), self.prices, axes=(1, 0)) @ self.torques.T
-        return np.asarray(worth / self.costs)
-
-    def mean(self, centres: Vector, lengths: Vector) -> Vector:
-        """Mean of q in stretches about ``centres`` (n,) s, ``lengths`` (n,) s long, (n, channels)."""
-        lost = self.program.influence.widths(lengths)
-        worth = np.einsum("ne,nek->nk", lost * self.prices, self.program.influence.rows(centres)) @ self.torques.T
-        return np.asarray(worth / self.costs)
-
-
-def _highest(curve: Curve, which: NDArray[np.bool_]) -> float:
+def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     """The highest q of ``which`` channels at any time; a little more where that is not exact."""
     which_ones = np.flatnonzero(which)
     if not len(which_ones):
@@ -143,13 +128,12 @@ def _highest(curve: Curve, which: NDArray[np.bool_]) -> float:
     return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
 
 
-def _ends(curve: Curve, begins: Vector, lengths: Vector) -> list[Vector]:
+def _ends(curve: SmallAngles, begins: Vector, lengths: Vector) -> list[Vector]:
     """q at both ends of stretches, (n, channels) each."""
-    middle = begins + 0.5 * lengths
-    return [curve.at(begins, middle), curve.at(begins + lengths, middle)]
+    return [curve.at(begins), curve.at(begins + lengths)]
 
 
-def _lasting(curve: Curve, which: NDArray[np.bool_], factor: float) -> float:
+def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> float:
     """What ``which`` channels gain by being on whenever it pays, with prices lowered by a ``factor``."""
     which_ones = np.flatnonzero(which)
     if not len(which_ones):
@@ -158,9 +142,9 @@ def _lasting(curve: Curve, which: NDArray[np.bool_], factor: float) -> float:
     ends = [one[:, which_ones] / factor - 1.0 for one in _ends(curve, curve.begins, curve.lengths)]
     pays = np.flatnonzero((_top(ends[0], ends[1], bends, curve.lengths[:, None]) > 0.0).any(axis=1))
     begins, lengths = curve.begins[pays], curve.lengths[pays] / PARTS
-    total, before, middle = 0.0, ends[0][pays], begins + 0.5 * curve.lengths[pays]
+    total, before = 0.0, ends[0][pays]
     for part in range(PARTS):
-        after = curve.at(begins + (part + 1) * lengths, middle)[:, which_ones] / factor - 1.0
+        after = curve.at(begins + (part + 1) * lengths)[:, which_ones] / factor - 1.0
         mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which_ones] / factor - 1.0
         arch = bends * lengths[:, None] ** 2
         gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import re
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -121,44 +120,3 @@ def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Ru
     assert found["recommended"]["final"] == found["recommended"]["plan"]["final"]
     assert re.search(r"^H ends at +tilt 3\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)
     assert re.search(r"^target +tilt 3\.0000 deg, azimuth 45\.0000 deg$", done.stdout, re.MULTILINE)
-
-
-@pytest.mark.deep
-def test_the_front_of_propellant_against_the_share_that_complies(run: Run, tmp_path: Path) -> None:
-    files = ("--csv", "front.csv", "--json", "front.json", "--plot", "front.svg")
-    done = run("trade", "--robust", "--quiet", "--points", "3", *files)
-    assert done.returncode == 0, done.stderr
-    assert "What it costs that more cases comply (99.7 % required)" in done.stdout
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "front.csv").read_text("utf-8"))))
-    costs, shares = ([float(row[key]) for row in rows] for key in ("propellant_kg", "met_fraction"))
-    assert len(rows) >= 3
-    assert costs == sorted(costs)
-    assert all(one < other for one, other in pairwise(shares))
-    assert shares[-1] > 0.997
-    least = next(cost for cost, share in zip(costs, shares, strict=True) if share >= 0.997)
-    assert 1e3 * least == pytest.approx(13.15, abs=0.01)  # what `plan --robust` takes, see below
-    assert any(0.99 < share < 0.997 for share in shares)
-    points = json.loads((tmp_path / "front.json").read_text("utf-8"))["points"]
-    assert [one["met_fraction"] for one in points] == pytest.approx(shares)
-    assert all(one["plan"]["pulses"] for one in points)
-    assert "cases that comply, %" in (tmp_path / "front.svg").read_text("utf-8")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--allow", "1deg"), "--allow is of the front against time; leave it out with --robust"),
-        (("--schedules", "folder"), "--schedules is of the front against time"),
-        (("--least", "impulse"), "--least is of the front against time"),
-    ],
-)
-def test_the_front_takes_no_option_of_the_other_one(run: Run, arguments: tuple[str, ...], said: str) -> None:
-    done = run("trade", "--robust", *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-
-
-def test_a_front_needs_dispersions_and_a_requirement(run: Run, sat: Path) -> None:
-    assert "no requirement that cases could comply with" in run("trade", sat.name, "--robust").stderr
-    sat.write_text(BODY, encoding="utf-8")
-    assert "dispersions:" in run("trade", sat.name, "--robust").stderr

@@ -93,7 +93,7 @@ def test_the_sweep_runs(run: Run, tmp_path: Path) -> None:
 def test_a_dict_is_read_as_the_file_is() -> None:
     text = TILTED + "limits: {horizon: 100 s, max_pulses: 3}\n"
     assert nutdamp.load(KEYS).to_dict() == nutdamp.read(text).to_dict()
-    assert nutdamp.load(KEYS, set={"limits.horizon": 50.0}).core.limits.horizon == 50.0
+    assert nutdamp.load(KEYS, set={"limits.horizon": 50.0}).limits.horizon == 50.0
     assert nutdamp.load({**KEYS, "name": "1e3"}).name == "1e3"
 
 
@@ -105,26 +105,26 @@ def test_a_fault_in_a_dict_has_a_place() -> None:
 
 def test_with_changes_the_keys_named_and_no_others(craft: nutdamp.Spacecraft, tmp_path: Path) -> None:
     first = nutdamp.load(KEYS).with_(limits={"horizon": "300 s"}, requirement={"momentum_shift": "1 deg"})
-    assert (first.core.limits.horizon, first.core.limits.max_pulses) == (300.0, 3)
-    assert first.core.requirement is not None
-    assert first.core.requirement.nutation == pytest.approx(math.radians(0.5))
+    assert (first.limits.horizon, first.limits.max_pulses) == (300.0, 3)
+    assert first.requirement is not None
+    assert first.requirement.nutation == pytest.approx(math.radians(0.5))
     again = first.with_(limits={"max_pulses": 2})
-    assert (again.core.limits.horizon, again.core.limits.max_pulses) == (300.0, 2)
-    assert first.core.limits.max_pulses == 3
+    assert (again.limits.horizon, again.limits.max_pulses) == (300.0, 2)
+    assert first.limits.max_pulses == 3
     changed = craft.with_(state={"nutation": "8 deg"}, thrusters={"+M1": {"force": 12.0}})
     assert changed.nutation == pytest.approx(math.radians(8.0))
-    assert changed.core.omega0[2] == craft.core.omega0[2]
-    forces = {one.name: one.thrust for channel in changed.core.channels for one in channel.thrusters}
+    assert changed.omega0[2] == craft.omega0[2]
+    forces = {one.name: one.thrust for channel in changed.channels for one in channel.thrusters}
     assert (forces["+M1"], forces["-M1"]) == (12.0, 10.0)
     (tmp_path / "own.yaml").write_text(TILTED)
     held = nutdamp.load(tmp_path / "own.yaml", set={"steerable.isp": 200.0})
     for one in (held, nutdamp.plan(held, "two-pulse").spacecraft, nutdamp.plan(held, "none").fly(3.0).spacecraft):
         more = one.with_(name="Other")
         assert more.name == "Other"
-        assert more.core.steerable is not None
-        assert more.core.steerable.isp == 200.0
+        assert more.steerable is not None
+        assert more.steerable.isp == 200.0
     compared = nutdamp.compare(held, ["two-pulse"])
-    assert compared["two-pulse"].spacecraft.with_(mass=3).core.mass == 3.0
+    assert compared["two-pulse"].spacecraft.with_(mass=3).mass == 3.0
 
 
 def test_there_is_one_type_of_each_name(craft: nutdamp.Spacecraft) -> None:

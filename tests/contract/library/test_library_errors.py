@@ -193,4 +193,4 @@ def test_an_unknown_scheme_is_refused_without_nutation_too() -> None:
         nutdamp.plan(calm, "three-pulse")
     for call in (planning.plan, planning.alternatives):
         with pytest.raises(KeyError):
-            call(calm.core, "three-pulse")
+            call(calm, "three-pulse")

@@ -206,7 +206,7 @@ def test_the_library_sets_too(tmp_path: Path) -> None:
     craft = nutdamp.load(
         file,
         set={"limits.horizon": "300 s", "thrusters.T1.torque": (9, 0, 0), "limits.blackout": [["1 s", 2]], "mass": 50},
-    ).core
+    )
     assert craft.limits.horizon == 300.0
     assert craft.limits.blackout == ((1.0, 2.0),)
     assert craft.channels[0].thrusters[0].torque[0] == 9.0

@@ -104,7 +104,7 @@ def test_a_library_flight_ends_where_its_track_does() -> None:
     flown = nutdamp.plan(body, "none").fly(until=60.0)
     assert flown.residual.nutation == pytest.approx(flown.track.nutation[-1], rel=1e-12)
     assert flown.residual.nutation > 1.5 * body.nutation
-    assert "→" in title(flown.core)
+    assert "→" in title(flown)
 
 
 NUTATION = r"^nutation +([<0-9.e -]+) deg +([<0-9.e -]+) deg$"
