@@ -62,6 +62,10 @@ def in_order(faults: Iterable[Fault]) -> list[Fault]:
     return sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
 
 
+MOST_SHOWN = 100
+"""Faults of a file that its message names."""
+
+
 class FaultyFile(NutdampError):
     """An input file says something that cannot be; carries all its faults, in the order of the file."""
 
@@ -70,7 +74,9 @@ class FaultyFile(NutdampError):
         super().__init__(self.faults)
 
     def __str__(self) -> str:
-        return "\n".join(str(fault) for fault in self.faults)
+        more = len(self.faults) - MOST_SHOWN
+        cut = [f"and {more} more faults"] if more > 0 else []
+        return "\n".join([*map(str, self.faults[:MOST_SHOWN]), *cut])
 
 
 class BadRequest(NutdampError):

@@ -124,10 +124,18 @@ class Plan(views.Data, views.Tabled):
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether the flown residual keeps the requirement of the file, and the spin of the goal where there is one.
+        """Whether the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
-        None where neither is given, and without a schedule. With a target axis the shift of H counts from there.
+        None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
+        shift of H counts from there.
         """
+        if self.left is None:
+            return None
+        return False if self.kept is False else self.ends_well
+
+    @property
+    def ends_well(self) -> bool | None:
+        """Whether the flown residual keeps what is required at the end; None where nothing is."""
         if self.left is None or not compliance.required(self.spacecraft):
             return None
         return not any(bound.required for bound in self.shortfalls)
@@ -144,12 +152,12 @@ class Plan(views.Data, views.Tabled):
 
     @property
     def standing(self) -> Standing:
-        """What it reaches; an infeasible plan misses all."""
-        if self.left is None or self.meets_requirement is False:
+        """What it reaches at the end, whatever cones it breaks on the way; an infeasible plan misses all."""
+        if self.left is None or self.ends_well is False:
             return Standing.MISSES
         if not self.shortfalls:
             return Standing.COMPLIES
-        return Standing.MISSES if self.meets_requirement is None else Standing.MEETS
+        return Standing.MISSES if self.ends_well is None else Standing.MEETS
 
     @property
     def severity(self) -> float:

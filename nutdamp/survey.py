@@ -26,6 +26,10 @@ SHORTEST, GRID = 1e-6, 600
 """Part of the longest on-time from which on, and number of on-times among which, the largest step is looked for."""
 
 
+DIGITS = 9
+"""Of misses in rad, those that are no rounding: among equals the pair that is named first."""
+
+
 @dataclass(frozen=True, slots=True)
 class ChannelSteps:
     """A channel and the nutation angles (rad) that its pulses take out or put in.
@@ -167,12 +171,14 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
         ),
     )
     usable = [channel for channel in spacecraft.channels if channel.damps]
-    pairs = [
-        PairFit(one, two, cmath.phase(two.transverse * (one.transverse * needed).conjugate()))
-        for one in usable
-        for two in usable
-    ]
-    return min(pairs, key=lambda pair: abs(pair.miss), default=None)
+    torques = np.array([channel.transverse for channel in usable])
+    best: PairFit | None = None
+    for first, torque in zip(usable, torques, strict=True):  # a row at a time: many channels have very many pairs
+        misses = np.angle(torques * np.conj(torque * needed))
+        index = int(np.argmin(np.abs(misses).round(DIGITS)))
+        if best is None or round(abs(misses[index]), DIGITS) < round(abs(best.miss), DIGITS):
+            best = PairFit(first, usable[index], float(misses[index]))
+    return best
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,9 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     match = _QUANTITY.fullmatch(text)
     # A "unit" that starts like the rest of a number is a decimal comma or a thousands separator.
     if match is None or re.match(r"[0-9.,_']", match[2]):
-        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
+        comma = re.match(r"\s*[-+]?[0-9]+,[0-9]+\s*($|[^0-9.,\s])", text)
+        point = f"; write {shown(text.replace(',', '.', 1))}, with a decimal point" if comma else ""
+        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}{point}")
     number, unit = float(match[1]), re.sub(r"\s+", " ", match[2])
     if not unit and bare:
         return number, 1.0

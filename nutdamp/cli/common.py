@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import click
 
 from nutdamp.cli.parameters import FILE, Named
+from nutdamp.cli.screen import say
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def parsed(
     from nutdamp.files.spacecraft_file import read_spacecraft
 
     def warn(doubt: Fault) -> None:
-        remark(doubt.as_warning)
+        say(doubt.as_warning)
         if doubts is not None:
             doubts.append(doubt)
 

@@ -69,9 +69,9 @@ def command(
     fired = None
     if schedule is not None:
         fired, warnings = read_pulses(schedule, job.spacecraft)
-        job.warn(warnings)
+        job.doubt(warnings)
     record, read = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
-    job.warn(read)
+    job.doubt(read)
     with working("fitting", quiet=quiet):
         found = fit(job.spacecraft, record)
     now = carried(found, at)

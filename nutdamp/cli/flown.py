@@ -11,7 +11,7 @@ import click
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.scheme_options import expect_read
-from nutdamp.schemes import NAMES, PLANNED, Options, SchemeOptions
+from nutdamp.schemes import NAMES, Options, SchemeOptions
 
 if TYPE_CHECKING:
     from nutdamp.cli.job import Job
@@ -37,11 +37,6 @@ class Flown(NamedTuple):
     def file(self) -> str | None:
         """The file that is read, if any."""
         return self.schedule if self.blocks is None else self.blocks
-
-    @property
-    def fires(self) -> bool:
-        """Whether it is to end somewhere: not so free motion."""
-        return self.scheme is None or self.scheme in PLANNED
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
@@ -109,7 +104,7 @@ def _read(job: Job, schedule: str, options: Options) -> Plan:
 
     expect_read((), options, job.spacecraft, job.remark)
     plan, warnings = read_plan(schedule, job.spacecraft, options.of(SchemeOptions))
-    job.warn(warnings)
+    job.doubt(warnings)
     return plan
 
 
@@ -152,5 +147,5 @@ def _fired(job: Job, path: str, options: Options, *, jitter: bool) -> Plan:
     if jitter and body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
         job.remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
     made = fired(body, blocks, JITTER_SEED if jitter else None)
-    job.warn((*warnings, *broken_limits(body, made)))
+    job.doubt((*warnings, *broken_limits(body, made)))
     return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)

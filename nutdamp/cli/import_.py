@@ -11,18 +11,20 @@ from nutdamp.cli.places import expect_outputs
 
 
 @click.command("import")
-@click.argument("form", type=click.Choice(["apm"]), metavar="apm")
-@click.argument("file", type=FILE)
+@click.argument("given", nargs=-1, required=True, metavar="[apm] FILE")
 @click.option("-o", "--output", type=FILE, default="-", help="Spacecraft file to write; default standard output.")
 @click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
-def command(form: str, file: str, output: str, schedule: str | None, quiet: bool) -> None:  # noqa: ARG001 - one form
+def command(given: tuple[str, ...], output: str, schedule: str | None, quiet: bool) -> None:
     """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, in KVN).
 
     The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
     manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for
     standard input.
     """
+    *form, file = given
+    if form not in ([], ["apm"]):
+        raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
     expect_outputs(file, output=output, schedule=schedule)
 
     from nutdamp.files.apm_import import imported

@@ -30,17 +30,15 @@ def command(file: str, name: str | None, listed: bool, force: bool, quiet: bool)
     It is the built-in example, in which every key is described, or with --from one of the spacecraft that ship with
     nutdamp, each with the sources of its figures.
     """
-    from pathlib import Path
-
     from nutdamp.errors import CannotWrite
     from nutdamp.files.examples import BUILT_IN, example_text
-    from nutdamp.files.output import STDOUT, write_whole
+    from nutdamp.files.output import STDOUT, check_place, write_whole
 
     if listed:
         _list()
         return
     text = example_text(_known(name) if name else BUILT_IN)
-    if file != STDOUT and Path(file).exists() and not force:
+    if file != STDOUT and check_place(file).exists() and not force:
         raise CannotWrite(file, "it is already there; --force replaces it")
     write_whole(file, text)
     if file != STDOUT:

@@ -36,9 +36,14 @@ class Job(NamedTuple):
     quiet: bool
 
     def warn(self, warnings: Iterable[str]) -> None:
-        """Print warnings on standard error, unless quiet."""
+        """Print warnings about results on standard error, unless quiet."""
         for warning in warnings:
             self.remark(f"warning: {warning}")
+
+    def doubt(self, warnings: Iterable[str]) -> None:
+        """Print warnings about the data on standard error, quiet or not."""
+        for warning in warnings:
+            say(f"warning: {warning}")
 
     def deliver(
         self,
@@ -70,7 +75,24 @@ def begin(
     text = source(given.path, remark)
     spacecraft = parsed(text, given.settings, remark, aim)
     expect_places(*(path for path in written.values() if isinstance(path, str)))
+    context = click.get_current_context(silent=True)
+    if context is not None and isinstance(written.get("json"), str):
+        context.meta[UNDER_WAY] = written["json"], spacecraft
     return Job(spacecraft, text, remark, silent, quiet)
+
+
+UNDER_WAY = "nutdamp.cli.job"
+"""Where the context of a command line keeps the JSON file and the spacecraft of the job that has begun."""
+
+
+def write_infeasible(context: click.Context, reason: Exception) -> None:
+    """Write the JSON file of the job that has begun, if there is one: that nothing is feasible, and why."""
+    if UNDER_WAY not in context.meta:
+        return
+    from nutdamp.files.plan_json import infeasible_json
+
+    path, spacecraft = context.meta[UNDER_WAY]
+    deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
 
 
 def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:

@@ -11,7 +11,7 @@ import click
 
 from nutdamp import __version__
 from nutdamp.cli.boundary import run
-from nutdamp.errors import nearest
+from nutdamp.errors import Infeasible, nearest
 
 COMMANDS = {
     "plan": "Plan pulse schedules that damp the nutation, and compare them.",
@@ -55,6 +55,16 @@ class Commands(click.Group):
             close = nearest(name, COMMANDS)
             ctx.fail(f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else ""))
         return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command; where nothing that was asked for is feasible, its JSON file says so all the same."""
+        try:
+            return super().invoke(ctx)
+        except Infeasible as reason:
+            from nutdamp.cli.job import write_infeasible
+
+            write_infeasible(ctx, reason)
+            raise
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """The command of that name."""

@@ -65,7 +65,7 @@ def command(
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
-    breaks a cone of keep; 0 for free motion, which is no plan to judge. SPACECRAFT is a YAML file, or - for standard
+    breaks a cone of keep; so for free motion too. SPACECRAFT is a YAML file, or - for standard
     input; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for
     --schedule standard input.
     """
@@ -94,7 +94,7 @@ def command(
         (plot, partial(_picture, made, track, figure)),
     ]
     job.deliver(outputs, partial(_screen, made), *[partial(_drawing, made, track)] * drawn)
-    leave(missed=flown.fires and made.decision.met is False and len(made.flown.schedule) == len(pulses))
+    leave(missed=made.decision.met is False and len(made.flown.schedule) == len(pulses))
 
 
 def _picture(made: Simulation, track: Track | None, figure: str) -> Figure:

@@ -63,6 +63,8 @@ def by_name(value: Mapping[str, object]) -> bool:
 class ToleranceSection(Section):
     """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
 
+    written = "a tolerance, such as {normal: 2 %}"
+
     normal: Any = Field("One sigma of a normal distribution, in its unit or in %.", "2 %", default=None)
     uniform: Any = Field("Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None)
     triangular: Any = Field("Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None)

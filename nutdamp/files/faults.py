@@ -81,6 +81,8 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
                 node.value[meant], node.keys[meant] = dropped, node.keys[key]
             elif "tensor" in fields and MOMENT.fullmatch(key):
                 cure = "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
+            elif key == "<<":
+                cure = "merge keys are of YAML 1.1; write the keys out"
             elif ":" in key:
                 cure = "put a space behind the colon"
             yield Finding((*path, key), f"unknown key; {cure}", at_key=True)

@@ -40,10 +40,11 @@ class Quantity(Rule):
         return result
 
     def _degrees(self, value: object) -> str:
-        """A hint for an angle without unit that would be in range in degrees."""
-        if self.kind != "angle" or isinstance(value, str) or not self._allows(parse(f"{value} deg", "angle")):
+        """A hint for an angle without unit that would be in range in degrees, and for a share that would be in %."""
+        meant = {"angle": "deg", "ratio": "%"}.get(self.kind)
+        if meant is None or isinstance(value, str) or not self._allows(parse(f"{value} {meant}", self.kind)):
             return ""
-        return f" (read as radians; write {value} deg)"
+        return f" (read as radians; write {value} deg)" if meant == "deg" else f"; write {value} % if that is meant"
 
     def _allows(self, result: float) -> bool:
         return all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items())
@@ -82,6 +83,24 @@ class AxialShorthand(Rule):
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """The vector or the torque."""
         return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
+
+
+class ListOf(Rule):
+    """Annotation of a list of lists, each ``written`` so, that says how a single one is put into a list."""
+
+    def __init__(self, written: str) -> None:
+        self.written = written
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """The list; raises ValueError where its first entry is none."""
+        if isinstance(value, list) and value and not isinstance(value[0], list):
+            one = ", ".join(str(entry) for entry in value)
+            raise ValueError(f"expected a list of {self.written}, such as [[{one}]], got [{one}]")
+        return inner(value)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """As of the list."""
+        return inner()
 
 
 class OrWord(Rule):

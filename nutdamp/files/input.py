@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 import sys
 from pathlib import Path
 
@@ -18,11 +19,22 @@ def read_bytes(path: str, most: int = -1) -> bytes:
             if sys.stdin is None:
                 raise CannotRead(path, "there is no standard input")
             return sys.stdin.buffer.read(most)
+        if _is_device(Path(path)):
+            raise CannotRead(path, "it is a device; expected a file, a pipe or -")
         with Path(path).open("rb") as stream:
             return stream.read(most)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise CannotRead(path, reason.lower()) from error
+
+
+def _is_device(path: Path) -> bool:
+    """Whether reading may go on for ever, or do something: a device that is no terminal, or a socket."""
+    mode = path.stat().st_mode
+    if stat.S_ISCHR(mode):
+        with path.open("rb") as stream:
+            return not stream.isatty()
+    return stat.S_ISBLK(mode) or stat.S_ISSOCK(mode)
 
 
 def read_limited(path: str, most: int) -> bytes:

@@ -36,7 +36,7 @@ KINDS = (
     Kind(
         r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_APM_VERS",
         "a CCSDS attitude parameter message",
-        "`nutdamp import apm FILE` makes a spacecraft file of it",
+        "`nutdamp import FILE` makes a spacecraft file of it",
     ),
     Kind(
         r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_\w+_VERS|\s*<\?xml|\s*<!DOCTYPE|\s*<html",

@@ -16,6 +16,7 @@ from nutdamp.spacecraft import Inertia
 from nutdamp.tolerances import KINDS
 from nutdamp.units import KINDS as UNITS
 from nutdamp.units import shown
+from nutdamp.words import span
 
 SAMPLES = 4.0
 """Samples a nutation period without which the phase of the nutation is hardly seen."""
@@ -155,7 +156,7 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     elif on_time is not None:
         for one in known:
             if not one.least <= on_time <= one.most:
-                problem = f"{on_time:g} s is outside what {one.name} allows: {one.least:g} s to {one.most:g} s"
+                problem = f"{on_time:g} s is outside what {one.name} allows: {span(one.least, one.most, 's')}"
                 yield Finding(("loop", "on_time"), problem)
     names, before = [one.name for one in known], set()
     for index, node in facts.children("loop", "faults", "reversed"):

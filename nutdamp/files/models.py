@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.files.dispersion_models import DispersionsSection
-from nutdamp.files.fields import OrWord
+from nutdamp.files.fields import ListOf, OrWord
 from nutdamp.files.loop_models import LoopSection
 from nutdamp.files.quantities import (
     AcuteAngle,
@@ -159,7 +159,7 @@ class LimitsSection(Section):
     gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
     tick: PositiveTime | None = Field("Resolution of commanded starts and on-times, s; default: none.", "1 ms")
     max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
-    blackout: list[Window] = Field(
+    blackout: Annotated[list[Window], ListOf("[begin, end]")] = Field(
         "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
     )
 

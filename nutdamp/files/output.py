@@ -57,12 +57,11 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
             yield sys.stdout.buffer
             sys.stdout.buffer.flush()
             return
-        target = Path(path).resolve()
-        if target.exists() and not target.is_file() and not target.is_dir():
+        target = check_place(path)
+        if target.exists() and not target.is_file():
             with target.open("wb") as stream:
                 yield stream
             return
-        check_place(path)
         with _replacing(target) as stream:
             yield stream
     except BrokenPipeError:
@@ -71,17 +70,31 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
         raise CannotWrite(path, reason.strerror or str(reason)) from reason
 
 
-def check_place(path: str) -> None:
-    """See before long work that a file has a folder that is there and may be written to. Raises CannotWrite."""
+def check_place(path: str) -> Path:
+    """Where a file is to stand, behind links; seen before long work to be a place that can be written to.
+
+    Raises CannotWrite where it cannot: also where links go round in a circle, or the name cannot be one.
+    """
     if path == STDOUT:
-        return
-    target = Path(path).resolve()
-    if target.is_dir():
-        raise CannotWrite(path, "it is a directory")
-    if not target.parent.is_dir():
-        raise CannotWrite(path, f"{target.parent} is no directory")
-    if not os.access(target if target.exists() else target.parent, os.W_OK):
-        raise CannotWrite(path, "permission denied")
+        return Path(path)
+    try:
+        target = Path(path).resolve()
+        if target.is_symlink():  # before Python 3.13 `resolve` may give up on a circle without a word
+            raise CannotWrite(path, "too many levels of symbolic links")
+        if target.is_dir():
+            raise CannotWrite(path, "it is a directory")
+        if not target.parent.is_dir():
+            raise CannotWrite(path, f"{target.parent} is no directory")
+        if not os.access(target if target.exists() else target.parent, os.W_OK):
+            raise CannotWrite(path, "permission denied")
+    except (OSError, RuntimeError, ValueError) as reason:  # RuntimeError: links in a circle; ValueError: a zero byte
+        raise CannotWrite(path, _said(reason)) from reason
+    return target
+
+
+def _said(reason: Exception) -> str:
+    """What the system says, without the path."""
+    return getattr(reason, "strerror", None) or str(reason).partition(" from ")[0]
 
 
 def make_folder(path: str) -> None:
@@ -90,8 +103,8 @@ def make_folder(path: str) -> None:
         Path(path).mkdir(parents=True, exist_ok=True)
     except FileExistsError as reason:
         raise CannotWrite(path, "it is there, and no directory") from reason
-    except OSError as reason:
-        raise CannotWrite(path, reason.strerror or str(reason)) from reason
+    except (OSError, ValueError) as reason:
+        raise CannotWrite(path, _said(reason)) from reason
 
 
 @contextmanager

@@ -26,6 +26,11 @@ def heading(spacecraft: Spacecraft) -> dict[str, Any]:
     return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
 
 
+def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
+    """What the JSON file of any command holds where nothing that was asked for is feasible."""
+    return {**heading(spacecraft), "feasible": False, "why": why}
+
+
 def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
     """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
     return {

@@ -51,6 +51,7 @@ def doubts(root: Node) -> Iterator[Finding]:
         if value is not None and abs(value) > 2.0 * math.pi:
             yield _doubt(path, value, "angle", "deg")
     yield from _requirements(facts)
+    yield from _state(facts)
     for path in _lengths(facts):
         value = _bare(facts, path)
         if value is not None and abs(value) > FAR:
@@ -88,6 +89,18 @@ def _requirements(facts: Facts) -> Iterator[Finding]:
         value = _bare(facts, path)
         if value is not None and least < value < 0.5 * math.pi:  # from there on it is refused, with the same hint
             yield _doubt(path, value, "angle", "deg")
+
+
+def _state(facts: Facts) -> Iterator[Finding]:
+    """A nutation at t = 0 that is large for one in rad; a loop that waits for more than is required at the end."""
+    path = ("state", "nutation")
+    value = _bare(facts, path)
+    if value is not None and LOOSE < value < 0.5 * math.pi:
+        yield _doubt(path, value, "angle", "deg")
+    start, most = facts.number("angle", "loop", "start"), facts.number("angle", "requirement", "nutation")
+    if start is not None and most is not None and start > most:
+        degrees = f"{math.degrees(start):g} deg is above requirement.nutation, {math.degrees(most):g} deg"
+        yield Finding(("loop", "start"), f"{degrees}: the loop lets more nutation stand than is required")
 
 
 def _nutation(facts: Facts) -> float:

@@ -52,6 +52,10 @@ def symmetric(tensor: Vector) -> Vector:
     return 0.5 * (tensor + tensor.T)
 
 
+FORMULA = "=@"
+"""Beginnings of a cell that a spreadsheet takes for a formula, where they are no sign of a name such as +M1."""
+
+
 def _names(facts: Facts) -> Iterator[Finding]:
     lists = ("thrusters", "disturbances", "keep")
     entries: list[KeyPath] = [(key, index, "name") for key in lists for index, _ in facts.children(key)]
@@ -62,6 +66,8 @@ def _names(facts: Facts) -> Iterator[Finding]:
             continue
         if not name.strip() or not name.isprintable():
             yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
+        elif name[0] in FORMULA:
+            yield Finding(path, f"{shown(name)} would be a formula in a spreadsheet; take another", at_key)
         elif name == STEERABLE and path[0] in ("thrusters", "channels"):
             yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
     first: dict[tuple[str | int, str], KeyPath] = {}

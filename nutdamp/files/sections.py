@@ -101,6 +101,9 @@ class Within(Rule):
 class Section:
     """A mapping of the file: no key that is not named here."""
 
+    written: ClassVar[str] = "a mapping {key: value, …}"
+    """How it is written, for messages."""
+
     schema_extra: ClassVar[dict[str, Any]] = {}
     """What its JSON Schema has besides."""
 
@@ -126,7 +129,7 @@ class Section:
         Unknown keys and empty values are not looked for here.
         """
         if not isinstance(value, dict):
-            problems.append((path, _mismatch(value, "a mapping {key: value, …}")))
+            problems.append((path, _mismatch(value, cls.written)))
             return None
         values = {}
         for name, key in cls.fields().items():

@@ -55,6 +55,8 @@ def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) ->
     """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
     stream.write(f"{','.join(HEADER)}\r\n".encode())
     for piece in pieces:
+        if not len(piece.t):
+            continue
         stream.write(_lines(track_array(piece, inertia).tolist()).encode())
 
 

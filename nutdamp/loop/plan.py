@@ -53,9 +53,9 @@ class LoopPlan(Plan):
 
     @property
     def meets_requirement(self) -> bool | None:
-        """As of any plan; not where the loop was stopped or never quiet, nor where the spin axis breaks a cone."""
+        """As of any plan; not where the loop was stopped or never quiet."""
         found = super().meets_requirement
-        return False if self.kept is False or (found is not None and self.flown_run.lost) else found
+        return False if found is not None and self.flown_run.lost else found
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:

@@ -77,7 +77,7 @@ FAILS = "does not meet the requirement with nominal values"
 
 def fails(point: Point) -> bool:
     """Whether it does not meet the requirement of the file, or breaks a cone."""
-    return point.plan.meets_requirement is False or point.plan.kept is False
+    return point.plan.meets_requirement is False
 
 
 TOGETHER = 1e-3
@@ -114,13 +114,13 @@ def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
     Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
     first.
     """
-    until, misses = chosen.pulses.end, chosen.meets_requirement is False or chosen.kept is False
+    until, misses = chosen.pulses.end, chosen.meets_requirement is False
     better = [
         _Better(
             saved if misses or saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point, misses
         )
         for index, front, point in numbered(found)
-        if point.plan.meets_requirement and point.plan.kept is not False
+        if point.plan.meets_requirement
         for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
         if misses or (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]

@@ -60,7 +60,10 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
-    search = Search(spacecraft, at_hand(spacecraft, usable(spacecraft)), commands)
+    channels = [one for one in at_hand(spacecraft, usable(spacecraft)) if commandable_widths(commands, one).size]
+    if not channels:
+        raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
+    search = Search(spacecraft, channels, commands)
     flights: list[Flown] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"

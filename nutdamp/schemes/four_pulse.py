@@ -12,6 +12,7 @@ from nutdamp.schemes.options import FourPulseOptions
 from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
 from nutdamp.schemes.tools.reasons import at_hand, no_alignment
 from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.words import span
 
 DEFAULT_SHARE = 0.125
 """Default on-time as a share of T_ω: 2.6 % of the impulse is lost to the width."""
@@ -44,7 +45,7 @@ def _on_time(builder: ImpulseBuilder, channel: Channel, requested: float | None)
     if not (channel.min_on_time <= requested <= channel.max_on_time and 0.0 < requested < math.inf):
         raise Infeasible(
             f"an on-time of {requested:.4g} s is outside what {channel.name} allows: "
-            f"{channel.min_on_time:.4g} s to {channel.max_on_time:.4g} s"
+            f"{span(channel.min_on_time, channel.max_on_time, 's')}"
         )
     return requested
 

@@ -113,7 +113,8 @@ def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
         from matplotlib import style
 
         with style.context(["default", _SETTINGS]), warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Glyph .* missing from")  # a name in another script is drawn as boxes
+            # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
+            warnings.simplefilter("ignore", UserWarning)
             return draw(*args, **kwargs)
 
     return drawn

@@ -98,15 +98,13 @@ class Problem:
             low, high = (low, middle) if self.feasible(middle) else (middle, high)
         return high
 
-    def check_number(self, solution: Solution) -> None:
-        """Raise Infeasible where burns of the longest on-time would be more than the moments there are for them."""
-        needed = math.fsum(burn.on_time / burn.channel.max_on_time for burn in solution.burns)
-        if needed > self.program().forbidden.size:
-            longest = max(burn.channel.max_on_time for burn in solution.burns)
-            raise Infeasible(
-                f"at least {needed:.3g} pulses would be needed, for none may be longer than {longest:.3g} s "
-                "(max_on_time)"
-            )
+    def overtaxed(self, solution: Solution) -> dict[str, float]:
+        """Channels that need more pulses of their longest on-time than there are moments for, and how many."""
+        needed: dict[str, float] = {}
+        for burn in solution.burns:
+            name = burn.channel.name
+            needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
+        return {name: count for name, count in needed.items() if count > self.program().forbidden.shape[1]}
 
     def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with what any other must cost."""

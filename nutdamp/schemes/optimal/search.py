@@ -189,7 +189,9 @@ class _Search(Problem):
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        self.check_number(first)
+        if overtaxed := self.overtaxed(first):
+            made = self.without(overtaxed).schedule()
+            return self.with_bounds(Schedule(made.pulses, made.notes), first)
         with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
             best = self.whole_or_shorter(first)
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
@@ -199,6 +201,21 @@ class _Search(Problem):
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+
+    def without(self, overtaxed: dict[str, float]) -> _Search:
+        """The search without channels whose pulses are too short to do what is asked of them.
+
+        Raises Infeasible, naming the limit, where there are no others.
+        """
+        others = tuple(one for one in self.spacecraft.channels if one.name not in overtaxed)
+        try:
+            return _Search(replace(self.spacecraft, channels=others), self.options)
+        except Infeasible:
+            name, count = max(overtaxed.items(), key=lambda entry: entry[1])
+            longest = next(one.max_on_time for one in self.channels if one.name == name)
+            raise Infeasible(
+                f"{name} would have to fire {count:.3g} pulses, none longer than {longest:.3g} s (max_on_time)"
+            ) from None
 
     def astray(self, made: Schedule | None) -> bool:
         """Whether there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""

@@ -20,6 +20,7 @@ from nutdamp.schedule import TOUCHING, Pulse, channel_pulse, steerable_pulse
 from nutdamp.schemes.options import RhumbLineOptions
 from nutdamp.schemes.tools import reasons
 from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.words import span
 
 TURN_SHARE = 0.125
 """Default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc."""
@@ -123,7 +124,7 @@ class Train:
         if not self.shortest <= given <= self.longest:
             raise Infeasible(
                 f"an on-time of {given:.4g} s is outside what the channels allow: "
-                f"{self.shortest:.4g} s to {self.longest:.4g} s"
+                f"{span(self.shortest, self.longest, 's')}"
             )
         if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
             raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {self.here.limits.tick:.4g} s")

@@ -47,6 +47,16 @@ def doubts_of(text: str) -> list[str]:
             BODY + "omega0: [0.1, 0, 180]\n",
             "f.yaml:3:18: omega0[2]: warning: 180 is read as 180 rad/s; write 180 deg/s if that is meant",
         ),
+        (
+            BODY + "state: {spin: 3, nutation: 0.5}\n",
+            "f.yaml:3:28: state.nutation: warning: 0.5 is read as 0.5 rad (28.65 deg); write 0.5 deg if that is meant",
+        ),
+        (
+            BASE
+            + "requirement: {nutation: 0.3 deg}\nthrusters: [{name: T, torque: [1, 0, 0]}]\n"
+            + "loop: {sensor: {kind: gyro, rate: 20 Hz}, start: 0.5 deg, stop: 0.1 deg}\n",
+            "f.yaml:6:50: loop.start: warning: 0.5 deg is above requirement.nutation, 0.3 deg",
+        ),
         (BASE + "goal: {spin: 28}\n", "f.yaml:4:14: goal.spin: warning: 28 is read as 28 rad/s; write 28 rpm"),
         (
             BASE + THRUSTER.format(300, 0),

@@ -7,12 +7,13 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from nutdamp.errors import CannotWrite
-from nutdamp.files.output import PREFIX, SUFFIX, json_text, whole_file, write_whole
+from nutdamp.files.output import PREFIX, SUFFIX, json_text, make_folder, whole_file, write_whole
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -94,3 +95,9 @@ def test_a_name_that_is_not_utf_8_comes_back_from_json(tmp_path: Path) -> None:
     name = os.fsdecode(b"d\xfcse.yaml")
     write_whole(str(tmp_path / "x.json"), json_text({"file": name, "umlaut": "ü"}))
     assert json.loads((tmp_path / "x.json").read_text(encoding="utf-8")) == {"file": name, "umlaut": "ü"}
+
+
+@pytest.mark.parametrize("write", [write_whole, lambda path, _: make_folder(path)])
+def test_a_zero_byte_is_no_path(write: Callable[[str, str], object]) -> None:
+    with pytest.raises(CannotWrite):
+        write("a\0b", "1")

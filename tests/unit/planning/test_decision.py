@@ -188,6 +188,7 @@ def watched(least: float) -> Spacecraft:
 def test_a_cone_that_is_broken_is_not_met_whatever_is_left() -> None:
     kept, broken = (decided_of(watched(least)) for least in (10.0, 16.0))
     assert (kept.met, broken.met, broken.nominal) == (True, False, True)
+    assert (kept.plan.meets_requirement, broken.plan.meets_requirement, broken.plan.ends_well) == (True, False, True)
     (found,) = broken.strays
     assert math.degrees(found.least) < 16.0
     flown = Decision(broken.plan, counted(0.714, 0.9))  # cones count in each case; the row is of nominal values

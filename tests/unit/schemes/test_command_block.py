@@ -432,3 +432,13 @@ def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_
     alike = replace(body, commands=replace(body.commands, delay_step=0.02, widths=widths))
     plan = planning.plan(replace(alike, limits=replace(body.limits, tick=0.01)), "command-block")
     assert not any("tick" in note for note in plan.pulses.notes)
+
+
+def test_a_channel_without_a_commandable_width_is_left_out() -> None:
+    body = load(places.case("command-block-empty-widths.yaml"))
+    made = planning.plan(body, "command-block")
+    assert made.failure is None
+    assert {pulse.channel for pulse in made.pulses} == {"T1"}
+    alone = planning.plan(replace(body, channels=body.channels[1:]), "command-block")
+    assert not alone.feasible
+    assert alone.failure is None

@@ -260,3 +260,14 @@ def test_the_last_pulses_are_corrected_and_for_a_spin_the_one_that_gives_most_to
     body = replace(BODY, goal=Goal(None, spin))
     least_squares.Correction(SCHEMES[scheme], SchemeOptions())(body, Schedule(made), free)
     assert chosen == [corrected]
+
+
+def test_a_channel_whose_pulses_are_too_short_is_left_out() -> None:
+    """One of 1 µs at most beside one without a limit: the search goes on with that; alone, its limit is named."""
+    body = load_spacecraft(case("optimal-longer-than-inf.yaml"))
+    made = plan(body, "optimal")
+    assert made.feasible
+    assert {pulse.channel for pulse in made.pulses} == {"T1"}
+    assert made.pulses.bounds is not None
+    alone = plan(replace(body, channels=body.channels[1:]), "optimal")
+    check_text("optimal.too-short", infeasibility(alone))
