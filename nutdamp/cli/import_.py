@@ -11,7 +11,7 @@ from nutdamp.cli.places import expect_outputs
 
 
 @click.command("import")
-@click.argument("given", nargs=-1, required=True, metavar="[apm] FILE")
+@click.argument("given", nargs=-1, required=True, type=FILE, metavar="[apm] FILE")
 @click.option("-o", "--output", type=FILE, default="-", help="Spacecraft file to write; default standard output.")
 @click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
