@@ -156,7 +156,7 @@ def sun_of(body: Spacecraft) -> Vector:
     return body.sun
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_ace_is_planned_with_about_the_pulses_reported() -> None:
     """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, with a way of 16 deg past the Sun: 99 pulses were flown."""
     body = at_rest("ace", 5.0832)

@@ -132,7 +132,7 @@ def test_the_axis_track_ends_where_h_and_the_spin_axis_end() -> None:
     assert np.hypot(*line(space, "H at t = 0 and after each pulse")[-1]) == pytest.approx(shift, abs=1e-9)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_target_is_marked_where_h_ends() -> None:
     space = panel(drawn("motion", "pointed"), "Axis track")
     (target,) = line(space, "target")
@@ -144,6 +144,7 @@ def test_the_target_is_marked_where_h_ends() -> None:
     ("name", "case"),
     [deep(*one) if number % 8 else one for number, one in enumerate(LAID_OUT) if one[0] != "timeline"],
     quick=1,
+    deep=2,
 )
 def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str) -> None:
     for axes in drawn(name, case).axes:
@@ -158,7 +159,7 @@ def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str)
             assert re.search(r", deg", axes.get_ylabel()) or axes.get_title().startswith("Firings")
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_pole_curve_shows_where_the_channels_push() -> None:
     """+M2 up, -M1 left, by the file's names; only those that fire."""
     axes = panel(drawn("motion", "34 pulses"), "Pole curve")
@@ -290,12 +291,12 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
 
 
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")  # of the name in another script
-@spread(("name", "case"), [deep(*one) if number % 4 else one for number, one in enumerate(LAID_OUT)], quick=1)
+@spread(("name", "case"), [deep(*one) if number % 4 else one for number, one in enumerate(LAID_OUT)], quick=1, deep=2)
 def test_no_text_is_cut_or_covers_another(name: str, case: str) -> None:
     check_layout(drawn(name, case))
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("path", sorted((places.CONFIGS).glob("*.yaml")), ids=lambda path: path.stem)
 def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
     body = load_spacecraft(str(path))

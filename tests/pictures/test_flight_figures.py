@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Annotation
 from support.builders import aimed, cross, fan, spinner
-from support.cases import deep, spread
+from support.cases import deep, spread, weekly
 from support.colours import check_colours, contrast, pages
 from support.layout import check_layout, texts
 
@@ -68,7 +68,6 @@ ODD: dict[str, tuple[Spacecraft, Schedule]] = {
 
 
 ALWAYS = ("three moments", "blackouts")
-CASES = [case if case in ALWAYS else deep(case) for case in ODD]
 
 
 @cache
@@ -81,8 +80,8 @@ def drawn(name: str, case: str) -> Figure:
 # --- time axes -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.deep
-@spread("case", CASES, quick=1)
+@pytest.mark.weekly
+@spread("case", ODD, quick=1, deep=2)
 def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
     body, pulses = ODD[case]
     inertial = 2.0 * math.pi * body.inertia.A / float(np.linalg.norm(np.asarray(body.inertia.moments) * body.omega0))
@@ -126,7 +125,7 @@ def test_titles_name_scheme_model_and_result(by_impulses: bool, model: str) -> N
         assert re.search(r"nutation 5 deg → < 1e-9 deg, shift of H \S+", heading)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_titles_of_a_turn_say_how_far_to_which_target_and_the_pictures_mark_it() -> None:
     """It is 110 degrees: nutation alone would be a word about the least of it."""
     for name in NAMES:
@@ -150,8 +149,8 @@ def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
     assert sum(f"H towards you, {right} to the right" in title for title in titles) == 2
 
 
-@pytest.mark.deep
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.weekly
+@spread("case", ODD, quick=2, deep=4)
 def test_no_number_is_minus_zero(case: str) -> None:
     for name in ("overview", "history"):
         for text, _ in texts(drawn(name, case)):
@@ -166,7 +165,7 @@ def bar_labels(axes: Axes) -> list[Annotation]:
 
 
 @pytest.mark.parametrize("name", ["overview", "timeline"])
-@pytest.mark.parametrize("case", [case if case in ALWAYS else deep(case) for case in ODD if len(ODD[case][1])])
+@pytest.mark.parametrize("case", [case if case in ALWAYS else weekly(case) for case in ODD if len(ODD[case][1])])
 def test_labels_of_firings_have_room(name: str, case: str) -> None:
     """Inside the panel, on no other label, no bar and no hatching; every pulse has one where there is room."""
     figure = drawn(name, case)
@@ -229,7 +228,7 @@ def joined_to(axes: Axes, note: Annotation, figure: Figure) -> Vector:
     return np.array([0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)])
 
 
-@pytest.mark.parametrize("case", CASES)
+@spread("case", ODD, quick=2, deep=4)
 def test_each_direction_is_named_at_the_tip_of_its_own_arrow(case: str) -> None:
     """In its colour; by a thin line where the tips lie close together."""
     for name, panels in (("overview", [2]), ("sphere", [0, 1])):
@@ -372,7 +371,7 @@ def test_many_turns_are_drawn_thin() -> None:
     assert widths[0] > widths[1] > widths[2]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_where_h_moves_little_it_is_shown_enlarged() -> None:
     figure = drawn("motion", "120 pulses")
     body, space, inset = figure.axes
@@ -394,14 +393,14 @@ def test_where_h_moves_little_it_is_shown_enlarged() -> None:
 # --- colours ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", [deep("reversed"), "far target", deep("120 pulses")])
+@pytest.mark.parametrize("case", [weekly("reversed"), "far target", weekly("120 pulses")])
 @pytest.mark.parametrize("name", NAMES)
 def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case: str) -> None:
     check_colours(drawn(name, case))
     assert all(contrast(GREY, paper) > 3.0 for paper, _ in pages())
 
 
-@pytest.mark.parametrize("case", CASES)
+@spread("case", ODD, quick=2, deep=4)
 def test_odd_flights_are_drawn_whole(case: str) -> None:
     """All words inside the sheet, and none over another in the same panel."""
     for name in NAMES:

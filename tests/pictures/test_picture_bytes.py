@@ -50,7 +50,7 @@ def digest() -> str:
     return hashlib.sha256(file + figures.svg(figures.flight_figure("overview", made, track)).encode()).hexdigest()
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_another_process_makes_the_same_bytes() -> None:
     """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
     folders = [str(places.TESTS), str(Path(__file__).parent)]

@@ -21,6 +21,7 @@ from nutdamp.presentation import figures
 from nutdamp.presentation.figures import style
 from nutdamp.presentation.text import cost
 from nutdamp.remarks import down
+from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Requirement
 
@@ -29,7 +30,23 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 
 @cache
 def traded() -> tuple[fronts.Front, ...]:
-    return fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(0.0, math.inf))
+    """Two hand-made fronts that begin with one schedule: later ends cost less, and a free H less still."""
+    strict = ((0.0, 1.0), (4.0, 0.97), (10.0, 0.95), (20.0, 0.94))
+    free = ((0.0, 1.0), (5.0, 0.94), (12.0, 0.91), (22.0, 0.895))
+    first = _point(*strict[0])
+    return tuple(
+        fronts.Front(shift, (first, *(_point(*one) for one in ends[1:])))
+        for shift, ends in ((0.0, strict), (math.inf, free))
+    )
+
+
+def _point(later: float, share: float) -> fronts.Point:
+    """The two pulses of the compared body, ``later`` s and of a ``share`` of their impulse."""
+    made = compared()["two-pulse"]
+    pulses = tuple(replace(one, t=one.t + later, impulse=one.impulse * share) for one in made.pulses)
+    least = share * made.total_impulse
+    schedule = Schedule(pulses, bounds=Bounds(0.99 * least, 0.9 * least, "N m s", 40.0))
+    return fronts.Point(replace(made, scheme="optimal", schedule=schedule), 40.0, "N m s")
 
 
 @pytest.mark.deep
@@ -91,7 +108,7 @@ def test_a_front_that_is_missing_is_named_above_the_others() -> None:
     assert not any("none" in text.get_text() for text, _ in texts(figures.trade_figure(BODY, (strict, free))))
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_points_that_do_not_meet_the_requirement_are_crossed_out() -> None:
     body = replace(BODY, requirement=Requirement(momentum_shift=math.radians(0.05)))
     found = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
@@ -118,7 +135,7 @@ def near_each_other(count: int, *, later: float, cheaper: float) -> list[fronts.
     return close
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_points_close_together_keep_numbers_that_can_be_read() -> None:
     """Eighty schedules of which each costs a little less, a little later."""
     close = near_each_other(80, later=0.006, cheaper=0.0022)

@@ -238,7 +238,7 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_ordinary_and_degenerate_spacecraft_get_results_or_reasons(tmp_path: Path, planner: Planner) -> None:
     seeds = [seed for seed in QUICK if seed % 25]
     assert [one for seed in seeds for one in faults(seed, tmp_path, planner)] == []
@@ -255,7 +255,7 @@ def test_every_command_meets_every_scheme() -> None:
             assert met[name, scheme] >= least, (name, scheme)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_hundreds_of_spacecraft_get_results_or_reasons(block: int, tmp_path: Path, planner: Planner) -> None:
     assert [one for seed in range(block, SEEDS, BLOCKS) for one in faults(seed, tmp_path, planner)] == []

@@ -131,8 +131,8 @@ def check(body: Spacecraft, scheme: str, options: Options) -> None:
         assert len(plan.pulses) == 2
 
 
-@spread("requested", REQUESTED.values(), quick=1, ids=REQUESTED)
-@spread("block", range(10), quick=1)
+@spread("requested", REQUESTED.values(), quick=1, deep=2, ids=REQUESTED)
+@spread("block", range(10), quick=1, deep=2)
 def test_whatever_the_limits(block: int, requested: tuple[str, Options]) -> None:
     """Seeds, not hypothesis: its examples change with every module that happens to be loaded."""
     for seed in range(20 * block, 20 * (block + 1)):

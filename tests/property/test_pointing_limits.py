@@ -61,16 +61,16 @@ def test_whatever_the_limits(block: int, scheme: str) -> None:
             raise
 
 
-@spread("scheme", SCHEMES, quick=1)
-@spread("hard", HARD.values(), quick=1, ids=HARD)
+@spread("scheme", SCHEMES, quick=1, deep=2)
+@spread("hard", HARD.values(), quick=1, deep=2, ids=HARD)
 def test_awkward_limits(hard: Limits, scheme: str) -> None:
     for requested in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
         check(aimed(spinner(limits=hard, **requested), 10.0, 45.0), scheme, Options())
 
 
-@pytest.mark.deep
-@spread("scheme", SCHEMES, quick=1)
-@spread("spin", [3.0, -3.0], quick=1)
+@pytest.mark.weekly
+@spread("scheme", SCHEMES, quick=1, deep=2)
+@spread("spin", [3.0, -3.0], quick=1, deep=2)
 def test_most_unlimited_cases_end_on_the_target(scheme: str, spin: float) -> None:
     """Strong channels and time: nothing is in the way."""
     rng = np.random.default_rng(7)
@@ -100,7 +100,7 @@ def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: 
         assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
 @pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
 def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:

@@ -163,14 +163,14 @@ def check(cases: list[Case], periods: float) -> int:
     return compared
 
 
-@pytest.mark.deep
-@spread("batch", range(12), quick=1)
+@pytest.mark.weekly
+@spread("batch", range(12), quick=1, deep=0)
 def test_25_random_cases_over_10_periods(batch: int) -> None:
     rng = np.random.default_rng(1970 + batch)
     assert check([draw(rng, 10.0) for _ in range(25)], 10.0) >= 5
 
 
-@spread("batch", range(10), quick=0)
+@spread("batch", range(10), quick=0, deep=0)
 def test_2_random_cases_over_100_periods(batch: int) -> None:
     rng = np.random.default_rng(2070 + batch)
     check([draw(rng, 100.0, slimmest=0.25) for _ in range(2)], 100.0)

@@ -149,7 +149,7 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     return chosen.standing
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_nothing_beats_what_is_recommended() -> None:
     found = [standing(number, planned(draw(number))) for number in range(COUNT)]
     # Each kind of outcome is there, and often.
@@ -158,7 +158,7 @@ def test_nothing_beats_what_is_recommended() -> None:
     assert found.count(None) < COUNT // 3
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("number", WITH_OPTIMAL)
 def test_nor_where_optimal_is_compared_too(number: int) -> None:
     body = draw(number)
@@ -166,7 +166,7 @@ def test_nor_where_optimal_is_compared_too(number: int) -> None:
     assert standing(number, compared) is not None
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_what_is_said_of_the_recommended_plan_is_so() -> None:
     """Its residuals by an integrator that shares nothing with the flights here."""
     checked = 0

@@ -166,8 +166,8 @@ def test_near_a_right_angle_of_nutation_there_is_an_answer(scheme: str) -> None:
     assert plan.feasible == (None not in figures)
 
 
-@pytest.mark.deep
-@spread("degrees", [89.9, 89.999], quick=1)
+@pytest.mark.weekly
+@spread("degrees", [89.9, 89.999], quick=1, deep=1)
 def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
     for body in (spinner(degrees=degrees, channels=cross(5e3)), spinner(degrees=degrees, steerable=Steerable(1e4))):
         for scheme in (*CLASSIC, "half-cone", "rhumb-line"):
@@ -177,7 +177,7 @@ def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
             assert (left is None) == (infeasibility(plan) != "")
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> None:
     """One pulse that spins a needle up to turn after turn."""
     body = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0)

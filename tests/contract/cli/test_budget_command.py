@@ -55,6 +55,7 @@ def test_the_same_seed_gives_the_same_budget(run: Run) -> None:
         ("state.nutation=0deg", "There is no nutation yet that could grow."),
     ],
     quick=1,
+    deep=0,
 )
 def test_what_is_particular_is_said(run: Run, changed: str, said: str | None, tmp_path: Path) -> None:
     more = () if said else ("--set", "loop.stop=0.01deg")

@@ -231,7 +231,7 @@ def test_the_default_number_of_cases_is_that_of_the_other_commands(run: Run, bod
     assert (data["samples"], data["seed"]) == (20_000, 1)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path: Path) -> None:
     """`disperse`, `plan --robust` and `report` of the built-in example, 20,000 cases of seed 1."""
     sentence = r"((?:NOT )?met: [\d.]+ % of cases comply \([\d.]+ % required\))"

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from support.cases import deep
+from support.cases import weekly
 from support.dispersed import FILE
 from support.process import Run
 
@@ -44,8 +44,8 @@ def interrupted(body: Path, number: signal.Signals, *arguments: str, wait: str) 
     return process.returncode, out, err
 
 
-@pytest.mark.deep
-@pytest.mark.parametrize("number", [signal.SIGINT, deep(signal.SIGTERM)])
+@pytest.mark.weekly
+@pytest.mark.parametrize("number", [signal.SIGINT, weekly(signal.SIGTERM)])
 def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: signal.Signals) -> None:
     """The first cases are written, whole; and they are those of a run that requested no more."""
     files = ("--csv", "s.csv", "--json", "s.json")

@@ -74,7 +74,7 @@ def test_the_file_written_keeps_comments_and_moves_to_an_epoch(run: Run, tmp_pat
     assert {(one, other): value for one, other, value in known.correlation}["A", "C"] > 0.999
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_path: Path) -> None:
     blind = run("disperse", "-q", "--set", "requirement.probability=99.7%", "--json", "blind.json")
     assert blind.returncode == 4
@@ -89,7 +89,7 @@ def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_
     assert json.loads((tmp_path / "blind.json").read_text())["requirement"]["met_fraction"] < 0.88
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_plans_from_the_estimate_meet_the_requirement_on_the_true_bodies(run: Run, tmp_path: Path) -> None:
     met = 0
     for seed in range(30):
@@ -221,7 +221,7 @@ def test_a_fitted_file_is_fitted_again_with_what_was_known(run: Run, tmp_path: P
     assert other["C/A"].sigma == pytest.approx(one["C/A"].sigma / math.sqrt(2.0), rel=0.05)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_path: Path) -> None:
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n8,0.3,+M1\n16,0.3,-M2\n", encoding="utf-8")
     flown_so = ("--set", "thrusters.+M1.force=9.5N", "--set", "inertia.C=80.3 kg m^2")
@@ -249,7 +249,7 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     assert pairs[frozenset(("thrust +M1", "A"))] > 0.99
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(run: Run, tmp_path: Path) -> None:
     (tmp_path / "probe.csv").write_text("start_s,on_time_s,channel\n8,0.3,+M1\n16,0.3,-M2\n", encoding="utf-8")
     late = "valve={open_delay: 40 ms, close_delay: 40 ms}"
@@ -291,7 +291,7 @@ def test_remarks_are_in_the_json_and_biases_without_a_key_are_named(run: Run, tm
     assert all(" ".join(one.split()).lower() in flat for one in said)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
     """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the record."""
     (tmp_path / "fired.csv").write_text("start_s,on_time_s,channel\n20,0.5,+M2\n", encoding="utf-8")

@@ -34,8 +34,8 @@ def numbers(text: str) -> list[str]:
     return re.findall(r"-?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?", text)
 
 
-@pytest.mark.deep
-@spread("command", COMMANDS, quick=2, ids=lambda command: command[0])
+@pytest.mark.weekly
+@spread("command", COMMANDS, quick=2, deep=2, ids=lambda command: command[0])
 def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: tuple[str, ...]) -> None:
     wide = run(*command, "--quiet", columns=300)
     for width in (25, 59, 60, 80):
@@ -89,8 +89,8 @@ def test_a_table_that_does_not_fit_stands_as_blocks_on_wide_screens_too() -> Non
     assert "2.5" in text
 
 
-@pytest.mark.deep
-@spread("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"], quick=1)
+@pytest.mark.weekly
+@spread("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"], quick=1, deep=1)
 def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
     """Each row of the comparison is one line, for units stand with the names of the rows."""
     done = run("plan", str(CONFIGS / f"{name}.yaml"), "--quiet", columns=80)

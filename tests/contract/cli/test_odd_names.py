@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.cases import deep
+from support.cases import weekly
 from support.process import Run
 
 from nutdamp.files.examples import example_text
@@ -31,20 +31,20 @@ def odd(run: Run, tmp_path: Path) -> str:
     return ODD
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     "command",
     [
         "plan {0}.yaml --json out.json --plot out.png",
         "check {0}.yaml --json out.json",
-        deep("simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg"),
+        weekly("simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg"),
         "verify {0}.yaml --schedule {0}.csv --json out.json",
         "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out",
         "trade {0}.yaml --points 1 --json out.json --schedules {0}",
-        deep("report {0}.yaml -o {0}.html"),
-        deep("animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320"),
+        weekly("report {0}.yaml -o {0}.html"),
+        weekly("animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320"),
         "export {0}.yaml --schedule {0}.csv --format apm -o {0}.apm",
-        deep("export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml"),
+        weekly("export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml"),
         "export {0}.yaml --schedule {0}.csv --format aem -o {0}.aem",
         "export {0}.yaml --schedule {0}.csv --format stk -o {0}.a",
         "export {0}.yaml --schedule {0}.csv --format basilisk -o {0}.py",

@@ -21,7 +21,7 @@ def left(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-@spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")], quick=1)
+@spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")], quick=1, deep=0)
 def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
     done = run("plan", "--plot", f"motion.{ending}")
     assert done.returncode == 0
@@ -67,7 +67,7 @@ def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: P
     assert "complying cases, %" in (tmp_path / "schemes.svg").read_text(encoding="utf-8")
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
     common = ("disperse", "--scheme", "two-pulse", "--samples", "200", "-q")
     said = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.6 kg m²"}

@@ -44,7 +44,7 @@ def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
 
 def test_a_spacecraft_yaml_in_the_folder_is_found(run: Run, tmp_path: Path) -> None:
     (tmp_path / "spacecraft.yaml").write_text(WEAK.replace("Weak", "Found-Me"))
-    done = run("plan")
+    done = run("plan", "--scheme", "one-pulse")
     assert "Found-Me" in done.stdout
     assert "reading spacecraft.yaml" in done.stderr
 
@@ -174,7 +174,7 @@ def test_nothing_feasible_is_exit_3_with_json(run: Run, tmp_path: Path) -> None:
 
 def test_a_missed_requirement_is_exit_4_with_results(run: Run, tmp_path: Path) -> None:
     (tmp_path / "weak.yaml").write_text(WEAK)
-    done = run("plan", "weak.yaml", "--csv", "pulses.csv")
+    done = run("plan", "weak.yaml", "--scheme", "two-pulse", "--csv", "pulses.csv")
     assert done.returncode == 4
     assert "Requirement NOT met with nominal values." in done.stdout
     assert (tmp_path / "pulses.csv").exists()

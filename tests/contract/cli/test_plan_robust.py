@@ -86,7 +86,7 @@ def test_nothing_feasible(run: Run, sat: Path) -> None:
     assert "one-pulse: infeasible:" in " ".join(done.stdout.split())
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
     """85.6 % of cases comply with two-pulse, the best of the plans that do not end as early as they can."""
     done = run("plan", "--robust", "--json", "plan.json")
@@ -109,7 +109,7 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     assert found["against"]["scheme"] == "optimal"
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Run, sat: Path, tmp_path: Path) -> None:
     options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
     done = run("plan", sat.name, *options, "--json", "plan.json")

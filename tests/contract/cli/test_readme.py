@@ -24,7 +24,7 @@ def tidy(text: str) -> list[str]:
     return [line.rstrip() for line in text.strip().splitlines()]
 
 
-@spread("session", SESSIONS, quick=2, ids=lambda text: str(text).splitlines()[0])
+@spread("session", SESSIONS, quick=2, deep=0, ids=lambda text: str(text).splitlines()[0])
 def test_a_session_prints_what_the_readme_shows(run: Run, session: str) -> None:
     for part in re.split(r"^\$ ", session, flags=re.MULTILINE)[1:]:
         command, _, shown = part.partition("\n")

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) -> None:
     done = run("report", "--scheme", "two-pulse")
     assert done.returncode == 0, done.stderr
@@ -31,7 +31,7 @@ def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) 
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.usefixtures("plain_pages")
 def test_trade_may_come_without_a_number(run: Run, tmp_path: Path) -> None:
     """A file may follow it, and a number of points."""
@@ -44,7 +44,7 @@ def test_trade_may_come_without_a_number(run: Run, tmp_path: Path) -> None:
     assert run("report", "--trade", "0").returncode == 2
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
     assert run("report", "my craft.yaml", "-q", "--with-disturbances", "-o", "a.html").returncode == 0

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.cases import deep, spread
+from support.cases import deep, spread, weekly
 from support.process import Run
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -35,11 +35,11 @@ def limited(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("command", "result"),
     [
-        deep("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
+        weekly("simulate --scheme two-pulse --csv big.csv --json small.json", "flown, real widths"),
         ("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
         ("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "Tolerance budget"),
-        deep("plan --plot big.svg --json small.json", "Recommended"),
-        deep("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
+        weekly("plan --plot big.svg --json small.json", "Recommended"),
+        weekly("trade --points 1 --plot big.png --json small.json", "H may end anywhere"),
     ],
 )
 def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, command: str, result: str) -> None:

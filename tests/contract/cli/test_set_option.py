@@ -61,7 +61,7 @@ def test_what_is_no_setting_is_a_usage_error(run: Run) -> None:
     assert "Invalid value for '--set': 'mass' is not KEY=VALUE" in done.stderr
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_report_shows_what_was_set(run: Run) -> None:
     page = run("report", "-o", "-", "-q", "--scheme", "two-pulse", "--set", "state.nutation=8 deg").stdout
     assert "damping 8 deg" in page

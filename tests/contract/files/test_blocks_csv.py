@@ -171,7 +171,7 @@ def test_everything_that_keeps_blocks_from_being_fired_is_listed(run: Run) -> No
     assert "sun_sensor: never sees the Sun, which is 112.4 deg from the spin axis at t = 0" in done.stderr
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
     """The same cases as of the plan from which the file was written: each from its own Sun pulses."""
     text = FILE + "dispersions: {thrust: {normal: 3 %}, A: {normal: 1 %}}\n"

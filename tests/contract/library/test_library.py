@@ -45,7 +45,7 @@ def test_every_public_name_is_there_and_no_other() -> None:
         _ = nutdamp.nonsense  # type: ignore[attr-defined]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
     (tmp_path / "typed.py").write_text(
         "import nutdamp\n"

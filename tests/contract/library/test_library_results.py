@@ -113,7 +113,7 @@ def dispersed(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_studies_have_the_numbers_of_the_commands(run: Run, dispersed: Path) -> None:
     craft = nutdamp.load(dispersed / "spacecraft.yaml")
     chosen = nutdamp.compare(craft).recommended
@@ -153,7 +153,7 @@ def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
         assert mine == its
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_report_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text(TILTED)
     chosen = ("--scheme", "two-pulse", "--set", "limits.horizon=100 s")
@@ -181,7 +181,7 @@ def test_a_report_of_replaced_fields_names_no_file(craft: nutdamp.Spacecraft, tm
     assert f"nutdamp.report(spacecraft, {str(tmp_path / 'own.html')!r}, ['two-pulse'])" in parsed(text).text
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
     craft = nutdamp.load(dispersed / "spacecraft.yaml")
     options = nutdamp.Options(on_time=0.2)

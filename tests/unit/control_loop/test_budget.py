@@ -113,14 +113,14 @@ def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
     agrees(*QUICK[name], 40, 1, 20)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", LONG)
 def test_with_noise_a_budget_is_that_of_many_long_flights(name: str) -> None:
     """With noise the length of a cycle scatters by about 15 %: over 600 of them the mean is known to 0.6 %."""
     agrees(*LONG[name], 600, 8, 400)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_loop_below_the_noise_fires_without_end_as_often_as_one_that_is_flown() -> None:
     body, made = craft(), loop(gyro(noise=rad(0.6)))
     cycle = Map(body, made).cycle()
@@ -136,7 +136,7 @@ def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
     assert cycle.high == pytest.approx(0.5 * math.atan(6.0 * 0.1 / (80.0 * 3.0)), rel=0.05)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("degrees", "pauses"), [(2.0, True), (2.07, False)])
 def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(degrees: float, pauses: bool) -> None:
     """Pulses all alike, half of each above stop: what is left of the first nutation decides whether it ever pauses."""
@@ -243,7 +243,7 @@ def test_propellant_follows_from_impulse_and_isp() -> None:
     assert held_by(craft(channels=four(isp=None))).propellant is None
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     body = replace(craft(), loop=loop(gyro()), cold=Cold(0.5, 10.0))
     steady = replace(body, tank=Tank(2.0, 22e5, 8e5, 0.0))
@@ -259,7 +259,7 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> None:
     made = loop(gyro())
     body = replace(craft(degrees=0.4), loop=made, tank=Tank(0.15, 22e5, 8e5, 1.0))

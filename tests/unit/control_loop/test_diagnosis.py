@@ -148,7 +148,7 @@ def fed_for(craft: Spacecraft, run: Run, names: set[str]) -> float:
     return (starts[-1] - starts[0] - latency) / craft.body_period if starts else 0.0
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else() -> None:
     rng, judged = np.random.default_rng(15), 0
     for _ in range(60):

@@ -292,7 +292,7 @@ def test_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, o
     check_dead_band(name, law, 500)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("name", "law"), [*zip(NOISY, ({}, BANGS, {}), strict=True)], ids=str)
 def test_ten_thousand_noisy_loops_fall_quiet_within_the_dead_band(name: str, law: dict[str, object]) -> None:
     check_dead_band(name, law, 10_000)
@@ -326,14 +326,14 @@ def test_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
     check_six(name, 300)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", ["prolate", "oblate, reversed, bang", "oblate, reversed, accelerometer"])
 def test_ten_thousand_noisy_loops_of_six_spacecraft_keep_the_dead_band(name: str) -> None:
     check_six(name, 10_000)
 
 
-@pytest.mark.deep
-@spread("dissipation", [None, 200.0], quick=1)
+@pytest.mark.weekly
+@spread("dissipation", [None, 200.0], quick=1, deep=1)
 def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> None:
     body = replace(craft(), dissipation=dissipation, attitude=Attitude(np.array([0.8, 0.0, 0.6, 0.0])))
     at = body.direction_in_n(rad(3.0), 0.4)

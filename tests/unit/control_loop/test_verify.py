@@ -38,7 +38,7 @@ CASES = {
 }
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", CASES)
 def test_dop853_fires_alike(name: str) -> None:
     found = verify_loop(CASES[name], 40.0)
@@ -47,7 +47,7 @@ def test_dop853_fires_alike(name: str) -> None:
     assert found.worst < 1e-7
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_firing_after_a_long_wait_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 1000)  # of schedules, which loops need not keep
     sensor = Sensor(ACCELEROMETER, 20.0, noise=1e-4, position=np.array([1.0, 0.2, 0.0]))

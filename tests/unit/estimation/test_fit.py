@@ -64,13 +64,13 @@ def scores(seeds: Iterable[int]) -> list[Score]:
     return [score(gyro_case(seed)) for seed in seeds]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_true_values_of_eight_records_are_in_the_95_percent_region() -> None:
     """All but one at most: 7.6 are expected."""
     assert sum(one.inside for one in scores(range(8))) >= 7
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_true_values_are_in_the_95_percent_region() -> None:
     found = scores(range(40))
     # 38 of 40 are expected; fewer than 33 come once in 2,000 sets of seeds.
@@ -78,7 +78,7 @@ def test_the_true_values_are_in_the_95_percent_region() -> None:
     assert 0.7 < math.sqrt(np.mean([one.off**2 for one in found])) < 1.35
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_thousand_records_are_in_their_regions_and_attain_the_bound() -> None:
     found = scores(range(1000, 2000))
     assert 0.93 <= np.mean([one.inside for one in found]) <= 0.97

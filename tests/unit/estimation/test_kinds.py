@@ -47,14 +47,14 @@ def scores(folder: Path, seeds: Iterable[int]) -> tuple[float, Vector]:
     return float(np.mean([one[0] for one in found])), np.array([one[1:] for one in found])
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_of_each_kind_of_column_one_record_is_in_its_region(tmp_path: Path) -> None:
     """All but two at most of 13: 12.35 are expected, and fewer than 11 once in 40."""
     share, _ = scores(tmp_path, range(len(KINDS)))
     assert share >= (len(KINDS) - 2) / len(KINDS)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_two_hundred_records_of_every_kind_are_in_their_regions(tmp_path: Path) -> None:
     count = 16 * len(KINDS)
     share, off = scores(tmp_path, range(1300, 1300 + count))
@@ -65,7 +65,7 @@ def test_two_hundred_records_of_every_kind_are_in_their_regions(tmp_path: Path) 
     assert np.mean(off**2, axis=0) == pytest.approx(1.0, abs=0.35)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("seed", [1311, 1323, 12])
 def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(tmp_path: Path, seed: int) -> None:
     """Turned by whole turns besides, or from far off: the search must reach the least cost there is."""

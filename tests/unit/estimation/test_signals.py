@@ -188,7 +188,7 @@ def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     assert found.noise[-1] == pytest.approx(5e-4, rel=0.4)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
     body, draw = nutdamp.load(FILE), np.random.default_rng(5)
     times = np.linspace(0.05, 40.0, 200)

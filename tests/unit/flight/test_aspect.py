@@ -122,8 +122,8 @@ def between(body: Spacecraft, share: float) -> Array:
 TURNING = aimed(spinner(80.0, 120.0, degrees=0.2, channels=cross(8.0, max_on_time=0.3)), 12.0, 30.0)
 
 
-@pytest.mark.deep
-@spread("scheme", ["optimal", "rhumb-line"], quick=1)
+@pytest.mark.weekly
+@spread("scheme", ["optimal", "rhumb-line"], quick=1, deep=0)
 def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     free = planning.plan(cones(TURNING), scheme)
     assert free.feasible
@@ -198,7 +198,7 @@ def enters(seed: int) -> bool | None:
     return any(attitude.angle_between(path, keep.direction).min() < keep.least - 1e-6 for keep in body.keep)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("seeds", [range(first, first + 10) for first in range(0, 160, 10)], ids=str)
 def test_in_random_cases_the_axis_never_enters_a_cone(seeds: Sequence[int]) -> None:
     """160 cases; with the 40 below they are 200."""
@@ -232,7 +232,7 @@ def in_sunlight(seed: int) -> Spacecraft:
 OTHERS = [(scheme, first) for first in range(0, 20, 2) for scheme in ("half-cone", "optimal")]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("scheme", "first"), OTHERS)
 def test_nor_does_it_by_other_schemes_that_turn_it(scheme: str, first: int) -> None:
     """40 cases in all, nutation on the way included; where no way round is found there is no plan."""
@@ -240,7 +240,7 @@ def test_nor_does_it_by_other_schemes_that_turn_it(scheme: str, first: int) -> N
         check_never_within(near_case(seed), scheme)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_nor_by_command_blocks() -> None:
     assert check_never_within(in_sunlight(0), "command-block")
 
@@ -268,7 +268,7 @@ keep: [{name: pole star, direction: [10 deg, 86 deg], min: 2 deg}]
 """
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path) -> None:
     shown = run("plan", "-", "--target", "10deg,80deg", "--scheme", "rhumb-line", "--json", "plan.json", stdin=FILE)
     assert shown.returncode == 0, shown.stderr

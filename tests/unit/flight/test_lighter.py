@@ -222,7 +222,7 @@ def test_three_moments_of_a_file() -> None:
     assert lightened(craft, 0.5).moments == pytest.approx((119.8, 119.85, 79.9))
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize("per_kg", [None, (900.0, 900.0, 600.0)])
 def test_without_blowdown_the_tank_is_empty_sooner(per_kg: tuple[float, float, float] | None) -> None:
     """At full pressure the commands take more than there is; what comes after that does not fire."""

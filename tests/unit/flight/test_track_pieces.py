@@ -112,7 +112,7 @@ def test_a_track_is_written_as_it_was_by_numbers() -> None:
     assert lines[1:-1] == [",".join([*map(number, row[:-1]), str(row[-1])]) for row in rows]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_memory_does_not_grow_with_the_rows() -> None:
     """What 4.5e5 rows of 18 columns take as one array alone is 65 MB; several of those stood side by side."""
     made = flown()

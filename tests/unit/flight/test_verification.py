@@ -226,9 +226,9 @@ def test_dissipation_keeps_the_momentum_and_drains_energy() -> None:
     assert slopes[1] / slopes[0] == pytest.approx(math.exp(30 / 600), rel=1e-11)
 
 
-@pytest.mark.deep
-@spread("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (123.0, 117.0, 80.0)], quick=1)
-@spread("spin", [3.0, -3.0], quick=1)
+@pytest.mark.weekly
+@spread("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (123.0, 117.0, 80.0)], quick=1, deep=2)
+@spread("spin", [3.0, -3.0], quick=1, deep=2)
 def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
     moments: tuple[float, float, float], spin: float
 ) -> None:
@@ -241,7 +241,7 @@ def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
     assert found.agree
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_course_example_of_dissipation() -> None:
     """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in DOP853."""
     body = Spacecraft("x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0)
@@ -297,7 +297,7 @@ def _missing(*_: object) -> BasiliskFlight:
     raise MissingExtra("verify", "a flight by Basilisk")
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Path) -> None:
     """Two thousand hours of coasting are more than DOP853 and Basilisk fly."""
     text = "name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"

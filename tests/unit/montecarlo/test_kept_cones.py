@@ -145,7 +145,7 @@ def keeper(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_disperse_says_how_many_cases_break_the_cone(run: Run, keeper: Path) -> None:
     done = run("disperse", str(keeper), "--scheme", "rhumb-line", "--samples", "2000", "--json", "-")
     found = json.loads(done.stdout)
@@ -197,7 +197,7 @@ def test_the_csv_has_the_angles_of_each_case(run: Run, keeper: Path, tmp_path: P
     assert both[1] == [line.rsplit(b",", 2)[0] for line in both[0]]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_robust_plan_keeps_the_cone_in_most_cases(keeper: Path) -> None:
     body = load(keeper)
     compared = comparison.compare(body, ("rhumb-line", "half-cone"))

@@ -203,7 +203,7 @@ def test_the_tile_of_the_dispersed_example_says_not_met(run: Run, tmp_path: Path
     assert tree.text.count(said) == 3  # verdict, tile, dispersion
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -221,7 +221,7 @@ def test_the_headline_names_the_plan_that_can_be_sent_or_fired_as_it_stands(
     assert said in headline.text
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_same_input_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
     contents = []
     for _ in range(2):

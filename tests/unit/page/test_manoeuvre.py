@@ -56,7 +56,7 @@ def rows(found: Node, title: str) -> list[dict[str, str]]:
     return [dict(zip(heads, row, strict=True)) for row in cells]
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_blocks_phases_signature_and_criteria() -> None:
     found = sheet(DISPERSED, "command-block", 9.0, 500)
     body = read_spacecraft(FILE, "f.yaml", ())

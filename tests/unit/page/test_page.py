@@ -79,8 +79,8 @@ def scripts(tree: Node) -> list[Node]:
     return [node for node in tree.all("script") if "type" not in node.attributes]
 
 
-@pytest.mark.deep
-@spread("name", ["example", "nasty"], quick=1)
+@pytest.mark.weekly
+@spread("name", ["example", "nasty"], quick=1, deep=0)
 def test_it_is_well_formed_and_needs_no_network(name: str, request: pytest.FixtureRequest) -> None:
     text = request.getfixturevalue(name)
     assert text.startswith("<!DOCTYPE html>\n<html lang=")
@@ -235,7 +235,7 @@ def test_valves_and_tank_are_among_what_the_spacecraft_is() -> None:
         assert said in text
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_with_valves_commanded_and_effective_on_times_are_told_apart() -> None:
     """In the columns of both tables, and above the picture, whose bars are the effective ones."""
     valve = "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}\n"
@@ -264,7 +264,7 @@ def test_without_a_feasible_plan_the_page_says_why() -> None:
     assert "the file names no thrusters" in tree.text
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_without_nutation_there_is_nothing_to_fire() -> None:
     text = page("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n", report_page)
     assert "No pulse is needed." in text
@@ -278,7 +278,7 @@ def test_numbers_are_found_in_cells(text: str, value: float | None) -> None:
     assert number_in(text) == value
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_marked() -> None:
     found = compared(example_text())
     fronts = trade(found.spacecraft, 3).fronts
@@ -306,7 +306,7 @@ dispersions: {A: {normal: SIGMA}}
 """
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("sigma", "good"), [("0.1 %", True), ("5 %", False)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     found = compared(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))

@@ -31,7 +31,7 @@ def arcs(sense: float, growth: float) -> tuple[Stretch, np.ndarray, np.ndarray]:
     return Stretch(bodies, np.zeros(COUNT), rates, upright), directions, lasts
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("sense", "growth"), [(1.0, 3e-3), (-1.0, 3e-3), (1.0, -6e-3)])
 def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: pytest.MonkeyPatch) -> None:
     here, directions, lasts = arcs(sense, growth)

@@ -103,7 +103,7 @@ def test_a_supply_counts_what_was_fired() -> None:
     assert (supply.fired, supply.used) == (Counter(), 0.0)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_where_the_first_dozen_miss_sequences_of_smaller_pulses_are_flown_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A body of which the best in closed form fly badly: 4.5 times the bound without those more, now less than half."""
     body = replace(some_body(2), requirement=Requirement(math.radians(0.1), math.radians(0.1)))

@@ -118,7 +118,7 @@ def flown_through(body: Spacecraft, made: Schedule) -> tuple[float, float]:
     return reference.angle(momentum, body.goal.axis), nutation
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_valve_without_delays_changes_no_block() -> None:
     body = aimed(at_rest("lunar-prospector"), 8.5, 40.0)
     plain, valved = (
@@ -137,8 +137,8 @@ def test_a_valve_without_delays_changes_no_block() -> None:
     assert slow.flight.residual.nutation == pytest.approx(plain.flight.residual.nutation, abs=1e-6)
 
 
-@pytest.mark.deep
-@spread("valve", [SLOW, UNEVEN], quick=1)
+@pytest.mark.weekly
+@spread("valve", [SLOW, UNEVEN], quick=1, deep=0)
 def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_much(valve: Valve) -> None:
     """Pulses of about 50 ms, valves 15 ms late. No train of equal pulses on a grid ends on the target to 1e-6 deg.
 

@@ -159,7 +159,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
     return best
 
 
-@spread("seed", [*(seed for seed in range(133) if seed % 4 != 3), *range(3, 132, 16)], quick=1)
+@spread("seed", [*(seed for seed in range(133) if seed % 4 != 3), *range(3, 132, 16)], quick=1, deep=2)
 def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
     """In 100 cases with a target 1 to 60 deg away, and 9 of damping alone; one in three of the former nutates."""
     body = some_body(seed, target=seed % 4 != 3)
@@ -196,14 +196,14 @@ def outcome(seed: int) -> tuple[float, float]:
     return body.to_turn, max(map(abs, off))
 
 
-@pytest.mark.deep
-@spread("seed", range(100), quick=2)
+@pytest.mark.weekly
+@spread("seed", range(100), quick=2, deep=2)
 def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: int) -> None:
     turn, off = outcome(seed)
     assert off < 1e-3 * turn
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_more_blocks_where_one_does_not_do() -> None:
     """Tight bounds: one block leaves more than is required; two or three do better, and --max-blocks keeps to one."""
     body = replace(some_body(2), requirement=Requirement(math.radians(0.05), math.radians(0.05)))
@@ -249,7 +249,7 @@ def check_flown_ones_are_not_beaten(seed: int, required: Requirement) -> None:
     assert plan.severity <= 1.02 * max(min(shares()), 1.0)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 @pytest.mark.parametrize(("seed", "required"), [(9, (0.1, 0.05)), (11, (0.1, 0.05)), (12, (0.3, 0.02))])
 def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int, required: tuple[float, float]) -> None:
     """The closed form leaves it out: its best ones left up to nine times as much as others of the same search."""
@@ -277,7 +277,7 @@ def a_turn(**limits: Any) -> Spacecraft:
     return replace(body, limits=replace(body.limits, **limits))
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_blocks_keep_the_limits_on_earliest_start_number_and_gap() -> None:
     for body in (a_turn(earliest=60.0), a_turn(max_pulses=30), a_turn(gap=6.0)):
         plan = planning.plan(body, "command-block")
@@ -285,7 +285,7 @@ def test_blocks_keep_the_limits_on_earliest_start_number_and_gap() -> None:
         assert plan.meets_requirement
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_with_disturbances_the_sun_pulses_are_those_of_the_disturbed_motion() -> None:
     body = replace(a_turn(), disturbances=(Disturbance(0.003 + 0.0j, 0.002),))
     plan = planning.plan(body, "command-block")
@@ -307,7 +307,7 @@ def test_a_looser_requirement_is_met_as_well() -> None:
         assert plan.left.nutation < min(math.radians(most), body.nutation)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
     """Where another was taken because it does better when flown, the note says no more than that."""
     body = a_turn()
@@ -356,7 +356,7 @@ def test_blocks_keep_out_of_blackout_windows() -> None:
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     """The blocks of all legs count their Sun pulses from t = 0: fired anew they are the same pulses."""
     straight = a_turn()
@@ -373,7 +373,7 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
 
 
-@spread("seed", range(6), quick=0)
+@spread("seed", range(6), quick=0, deep=0)
 def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> None:
     """Flown by the reference, nutation included, with a cone near the way."""
     body, rng = some_body(seed), np.random.default_rng(seed)
@@ -398,7 +398,7 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
     assert nearest > keep.least - 1e-4
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_a_way_that_only_fits_around_a_window_is_gone_in_two_blocks() -> None:
     free = planning.plan(a_turn(), "command-block").pulses
     window = (free.pulses[8].start - 1.0, free.pulses[8].start + 1.0)
@@ -420,7 +420,7 @@ def test_where_a_blackout_leaves_no_block_the_reason_says_so() -> None:
     assert "outside the blackout windows" in remarks.infeasibility(plan)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
     free, ticked = (planning.plan(a_turn(**limits), "command-block") for limits in ({}, {"tick": 0.0173}))
     assert ticked.feasible, remarks.infeasibility(ticked)

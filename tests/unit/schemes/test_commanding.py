@@ -216,7 +216,7 @@ def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
     assert np.hypot(ends.momentum[0], ends.momentum[1]) / ends.momentum[2] == pytest.approx(0.0, abs=MICRODEGREE)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     body = replace(through(SLOW, short_pulses()), cold=Cold(0.9, 4.0))
     made = made_by("optimal", body)
@@ -228,7 +228,7 @@ def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     assert budget["without cold pulses"] > 1000.0 * MICRODEGREE
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_with() -> None:
     late = Trapezoid(open_delay=0.005, close_delay=0.105)
     assert effective_on_times(channel("C", 8.0, 0.0, 0.0))[0] == 0.0
@@ -239,7 +239,7 @@ def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_w
         assert all(pulse.loaded[1] > 0.0 and pulse.on_time >= 0.1 for pulse in made.pulses)
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     """Oblate, strong thrusters, and a valve that closes so late that a tick already gives 141 ms of thrust."""
     M, tick = 1072.4242912066034, 0.05652980755265212

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support import reference
 from support.builders import aimed, channel, spinner
-from support.cases import deep, spread
+from support.cases import spread, weekly
 from support.places import case
 from support.process import Run
 
@@ -63,7 +63,7 @@ def left_by_reference(one: planning.Plan) -> tuple[float, float]:
     return reference.nutation(moments, end.rates, math.copysign(1.0, body.spin)), shift
 
 
-@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", deep("two-pulse"), deep("optimal")])
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", weekly("two-pulse"), weekly("optimal")])
 def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
     damped = 0
     for seed in range(8):
@@ -172,7 +172,7 @@ def test_the_first_order_least_knows_dissipation() -> None:
         assert left_by_reference(one)[0] < 1e-9
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
     """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without end."""
     names = {"+M1": (400.0, 0.0, 0.0), "-M1": (-400.0, 0.0, 0.0), "+M2": (0.0, 400.0, 0.0)}

@@ -63,9 +63,9 @@ def test_a_nutation_goes_along_or_first(degrees: float) -> None:
         ends_on_the_target(train(aimed(spinner(degrees=degrees, channels=channels), 25.0, -60.0)))
 
 
-@pytest.mark.deep
-@spread("on_time", [0.1, 0.3, 0.6], quick=1)
-@spread("torque", [40.0, 10.0], quick=1)
+@pytest.mark.weekly
+@spread("on_time", [0.1, 0.3, 0.6], quick=1, deep=2)
+@spread("torque", [40.0, 10.0], quick=1, deep=2)
 def test_arc_efficiency(torque: float, on_time: float) -> None:
     """Along the great circle equal pulses cost C|ω3|β over sinc(ω3τ/2), and what is left of a pulse and two to spare.
 
@@ -100,7 +100,7 @@ def closes(plan: planning.Plan) -> None:
     assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-8
 
 
-@pytest.mark.deep
+@pytest.mark.weekly
 def test_an_on_time_is_kept_exactly_or_the_nearest_that_works_is_named() -> None:
     kept, named = 0, 0
     for seed in range(16):
@@ -174,8 +174,8 @@ def test_unequal_moments_change_the_width_of_all_pulses_alike() -> None:
     ends_on_the_target(train(body))
 
 
-@pytest.mark.deep
-@spread(("degrees", "turn", "on_time"), [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)], quick=1)
+@pytest.mark.weekly
+@spread(("degrees", "turn", "on_time"), [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)], quick=1, deep=2)
 def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     degrees: float, turn: float, on_time: float
 ) -> None:
