@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from support import reference
 from support.builders import channel, spinner
+from support.cases import deep, spread
 from support.places import case
 from support.process import Run
 
@@ -52,8 +53,8 @@ def test_the_cones_of_an_arc_are_those_where_its_nutation_is_largest(
     assert other.nutation == pytest.approx(math.pi - min(angles), rel=2e-5)
 
 
-@pytest.mark.parametrize("moments", [(120.0, 100.0, 80.0), (300.0, 316.0, 440.0), (100.0, 110.0, 190.0)])
-@pytest.mark.parametrize("spin", [3.0, -0.7])
+@spread("moments", [(120.0, 100.0, 80.0), (300.0, 316.0, 440.0), (100.0, 110.0, 190.0)], quick=1, deep=2)
+@pytest.mark.parametrize("spin", [3.0, deep(-0.7)])
 def test_a_small_nutation_turns_as_fast_as_that_of_the_reference(
     moments: tuple[float, float, float], spin: float
 ) -> None:

@@ -33,6 +33,7 @@ BODY = spinner(channels=cross(20.0))
 SPREAD = Dispersions(A=Tolerance("normal", 0.02, relative=True))
 
 
+@pytest.mark.deep
 @spread("biased", [False, True], quick=1)
 @spread("required", [None, Requirement(nutation=0.01), Requirement(nutation=0.01, momentum_shift=0.01)], quick=1)
 def test_captions_of_dispersed_cases_name_no_bias_and_no_bound_that_is_not_drawn(

@@ -198,6 +198,7 @@ def test_units_of_time_do_not_matter(scale: float, requested: tuple[str, Options
         assert other.on_time * scale == pytest.approx(one.on_time, rel=1e-8)
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("requested", REQUESTED.values(), ids=REQUESTED)
 @spread("degrees", [1e-9, 1e-6, 1e-3, 70.0, 89.0], quick=2)
 def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, requested: tuple[str, Options]) -> None:

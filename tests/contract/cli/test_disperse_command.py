@@ -266,6 +266,7 @@ def test_one_case_and_all_cases_show_the_same_nominal_one(run: Run) -> None:
     assert nominal == found["one"][1].split()[0] == "0.1684"
 
 
+@pytest.mark.deep
 def test_it_says_where_the_nominal_case_ends_and_where_it_should(run: Run, tmp_path: Path) -> None:
     goal = ("--scheme", "half-cone", "--target", "10deg,45deg")
     done = run("disperse", *goal, "--samples", "200", "--json", "d.json")

@@ -201,6 +201,7 @@ LEAN_TOO = (
 )
 
 
+@pytest.mark.deep
 @spread("lean", [LEAN, LEAN_TOO], quick=1, deep=0)
 def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib(lean: tuple[str, ...]) -> None:
     """One process runs them all. numpy.ma, as `numpy.unique` loads it, is a tenth of the start-up of a command."""

@@ -21,6 +21,7 @@ def left(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.deep
 @spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")], quick=1, deep=0)
 def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
     done = run("plan", "--plot", f"motion.{ending}")
@@ -153,6 +154,7 @@ def without(package: str, tmp_path: Path, *arguments: str, more: str = "") -> su
     return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize(
     "arguments",
     [("plan", "--plot", "a.png"), ("simulate", "--scheme", "none", "--plot", "a.svg"), ("animate", "-o", "a.gif")],

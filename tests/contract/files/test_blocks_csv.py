@@ -32,6 +32,7 @@ def problems(text: str, folder: Path) -> list[str]:
     return [f"{fault.line}: {fault.where}: {fault.problem}" for fault in caught.value.faults]
 
 
+@pytest.mark.deep
 def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
     made = run("plan", "-", *GOAL, "--blocks", "blocks.csv", "--csv", "pulses.csv", stdin=FILE)
     assert made.returncode == 0, made.stderr

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from support import places
+from support.cases import spread
 
 from nutdamp.comparison import compare
 from nutdamp.files.spacecraft_file import load_spacecraft
@@ -27,7 +28,7 @@ def test_it_names_its_sources(path: Path) -> None:
     assert any("assumed" in line.lower() for line in comment)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.stem))
+@spread("path", FILES, quick=4, deep=len(FILES), ids=lambda path: str(path.stem))
 def test_it_is_planned(path: Path) -> None:
     spacecraft = load_spacecraft(path)
     compared = compare(spacecraft, CLASSIC)

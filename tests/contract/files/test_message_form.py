@@ -83,6 +83,7 @@ def test_keywords_stand_in_the_order_of_the_tables(case: str) -> None:
     ]
 
 
+@pytest.mark.deep
 @CASES
 def test_both_notations_hold_the_same(case: str) -> None:
     plan = messages.planned(case)

@@ -69,6 +69,7 @@ def manoeuvres(text: str) -> list[dict[str, str]]:
     return [dict(re.findall(r"^(MAN_\w+) += (\S+)", part, re.MULTILINE)) for part in parts]
 
 
+@pytest.mark.deep
 @CASES
 def test_velocity_changes_are_those_of_each_pulse(name: str) -> None:
     plan = planned(name, orbit=True)

@@ -45,6 +45,7 @@ def check(plan: Plan, keywords: dict[str, str], rows: np.ndarray) -> None:
         assert np.radians(values[4:]) == pytest.approx(messages.in_file_axes(body, rates[0]), abs=1e-8)
 
 
+@pytest.mark.deep
 @CASES
 def test_the_motion_is_that_of_the_flight(case: str) -> None:
     plan = messages.planned(case)

@@ -72,6 +72,7 @@ def test_an_impulse_bit_counts_in_full_thrust_and_bounds_on_times() -> None:
     assert all(isinstance(other.valve, Trapezoid) for other in others)
 
 
+@pytest.mark.deep
 def test_valves_of_no_times_are_none_and_plans_the_same_to_the_last_bit() -> None:
     plain = read()
     zero = read("valve: {open_delay: 0, close_delay: 0 s, rise_time: 0, fall_time: 0, on_time_is: effective}\n")

@@ -74,6 +74,7 @@ def test_the_example_runs(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "track.csv").stat().st_size > 100_000
 
 
+@pytest.mark.deep
 def test_the_sweep_runs(run: Run, tmp_path: Path) -> None:
     assert run("init").returncode == 0
     sweep = EXAMPLE.with_name("library_sweep.py")

@@ -88,6 +88,7 @@ def test_a_comparison_shares_one_budget(monkeypatch: pytest.MonkeyPatch) -> None
     assert spent.done < 330.0
 
 
+@pytest.mark.deep
 @spread("scheme", ["rhumb-line", "half-cone"], quick=1)
 def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
     scheme: str, monkeypatch: pytest.MonkeyPatch

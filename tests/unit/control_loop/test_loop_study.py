@@ -193,6 +193,7 @@ def test_faults_stop_each_case_on_its_own() -> None:
     assert results.settled == 20 - sum(count for stop, count in results.stops.items() if stop is not Stop.END)
 
 
+@pytest.mark.deep
 @spread("kind", ["tensor", "disturbed", "continuous"], quick=1)
 def test_cases_that_cannot_fly_together_fly_one_by_one(kind: str) -> None:
     body = craft()

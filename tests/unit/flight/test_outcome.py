@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from support import reference
 from support.builders import aimed, cross, events, spinner
+from support.cases import deep
 from support.process import Run
 
 import nutdamp
@@ -115,7 +116,7 @@ def rows(text: str) -> list[dict[str, str]]:
 
 
 @pytest.mark.parametrize("options", [(), ("--flown",)])
-@pytest.mark.parametrize("until", ["0.2 s", "2 s", "60 s"])
+@pytest.mark.parametrize("until", [deep("0.2 s"), "2 s", deep("60 s")])
 @pytest.mark.parametrize(
     "changes", [(), ("dissipation={time_constant: 50 s}",), ("disturbances=[{torque: [0, 0, 0.4 N m]}]",)]
 )
@@ -153,6 +154,7 @@ def test_nutation_that_grows_e_fold_is_shown_at_the_end(run: Run) -> None:
     assert found.groups() == ("13.38", "13.38")
 
 
+@pytest.mark.deep
 def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run) -> None:
     """The target is met through real widths; the impulse sum ends 2 deg from it."""
     options = ("simulate", "--scheme", "half-cone", "--target", "10deg,45deg")

@@ -157,6 +157,7 @@ def test_the_budget_names_each_imperfection_of_the_body() -> None:
     assert rows["all: as flown"].nutation == plan.flown.nutation
 
 
+@pytest.mark.deep
 def test_ideal_impulses_have_no_width_in_the_budget() -> None:
     body = spinner(steerable=Steerable())
     plans = [planning.plan(one, "one-pulse") for one in (body, EXAMPLE)]

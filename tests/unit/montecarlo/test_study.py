@@ -44,6 +44,7 @@ def same(first: Results, second: Results) -> None:
     assert first.shares == second.shares
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads_change_nothing(plain: Results, threads: int) -> None:
     same(plain, run(Results(a_study(), MANY), threads=threads))

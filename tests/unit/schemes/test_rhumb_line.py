@@ -260,6 +260,7 @@ def test_limits_are_kept() -> None:
 # --- fixed Sun phase -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.deep
 @spread("seed", range(20), quick=1)
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     """Small steps on the course as it is at each point end on the target after the way reported at first."""

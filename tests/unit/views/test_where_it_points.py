@@ -93,6 +93,7 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
     assert none["target"] is None
 
 
+@pytest.mark.deep
 @spread("command", ["plan", "simulate", "verify"], quick=1)
 def test_every_json_says_where_it_ends(run: Run, command: str) -> None:
     name = str(case("tensor-microsat.yaml"))

@@ -86,6 +86,7 @@ def test_on_times_are_none_or_at_least_the_least() -> None:
     assert flies(replace(free, channels=bounded), left=EXACT).pulses.cost >= found.cost * (1.0 - 1e-6)
 
 
+@pytest.mark.deep
 def test_the_same_plan_every_time() -> None:
     one, two = (starting_points.schedules(task_of(strong()))[0] for _ in range(2))
     assert [(pulse.start, pulse.on_time) for pulse in one] == [(pulse.start, pulse.on_time) for pulse in two]
