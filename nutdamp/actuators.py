@@ -44,6 +44,10 @@ class Thruster:
         return self.thrust / (self.isp * STANDARD_GRAVITY)
 
 
+CANCELLED = 1e-12
+"""Share of the largest torque of its thrusters below which that of a channel is rounding."""
+
+
 @dataclass(frozen=True, slots=True)
 class Channel:
     """Thrusters that fire together, as one body-fixed torque.
@@ -61,8 +65,10 @@ class Channel:
 
     @property
     def torque(self) -> Vector:
-        """Sum of the torques, (3,) N m."""
-        return np.asarray(sum(thruster.torque for thruster in self.thrusters), dtype=np.float64)
+        """Sum of the torques, (3,) N m; zero where they cancel, as of a pair for velocity changes, but for rounding."""
+        torques = np.array([thruster.torque for thruster in self.thrusters], dtype=np.float64)
+        total = torques.sum(axis=0)
+        return np.asarray(np.where(np.abs(total) > CANCELLED * np.abs(torques).max(), total, 0.0))
 
     @property
     def valve(self) -> Valve | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
@@ -28,9 +29,18 @@ _J2000 = Fraction(883_655_957_816, 1000)
 
 _TIME = re.compile(
     r"(?P<year>[0-9]{4})-(?:(?P<month>[0-9]{2})-(?P<day>[0-9]{2})|(?P<day_of_year>[0-9]{3}))"
-    r"T(?P<hour>[0-9]{2}):(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}(?:\.[0-9]+)?))?"
+    r"[T ](?P<hour>[0-9]{2}):(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}(?:\.[0-9]+)?))?"
     r"(?:Z|(?P<sign>[+-])(?P<zone_hour>[0-9]{2}):(?P<zone_minute>[0-9]{2}))?"
 )
+
+
+UNIFORM = {
+    "TAI": Fraction(10),
+    "GPS": Fraction(-9),
+    "TT": Fraction(42_184, 1000),
+    "TDB": Fraction(42_184, 1000),
+}
+"""Times without leap seconds, and what their clocks showed, s, at 1972-01-01T00:00:00 UTC; GPS as if it had run."""
 
 
 @dataclass(frozen=True, order=True, slots=True)
@@ -40,10 +50,11 @@ class Epoch:
     elapsed: Fraction
 
     @classmethod
-    def parse(cls, text: str) -> Epoch:
+    def parse(cls, text: str, system: str = "UTC") -> Epoch:
         """The moment that an ISO 8601 date and time names, with month and day or day of the year; UTC without a zone.
 
-        Raises ValueError, which says what is wrong.
+        ``system``: UTC, or a time without leap seconds and zones, one of `UNIFORM`. Raises ValueError, which says what
+        is wrong.
         """
         found = _TIME.fullmatch(text)
         if found is None:
@@ -57,12 +68,15 @@ class Epoch:
         east = 60 * int(found["zone_hour"] or "0") + int(found["zone_minute"] or "0")
         minutes = 60 * hour + minute - (-east if found["sign"] == "-" else east)
         day, minutes = day + minutes // 1440, minutes % 1440
-        within = 61 if minutes == 1439 and day in LEAP_DAYS else 60
+        if system != "UTC" and (found["sign"] or text.endswith("Z")):
+            raise ValueError(f"{text!r} has a zone, and {system} has none")
+        within = 61 if system == "UTC" and minutes == 1439 and day in LEAP_DAYS else 60
         if hour > 23 or minute > 59 or second >= within:
             raise ValueError(f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…")
         if day < FIRST_DAY:
             raise ValueError(f"{text!r} is before 1972, when the UTC second had another length")
-        return cls(Fraction(86400 * (day - FIRST_DAY) + _leaps_before(day) + 60 * minutes) + second)
+        elapsed = 86400 * (day - FIRST_DAY) + 60 * minutes + second
+        return cls(elapsed + _leaps_before(day) if system == "UTC" else _of_uniform(elapsed, system))
 
     def plus(self, seconds: float | Fraction) -> Epoch:
         """The moment so many SI seconds later; exact for the number as it is stored."""
@@ -102,6 +116,16 @@ class Epoch:
         while 86400 * (day - FIRST_DAY) + _leaps_before(day) > whole:  # the days before were longer
             day -= 1
         return day, whole - 86400 * (day - FIRST_DAY) - _leaps_before(day), part
+
+
+def _of_uniform(shown: Fraction, system: str) -> Fraction:
+    """Seconds since 1972-01-01T00:00:00 UTC where a clock without leap seconds shows so many since 1972-01-01."""
+    elapsed = shown - UNIFORM[system]
+    if system == "TDB":  # Kaplan 2005, USNO Circular 179, (2.6): to 10 µs
+        centuries = float(elapsed - _J2000) / 86400.0 / 36525.0
+        ahead = 0.001657 * math.sin(628.3076 * centuries + 6.2401) + 0.000022 * math.sin(575.3385 * centuries + 4.2970)
+        elapsed -= Fraction(round(ahead * 1e6), 1_000_000)
+    return elapsed
 
 
 def _day(found: re.Match[str]) -> int:

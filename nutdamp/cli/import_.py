@@ -8,6 +8,7 @@ from nutdamp.cli.common import quiet_option
 from nutdamp.cli.job import deliver, remarks
 from nutdamp.cli.parameters import FILE
 from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.screen import say
 
 
 @click.command("import")
@@ -27,7 +28,7 @@ def command(given: tuple[str, ...], output: str, schedule: str | None, quiet: bo
         raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
     expect_outputs(file, output=output, schedule=schedule)
 
-    from nutdamp.files.apm_import import imported
+    from nutdamp.files.apm_import import contradictions, imported
     from nutdamp.files.ccsds.apm_reader import read_apm
     from nutdamp.files.pulses_csv import pulses_csv
     from nutdamp.flight import flown
@@ -38,5 +39,7 @@ def command(given: tuple[str, ...], output: str, schedule: str | None, quiet: bo
     remark = remarks(quiet)
     for entry in contents.remarks:
         remark(f"{file}: {entry}")
+    for entry in contradictions(contents, body):
+        say(f"{file}: warning: {entry}")
     if pulses.pulses and schedule is None:
         remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")

@@ -21,6 +21,10 @@ _BLOCKS = {"inertia": "INERTIA", "omega0": "ANGVEL", "attitude": "EPOCH", "steer
 """Where a part of the spacecraft file comes from in the message."""
 
 
+SAME_NUTATION, ROUNDED = 0.01, 1e-5
+"""Share of a nutation, and rad besides, by which that of the inertia may differ: messages round."""
+
+
 def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
     """Text of the spacecraft file, the spacecraft in it, and the manoeuvres as a schedule (empty without any).
 
@@ -32,6 +36,17 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     text = spacecraft_text(contents, path, torquer)
     body = _read(text, contents, path)
     return text, body, _schedule(contents.manoeuvres, body)
+
+
+def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
+    """Where the motion of the spacecraft is another than the message states: its nutation, by inertia and period."""
+    stated, follows = contents.nutation, body.widest.nutation
+    if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
+        return []
+    return [
+        f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, but with this INERTIA NUTATION_PER gives one "
+        f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
+    ]
 
 
 def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:

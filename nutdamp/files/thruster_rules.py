@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     direction = facts.vector("number", 3, *path, "direction")
     if direction is not None and norm(direction) < SMALLEST:
         yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
-    elif _cancel([torque_of(facts, path)]):
+    elif _is_none(torque_of(facts, path)):
         if facts.has(*path, "torque"):
             yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
         else:
@@ -87,13 +87,9 @@ def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
     return np.cross(position, force_vector(direction, force)), norm(position) * abs(force)
 
 
-def _cancel(torques: Sequence[tuple[Vector, float] | None]) -> bool:
-    """Whether torques add up to zero; False where one is not known."""
-    known = [torque for torque in torques if torque is not None]
-    if len(known) < len(torques):
-        return False
-    total = norm(np.sum([torque for torque, _ in known], axis=0))
-    return total <= max(SMALLEST, CANCELLED * sum(size for _, size in known))
+def _is_none(torque: tuple[Vector, float] | None) -> bool:
+    """Whether a torque is zero but for rounding; False where it is not known."""
+    return torque is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1])
 
 
 def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
@@ -134,8 +130,6 @@ def instead(name: str, names: list[str]) -> str:
 
 
 def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
-    if len(members) > 1 and _cancel([torque_of(facts, member) for member in members]):
-        yield Finding(path, "the torques of these thrusters cancel; let them fire in channels of their own")
     times = [on_times_of(facts, member) for member in members]
     least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
     if least > most and all(shortest <= longest for shortest, longest in times):

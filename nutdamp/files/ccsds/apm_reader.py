@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nutdamp.epoch import Epoch
+from nutdamp.epoch import UNIFORM, Epoch
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.ccsds.checked import Checked, unit_length
 from nutdamp.files.ccsds.kvn import from_kvn
@@ -21,6 +21,7 @@ from nutdamp.files.frames import FRAMES
 from nutdamp.files.input import read_limited, utf8_text
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import Vector
+from nutdamp.words import listed
 
 UNIT = 1e-4
 """Deviation from length one up to which a quaternion counts as rounded."""
@@ -55,8 +56,9 @@ class Manoeuvre:
 class ApmContents:
     """What a message says, in body axes.
 
-    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m². ``lines``
-    are those where blocks begin; ``remarks`` what a reader should know.
+    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m².
+    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` what a reader
+    should know.
     """
 
     name: str
@@ -66,6 +68,7 @@ class ApmContents:
     quaternion: Vector | None
     rates: Vector
     tensor: Vector
+    nutation: float | None
     manoeuvres: tuple[Manoeuvre, ...]
     lines: dict[str, int]
     remarks: tuple[str, ...]
@@ -111,6 +114,8 @@ class _Reader:
         self.remarks: list[str] = []
         self.body: str | None = None
         self.frame: str | None = None
+        self.system = "UTC"
+        self.nutation: float | None = None
         self._sort(blocks[1:])
 
     def _sort(self, blocks: list[Block]) -> None:
@@ -136,9 +141,13 @@ class _Reader:
     def read(self) -> ApmContents | None:
         """The contents; None where faults leave none."""
         outside = self.outside
-        if outside.text("TIME_SYSTEM") not in (None, "UTC"):
-            outside.fault("TIME_SYSTEM", f"expected UTC, got {outside.text('TIME_SYSTEM')!r}")
-        epoch = outside.epoch("EPOCH")
+        self.system = outside.text("TIME_SYSTEM") or "UTC"
+        if self.system not in ("UTC", *UNIFORM):
+            outside.fault("TIME_SYSTEM", f"expected UTC, {listed(list(UNIFORM), 'or')}, got {self.system!r}")
+            self.system = "UTC"
+        elif self.system != "UTC":
+            self._remark(f"times are {self.system}; the spacecraft file has them in UTC")
+        epoch = outside.epoch("EPOCH", self.system)
         quaternion = self._attitude()
         rates = self._rates(quaternion)
         quaternion, rates = self._spin(quaternion, rates)
@@ -159,6 +168,7 @@ class _Reader:
             quaternion=quaternion,
             rates=rates,
             tensor=tensor,
+            nutation=self.nutation,
             manoeuvres=manoeuvres,
             lines={name: blocks[0].block.line for name, blocks in self.blocks.items() if blocks},
             remarks=tuple(self.remarks),
@@ -266,6 +276,7 @@ class _Reader:
             if values[1] <= 0.0:
                 block.fault("NUTATION_PER", f"{values[1]:g} s is no period; expected more than 0")
                 return quaternion, rates
+            self.nutation = tilt
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
             rate += 2.0 * math.pi / values[1] * momentum
@@ -296,7 +307,7 @@ class _Reader:
         found: list[Manoeuvre] = []
         last: tuple[Epoch, int] | None = None
         for block in self.blocks["MAN"]:
-            begins, duration = block.epoch("MAN_EPOCH_START"), block.number("MAN_DURATION")
+            begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
             torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
             frame = block.text("MAN_REF_FRAME")
             self._body_frame(block, "MAN_REF_FRAME", frame)

@@ -83,13 +83,13 @@ class Checked:
         found = [self.number(keyword) for keyword in keywords]
         return None if any(value is None for value in found) else [value for value in found if value is not None]
 
-    def epoch(self, keyword: str) -> Epoch | None:
-        """The value as a moment of UTC."""
+    def epoch(self, keyword: str, system: str) -> Epoch | None:
+        """The value as a moment of a time system, see `Epoch.parse`."""
         text = self.text(keyword)
         if text is None:
             return None
         try:
-            return Epoch.parse(text)
+            return Epoch.parse(text, system)
         except ValueError as wrong:
             self.fault(keyword, str(wrong))
             return None

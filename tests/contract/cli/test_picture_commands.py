@@ -33,7 +33,7 @@ def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: byt
 
 def test_another_figure_can_be_chosen(run: Run, tmp_path: Path) -> None:
     for figure in ("sphere", "timeline"):
-        assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 0
+        assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 4
     assert len({path.read_bytes() for path in tmp_path.iterdir()}) == 2
     assert run("plan", "--plot", "a.png", "--figure", "globe").returncode == 2
 

@@ -76,7 +76,7 @@ def test_a_scheme_that_cannot_set_the_spin_is_infeasible(run: Run) -> None:
     done = run("simulate", "--scheme", "two-pulse", "--spin", "31rpm")
     assert done.returncode == 3
     assert "two-pulse is infeasible: cannot set the spin" in done.stderr
-    assert run("simulate", "--scheme", "none", "--spin", "31rpm").returncode == 0
+    assert run("simulate", "--scheme", "none", "--spin", "31rpm").returncode == 4
     assert run("plan", "--spin", "keep").returncode == 0
 
 

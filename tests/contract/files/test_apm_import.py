@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import messages
+from support.golden import check_text
+from support.places import case
 
 from nutdamp import flight, planning
 from nutdamp.errors import FaultyFile
-from nutdamp.files.apm_import import imported
+from nutdamp.files.apm_import import contradictions, imported
 from nutdamp.files.ccsds.apm_reader import read_apm
 from nutdamp.files.exchange import export_text
 from nutdamp.files.pulses_csv import pulses_csv
@@ -157,3 +159,21 @@ def test_what_no_spacecraft_can_be_points_at_the_block(
     line = text.splitlines().index(f"{block}_START") + 1
     with pytest.raises(FaultyFile, match=rf"a\.apm:{line}:1: {block}: .*{problem}"):
         imported(read_apm(str(path)), str(path))
+
+
+def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_said(tmp_path: Path) -> None:
+    """A period of 720 s is none of this inertia, so that 0.1 deg cannot be."""
+    text = case("mms1.apm.txt").read_text(encoding="utf-8")
+    moments = []
+    for system in ("UTC", "TAI", "TT"):
+        path = tmp_path / f"{system}.apm"
+        path.write_text(text.replace("= UTC", f"= {system}"), encoding="utf-8")
+        contents = read_apm(str(path))
+        _, body, pulses = imported(contents, path.name)
+        moments.append(contents.epoch)
+        assert [pulse.start for pulse in pulses] == [3600.0]
+        (said,) = contradictions(contents, body)
+        check_text("files.nutation-contradicts", said)
+    assert [moments[0].since(one) for one in moments[1:]] == [37.0, 37.0 + 32.184]
+    agreeing = replace(contents, nutation=body.widest.nutation)
+    assert contradictions(agreeing, body) == []

@@ -244,7 +244,7 @@ BROKEN = [
     ("EPOCH = 2026-03-01T12:00:00.5\n", "", "1:1: EPOCH: missing"),
     ("EPOCH = 2026-03-01T12:00:00.5", "EPOCH = noon", "EPOCH: 'noon' is no epoch"),
     ("EPOCH = 2026-03-01T12:00:00.5", "EPOCH =", "EPOCH: empty"),
-    ("TIME_SYSTEM = UTC", "TIME_SYSTEM = TAI", "expected UTC, got 'TAI'"),
+    ("TIME_SYSTEM = UTC", "TIME_SYSTEM = UT1", "expected UTC, TAI, GPS, TT or TDB, got 'UT1'"),
     ("OBJECT_ID = 2026-031A\n", "", "OBJECT_ID: missing"),
     ("OBJECT_ID = 2026-031A", "OBJECT_IDENT = 2026-031A", "OBJECT_IDENT: unknown keyword; did you mean OBJECT_ID?"),
     ("ORIGINATOR = TEST", "ORIGINATOR = TEST\nORIGINATOR = TEST", "ORIGINATOR: given again, first in line 3"),

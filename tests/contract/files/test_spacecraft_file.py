@@ -3,18 +3,27 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from support import reference
+from support.builders import cross
+from support.places import case
 
+from nutdamp import flight
 from nutdamp.actuators import STANDARD_GRAVITY
+from nutdamp.comparison import compare
+from nutdamp.dispersion import study_of
+from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft
 from nutdamp.tolerances import Tolerance
 
@@ -134,6 +143,23 @@ def test_a_thruster_is_a_channel_of_its_own_without_channels() -> None:
         "thrusters: [{name: a, torque: [1, 0, 0]}, {name: b, torque: [0, 1, 0]}]}"
     )
     assert [(channel.name, channel.thrusters[0].name) for channel in craft.channels] == [("a", "a"), ("b", "b")]
+
+
+def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
+    """Two thrusters along axis 3 on both sides: their torques cancel, with 3 mm of tolerance in position not quite."""
+    body = load_spacecraft(case("lp71-dv-pair.yaml"))
+    (pair,) = body.channels
+    assert not pair.torque.any()
+    assert not pair.damps
+    assert not pair.axial
+    assert not any(made.feasible for made in compare(body, CLASSIC))
+    pulses = Schedule((channel_pulse(pair, 21.75, 43.5),))
+    assert flight.flown(body, pulses).residual.nutation == pytest.approx(body.nutation, rel=1e-9)
+    burn = run(Results(study_of(body, pulses), 500)).distribution("nutation")
+    assert burn is not None
+    assert burn.quantiles(np.array([0.95]))[0] > 1.2 * body.nutation
+    both = replace(body, channels=(*cross(8.0), pair), dispersions=None)
+    assert pair.name not in {pulse.channel for made in compare(both, CLASSIC) for pulse in made.pulses}
 
 
 def test_a_torque_without_lever_arm_leaves_the_thrust_open() -> None:

@@ -55,7 +55,7 @@ def test_texts(text: str, written: str) -> None:
         ("2016-12-31T23:58:60", "time of day"),
         ("2016-12-31T23:59:61", "time of day"),
         ("1971-12-31T23:59:59", "before 1972"),
-        ("2026-03-01 12:00:00", "no epoch"),
+        ("2026-03-01_12:00:00", "no epoch"),
         ("2026-03-01T12:00:00,5", "no epoch"),
     ],
 )
@@ -115,3 +115,31 @@ def test_a_rounded_moment_is_at_most_half_its_last_digit_off(seconds: float, dig
     text = moment.rounded(digits)
     assert abs(Epoch.parse(text).elapsed - moment.elapsed) <= Fraction(1, 2 * 10**digits)
     assert len(text) == len("2016-12-25T00:00:00.") + digits
+
+
+@pytest.mark.parametrize(
+    ("text", "system"),
+    [
+        ("2017-01-01T00:00:37", "TAI"),
+        ("2017-01-01T00:00:18", "GPS"),
+        ("2017-01-01T00:01:09.184", "TT"),
+    ],
+)
+def test_clocks_without_leap_seconds(text: str, system: str) -> None:
+    """TAI - UTC is 37 s from 2017 on (IERS, Bulletin C 52); GPS is TAI - 19 s, TT is TAI + 32.184 s."""
+    assert Epoch.parse(text, system) == Epoch.parse("2017-01-01T00:00:00Z")
+    with pytest.raises(ValueError, match="zone"):
+        Epoch.parse(f"{text}Z", system)
+    leap = Epoch.parse("2016-12-31T23:59:60Z")
+    assert Epoch.parse(text, system).since(leap) == 1.0
+
+
+@pytest.mark.parametrize(("day", "ahead"), [("2026-04-04", 1.6e-3), ("2026-10-05", -1.6e-3), ("2026-01-04", 0.0)])
+def test_barycentric_time_swings_with_the_distance_of_the_sun(day: str, ahead: float) -> None:
+    """TDB - TT follows the anomaly of the Earth, 0 at perihelion (3 January 2026) and 1.66 ms at most."""
+    difference = Epoch.parse(f"{day}T00:00:00", "TT").since(Epoch.parse(f"{day}T00:00:00", "TDB"))
+    assert difference == pytest.approx(ahead, abs=1e-4)
+
+
+def test_a_blank_may_stand_for_the_t() -> None:
+    assert Epoch.parse("2013-02-05 18:07:07+00:00") == Epoch.parse("2013-02-05T18:07:07Z")
