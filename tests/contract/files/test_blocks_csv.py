@@ -105,6 +105,8 @@ def test_very_many_pulses_are_refused_at_once(tmp_path: Path) -> None:
     assert problems(TOP + "T1,1,1,0.1,100000\n", tmp_path) == [
         "2: count: expected a whole number from 1 to 5000, got 100000"
     ]
+    (tmp_path / "most.csv").write_text(TOP + "T1,1,1,0.1,5000\n")
+    assert [block.count for block in read_blocks(tmp_path / "most.csv", CRAFT)[0]] == [5000]
 
 
 def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, tmp_path: Path) -> None:
