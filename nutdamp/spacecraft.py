@@ -185,11 +185,12 @@ class Spacecraft(views.Data, views.Shown):
     """A spinning rigid body, how it moves at t = 0, and what can be fired.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None; ``dispersions``: how far true values may differ;
-    ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun,
-    where it is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of
-    ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not;
-    ``loop`` damps by what a sensor shows; ``source`` is what it was read from, None once a field is replaced.
+    which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says which, None: by shape;
+    ``dispersions``: how far true values may differ; ``object_id`` names it in messages, which carry ``orbit``; ``sun``
+    (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are cones for the spin axis; ``commands``
+    is what blocks fired from the Sun pulses of ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than
+    the thrusters say, None where they are not; ``loop`` damps by what a sensor shows; ``source`` is what it was read
+    from, None once a field is replaced.
     """
 
     name: str
@@ -203,6 +204,7 @@ class Spacecraft(views.Data, views.Shown):
     limits: Limits = field(default_factory=Limits)
     disturbances: tuple[Disturbance, ...] = ()
     dissipation: float | None = None
+    nutation_grows: bool | None = None
     goal: Goal = field(default_factory=Goal)
     dispersions: Dispersions | None = None
     object_id: str | None = None
@@ -256,13 +258,15 @@ class Spacecraft(views.Data, views.Shown):
 
     @property
     def growth(self) -> float:
-        """Rate κ (1/s) at which energy dissipation lets a small nutation grow: prolate positive, oblate negative.
+        """Rate κ (1/s) at which energy dissipation lets a small nutation grow; negative where it decays.
 
-        A sphere has no energy to give: zero. See `physics.energy_sink`.
+        By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
+        that the Sun heats. A sphere has no energy to give: zero. See `physics.energy_sink`.
         """
         if self.dissipation is None or self.inertia.a == 0.0:
             return 0.0
-        return math.copysign(1.0 / self.dissipation, self.inertia.a)
+        grows = self.inertia.a > 0.0 if self.nutation_grows is None else self.nutation_grows
+        return 1.0 / self.dissipation if grows else -1.0 / self.dissipation
 
     @property
     def spin_drift(self) -> float:

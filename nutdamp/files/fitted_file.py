@@ -65,7 +65,7 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
         value, sigma = float(found.values[growth]), float(found.sigmas[growth])
         if abs(value) > SEEN * sigma and not _grows_so(carried, value):
             way = "grows" if value > 0.0 else "decays"
-            yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation does not explain for this shape"
+            yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
     for name in (one.name for one in found.model.parameters if one.name.startswith("delay ")):
         at = found.index(name)
         assert at is not None
@@ -160,8 +160,10 @@ def _dissipation(tree: Node, found: Fit, carried: Carried) -> Edits:
         return
     value, sigma = float(found.values[index]), float(found.sigmas[index])
     given = tree.get("dissipation", "time_constant")
-    if _grows_so(carried, value) and (abs(value) > SEEN * sigma):
+    if abs(value) > SEEN * sigma:
         yield ("dissipation", "time_constant"), _as_before(given, 1.0 / abs(value), "time", "s")
+        if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, value):
+            yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
 
 
 def _goal(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:

@@ -201,7 +201,10 @@ class DissipationSection(Section):
     """Energy dissipation within the body, by flexible parts or liquids."""
 
     time_constant: PositiveTime = Field(
-        "Time, s, in which the nutation angle grows (A > C) or decays (A < C) by the factor e.", "600 s"
+        "Time, s, in which the nutation angle grows or decays by the factor e.", "600 s"
+    )
+    nutation: Literal["grows", "decays"] | None = Field(
+        "What it does; default by shape: it grows where A > C, and decays where A < C.", "grows"
     )
 
 

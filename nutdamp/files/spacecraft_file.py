@@ -67,6 +67,10 @@ Warn = Callable[[Fault], None]
 """Is given each number that is hardly what was meant."""
 
 
+GROWS = {"grows": True, "decays": False, None: None}
+"""What ``dissipation.nutation`` says."""
+
+
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
     return read_spacecraft(read_text(Path(path)), str(path), settings, warn)
@@ -98,6 +102,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         limits=_limits(contents.limits),
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
+        nutation_grows=None if contents.dissipation is None else GROWS[contents.dissipation.nutation],
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
         orbit=_orbit(contents.orbit),

@@ -42,7 +42,7 @@ def _outlook(found: Budget) -> Iterator[str]:
         yield f"The nutation stays at {now}: a sphere has no energy to lose. No damping is needed to hold it."
     elif body.growth < 0.0:
         then = "" if limit is None else _falls(found, limit)
-        decays = f"the nutation of an oblate body decays, e-fold in {lasting(-1.0 / body.growth)}"
+        decays = f"the nutation decays, e-fold in {lasting(-1.0 / body.growth)}"
         yield f"No damping is needed: {decays}{then}."
     elif body.nutation == 0.0:
         yield "There is no nutation yet that could grow."

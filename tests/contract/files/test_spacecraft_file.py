@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from support import reference
 from support.builders import cross
 from support.places import case
@@ -21,6 +23,7 @@ from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
+from nutdamp.outcome import seen_at
 from nutdamp.physics import attitude
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC
@@ -334,6 +337,27 @@ def test_dissipation_lets_nutation_grow_or_decay_by_shape(A: float, C: float, gr
     craft = read(f"{{name: S, inertia: {{A: {A}, C: {C}}}, omega0: [0, 0, 1], dissipation: {{time_constant: 10 min}}}}")
     assert craft.dissipation == 600.0
     assert craft.growth == pytest.approx(growth)
+
+
+@pytest.mark.parametrize(("moments", "nutation"), [("A: 80, C: 120", "grows"), ("A: 120, C: 80", "decays")])
+def test_a_file_may_say_what_dissipation_does(moments: str, nutation: str) -> None:
+    """The motion is that of dH/dt = H x (ω + s), s = κ h3 (h x e3), in body axes; a boom in the Sun fed Ulysses so."""
+    text = f"inertia: {{{moments}}}, state: {{spin: 0.5, nutation: 2 deg}}"
+    craft = read(f"{{name: S, {text}, dissipation: {{time_constant: 100 s, nutation: {nutation}}}}}")
+    growth = 0.01 if nutation == "grows" else -0.01
+    assert craft.growth == growth
+    inertia = np.array(craft.inertia.moments)
+
+    def changes(_: float, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+        along = momentum / np.linalg.norm(momentum)
+        slip = growth * along[2] * np.cross(along, [0.0, 0.0, 1.0])
+        return np.cross(momentum, momentum / inertia + slip)
+
+    start = inertia * craft.omega0
+    end = solve_ivp(changes, (0.0, 150.0), start, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    left = seen_at(flight.flown(craft, Schedule(), 150.0), 150.0).final
+    assert left.nutation == pytest.approx(math.atan2(math.hypot(end[0], end[1]), end[2]), rel=1e-7)
+    assert left.spin == pytest.approx(end[2] / inertia[2], rel=1e-9)
 
 
 @pytest.mark.parametrize(
