@@ -79,7 +79,7 @@ def check_place(path: str) -> Path:
         return Path(path)
     try:
         target = Path(path).resolve()
-        if target.is_symlink():  # before Python 3.13 `resolve` may give up on a circle without a word
+        if target.is_symlink() or target.parent.is_symlink():  # `resolve` may give up on a circle without a word
             raise CannotWrite(path, "too many levels of symbolic links")
         if target.is_dir():
             raise CannotWrite(path, "it is a directory")
