@@ -49,7 +49,7 @@ def test_the_same_seed_gives_the_same_budget(run: Run) -> None:
 @spread(
     ("changed", "said"),
     [
-        ("inertia.C=6000 kg m^2", "No damping is needed: the nutation of an oblate body decays, e-fold in 90 s"),
+        ("inertia.C=6000 kg m^2", "No damping is needed: the nutation decays, e-fold in 90 s"),
         ("loop.start=0.05deg", None),
         ("requirement.nutation=0.8deg", "Damping must begin now: the nutation of 1 deg is already above 0.8 deg."),
         ("state.nutation=0deg", "There is no nutation yet that could grow."),
