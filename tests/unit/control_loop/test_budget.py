@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.builders import channel, spinner
-from support.cases import spread
+from support.cases import weekly
 
 import nutdamp
 from nutdamp.compliance import reached
@@ -66,6 +66,9 @@ QUICK = {
     "nine samples a period": (craft(), loop(gyro(rate=0.9, noise=0.0))),
     "reversed spin, ticks": (craft(spin=-3.0, limits=Limits(tick=0.004)), loop(gyro(noise=0.0))),
 }
+EVEN = ("continuous gyro", "continuous gyro, late", "nine samples a period")
+"""Those whose cycles are all as long."""
+
 LONG = {
     "gyro": (craft(), loop(gyro())),
     "bias and steps": (craft(), loop(gyro(bias=rad(0.01), quantisation=rad(0.01)))),
@@ -108,9 +111,10 @@ def agrees(body: Spacecraft, made: Loop, cycles: int, seeds: int, least: int) ->
     assert cycle.impulse == pytest.approx(impulse, rel=0.02)
 
 
-@spread("name", QUICK, quick=1)
+@pytest.mark.parametrize("name", [one if one in EVEN else weekly(one) for one in QUICK])
 def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
-    agrees(*QUICK[name], 40, 1, 20)
+    """On ticks the length of a cycle scatters: the mean of 40 of them is several % off, that of 160 here is not."""
+    agrees(*QUICK[name], 40 if name in EVEN else 160, 1, 20)
 
 
 @pytest.mark.weekly
