@@ -26,6 +26,10 @@ Output = tuple[str | None, Callable[[], "File | dict[str, Any] | Figure"]]
 """Path of a file to write, if one is requested, and what makes its content: a dict is for JSON, a figure a picture."""
 
 
+UNDER_WAY = "nutdamp.cli.job"
+"""Where the context of a command line keeps the JSON file and the spacecraft of the job that has begun."""
+
+
 class Job(NamedTuple):
     """The spacecraft that a command works on, text and name of its file; where remarks go; ``silent``: no screens."""
 
@@ -79,10 +83,6 @@ def begin(
     if context is not None and isinstance(written.get("json"), str):
         context.meta[UNDER_WAY] = written["json"], spacecraft
     return Job(spacecraft, text, remark, silent, quiet)
-
-
-UNDER_WAY = "nutdamp.cli.job"
-"""Where the context of a command line keeps the JSON file and the spacecraft of the job that has begun."""
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:

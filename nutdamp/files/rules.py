@@ -272,6 +272,11 @@ def _dissipation(facts: Facts) -> Iterator[Finding]:
     if time_constant == 0.0:
         cure = "expected a time above 0, or leave dissipation out for none"
         yield Finding(("dissipation", "time_constant"), f"zero; {cure}")
+    inertia = inertia_of(facts)
+    if inertia is not None and inertia.a == 0.0 and facts.has("dissipation", "nutation"):
+        yield Finding(
+            ("dissipation", "nutation"), "the nutation of a sphere neither grows nor decays; leave it out", True
+        )
 
 
 def _limits(facts: Facts) -> Iterator[Finding]:

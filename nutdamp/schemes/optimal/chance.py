@@ -53,16 +53,6 @@ class Sure(NamedTuple):
     left: Vector
 
 
-class Solved(NamedTuple):
-    """Columns and their ``on_times`` (n,) s, ``excess`` as in `Sure`; ``prices`` of the tangents, cost per N m s."""
-
-    columns: Columns
-    on_times: Vector
-    excess: float
-    tangents: list[Tangent]
-    prices: Vector
-
-
 class ChanceProgram:
     """The program of margins for the channels and slots of a ``program`` of small angles."""
 
@@ -78,19 +68,6 @@ class ChanceProgram:
 
     def solve(self, margin: float) -> Sure:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
-        found = self.solved(margin)
-        if found is None:
-            return Sure((), np.inf, np.zeros(5))
-        used = found.on_times > 0.0
-        left = self.model.left(found.columns, found.on_times)
-        return Sure(
-            burns(self.program.channels, found.columns.of(used), found.on_times[used], 1.01 * self.program.width),
-            found.excess,
-            np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
-        )
-
-    def solved(self, margin: float) -> Solved | None:
-        """The solution with all that proves it; None where the linear program cannot be solved."""
         tangents = [self.model.plain(limit, u) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
         rights = np.array([self.model.right(one, margin) for one in tangents]) / self.scale
@@ -118,10 +95,14 @@ class ChanceProgram:
                 self._add(master, tangents, priced, margin)
                 columns = columns.joined(priced)
         if found is None:
-            return None
-        prices = np.maximum(-found.shadows, 0.0) * self.dearest / self.scale
+            return Sure((), np.inf, np.zeros(5))
         on_times = self._on_times(taken, found.x[1:])
-        return Solved(taken, on_times, float(found.x[0]), tangents[: len(prices)], prices)
+        used, left = on_times > 0.0, self.model.left(taken, on_times)
+        return Sure(
+            burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
+            float(found.x[0]),
+            np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
+        )
 
     def _on_times(self, columns: Columns, amounts: Vector) -> Vector:
         """On-times (n,) s of amounts in units, without rounding."""
