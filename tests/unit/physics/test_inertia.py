@@ -1,4 +1,4 @@
-"""Inertia: the ratio a, shapes, principal axes of a tensor."""
+"""Inertia: the ratio a, shapes, principal axes of a tensor, and whether a spin about one of them is stable."""
 
 from __future__ import annotations
 
@@ -9,102 +9,72 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from support import reference
+from support.spinning import EPS, about, plain_spinners
 
 from nutdamp.physics import inertia, stability, triaxial
 
-Array = NDArray[np.float64]
-EPS = np.finfo(float).eps
 
-
-def about(axis: tuple[float, float, float], angle: float) -> Array:
-    """Rotation matrix by Rodrigues' formula."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
-
-
-def test_magnus_4_ratio() -> None:
+def test_magnus_4_ratio_and_shape() -> None:
     assert inertia.ratio(120.0, 80.0) == pytest.approx(1 / 3, rel=EPS)
-    assert inertia.ratio(100.0, 200.0) == -1.0  # flat disc
-    assert inertia.ratio(100.0, 100.0) == 0.0
+    assert [inertia.ratio(100.0, C) for C in (10.0, 200.0, 100.0)] == [0.9, -1.0, 0.0]
+    assert [inertia.shape(100.0, C) for C in (80.0, 100.0, 120.0)] == ["prolate", "sphere", "oblate"]
 
 
-@pytest.mark.parametrize(("C", "shape"), [(80.0, "prolate"), (100.0, "sphere"), (120.0, "oblate")])
-def test_shape(C: float, shape: str) -> None:
-    assert inertia.shape(100.0, C) == shape
-
-
-moments = st.tuples(st.floats(0.5, 1.0), st.floats(0.5, 1.0), st.floats(0.5, 1.0))
 directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1)
 
 
-@given(moments, directions, st.floats(-math.pi, math.pi), st.sampled_from([1e-6, 1.0, 1e6]))
+@given(st.tuples(*[st.floats(0.5, 1.0)] * 3), directions, st.floats(-math.pi, math.pi), st.sampled_from([1e-6, 1, 1e6]))
 def test_rotated_tensor_is_diagonal_in_its_principal_axes(
-    values: tuple[float, float, float], axis: tuple[float, float, float], angle: float, scale: float
+    moments: tuple[float, float, float], axis: tuple[float, float, float], angle: float, scale: float
 ) -> None:
     R = about(axis, angle)
-    tensor = scale * R @ np.diag(values) @ R.T
+    tensor = scale * R @ np.diag(moments) @ R.T
     tensor = 0.5 * (tensor + tensor.T)
-    found, axes = inertia.principal_axes(tensor)
+    principal, axes = inertia.principal_axes(tensor)
     assert axes.T @ axes == pytest.approx(np.eye(3), abs=8 * EPS)
     assert np.linalg.det(axes) == pytest.approx(1.0, abs=8 * EPS)  # right handed
     # Moments nearer than DEGENERATE count as equal: that much may stay off the diagonal.
-    assert axes.T @ tensor @ axes == pytest.approx(np.diag(found), abs=scale * (inertia.DEGENERATE + 20 * EPS))
-    assert sorted(found) == pytest.approx(sorted(scale * value for value in values), rel=inertia.DEGENERATE)
+    assert axes.T @ tensor @ axes == pytest.approx(np.diag(principal), abs=scale * (inertia.DEGENERATE + 20 * EPS))
+    assert sorted(principal) == pytest.approx(sorted(scale * one for one in moments), rel=inertia.DEGENERATE)
 
 
 @given(st.permutations([1.0, 0.9, 0.7]), directions, st.floats(-0.5, 0.5))
 def test_axes_are_named_by_the_axes_of_the_file_they_are_near_to(
-    values: list[float], axis: tuple[float, float, float], angle: float
+    moments: list[float], axis: tuple[float, float, float], angle: float
 ) -> None:
     """A turn of less than 30° permutes nothing: axis 3 nearest the file's third, axis 1 nearest its first."""
     R = about(axis, angle)
-    found, axes = inertia.principal_axes(R @ np.diag(values) @ R.T)
-    assert found == pytest.approx(values, rel=50 * EPS)
+    principal, axes = inertia.principal_axes(R @ np.diag(moments) @ R.T)
+    assert principal == pytest.approx(moments, rel=50 * EPS)
     assert axes == pytest.approx(R, abs=50 * EPS / 0.1)  # eigenvectors: eps over the gap of the moments
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
-def test_axis_3_is_the_nearest_to_the_third_whichever_moment_it_has(order: tuple[int, ...]) -> None:
-    """A tensor with permuted axes and a slight tilt: no axis of the file is renamed."""
-    values = np.array([5.0, 4.0, 3.0])[list(order)]
-    tilt = about((1.0, 2.0, 0.5), 0.02)
-    found, _ = inertia.principal_axes(tilt @ np.diag(values) @ tilt.T)
-    assert found == pytest.approx(tuple(values), rel=50 * EPS)
-
-
-def test_diagonal_tensor_keeps_its_axes_exactly() -> None:
-    found, axes = inertia.principal_axes(np.diag([3.0, 2.0, 4.0]))
-    assert found == (3.0, 2.0, 4.0)
+def test_axes_that_the_tensor_leaves_open() -> None:
+    """Whichever moment axis 3 has, it is the nearest to the third of the file, and so are axes of equal moments."""
+    for order in itertools.permutations((5.0, 4.0, 3.0)):
+        R = about((1.0, 2.0, 0.5), 0.02)
+        assert inertia.principal_axes(R @ np.diag(order) @ R.T)[0] == pytest.approx(order, rel=50 * EPS)
+    principal, axes = inertia.principal_axes(np.diag([3.0, 2.0, 4.0]))
+    assert principal == (3.0, 2.0, 4.0)
     assert np.array_equal(axes, np.eye(3))
-
-
-def test_equal_transverse_moments_lie_along_the_file_as_far_as_the_tilt_allows() -> None:
-    """Axis 3 tilted by 3° about axis 2: axis 1 stays in the 1-3 plane of the file."""
-    R = about((0.0, 1.0, 0.0), math.radians(3))
-    found, axes = inertia.principal_axes(R @ np.diag([120.0, 120.0, 80.0]) @ R.T)
-    assert found == pytest.approx((120.0, 120.0, 80.0), rel=10 * EPS)
-    assert axes == pytest.approx(R, abs=50 * EPS)
-
-
-def test_equal_moments_about_1_and_3_lie_along_the_third_axis_of_the_file() -> None:
-    """Only axis 2 is given (turned about axis 1): axis 3 is free in its plane, and nearest the file's third."""
-    R = about((1.0, 0.0, 0.0), math.radians(10))
-    _, axes = inertia.principal_axes(R @ np.diag([5.0, 3.0, 5.0]) @ R.T)
-    assert axes[:, 2] == pytest.approx(R[:, 2], abs=50 * EPS)
-    assert axes == pytest.approx(R, abs=50 * EPS)
-
-
-def test_sphere_that_rounding_has_smeared_keeps_the_axes_of_the_file() -> None:
-    tensor = 7.0 * np.eye(3) + 1e-15 * np.array([[0, 1, 2], [1, 0, 3], [2, 3, 0]])
-    found, axes = inertia.principal_axes(tensor)
-    assert found == pytest.approx((7.0, 7.0, 7.0), rel=4 * EPS)
+    for moments, R in (
+        # Axis 3 tilted about axis 2: axis 1 stays in the 1-3 plane of the file.
+        ((120.0, 120.0, 80.0), about((0.0, 1.0, 0.0), math.radians(3))),
+        # Only axis 2 is given: axis 3 is free in its plane.
+        ((5.0, 3.0, 5.0), about((1.0, 0.0, 0.0), math.radians(10))),
+    ):
+        principal, axes = inertia.principal_axes(R @ np.diag(moments) @ R.T)
+        assert principal == pytest.approx(moments, rel=10 * EPS)
+        assert axes == pytest.approx(R, abs=50 * EPS)
+    smeared = 7.0 * np.eye(3) + 1e-15 * np.array([[0, 1, 2], [1, 0, 3], [2, 3, 0]])  # a sphere, but for rounding
+    principal, axes = inertia.principal_axes(smeared)
+    assert principal == pytest.approx((7.0, 7.0, 7.0), rel=4 * EPS)
     assert axes == pytest.approx(np.eye(3), abs=4 * EPS)
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("moments", "expected"),
     [
         ((100.00000003, 100.0, 100.0), (100.0, 100.0, 100.0)),
         ((100.0, 100.0000000002, 100.0000000001), (100.0000000001,) * 3),  # I3 in the middle
@@ -117,21 +87,95 @@ def test_sphere_that_rounding_has_smeared_keeps_the_axes_of_the_file() -> None:
     ],
 )
 def test_moments_that_differ_by_rounding_are_one(
-    given: tuple[float, float, float], expected: tuple[float, float, float]
+    moments: tuple[float, float, float], expected: tuple[float, float, float]
 ) -> None:
-    found = inertia.settled(given)
-    assert found == pytest.approx(expected, rel=2 * EPS)
-    assert inertia.settled(found) == found
-    assert (found[0] == found[1]) == (expected[0] == expected[1])
-    assert (found[0] == found[2]) == (expected[0] == expected[2])
+    settled = inertia.settled(moments)
+    assert settled == pytest.approx(expected, rel=2 * EPS)
+    assert inertia.settled(settled) == settled
+    assert [settled[0] == one for one in settled] == [expected[0] == one for one in expected]
 
 
 @given(st.floats(1e-3, 1e6), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_what_is_a_sphere_is_one_for_every_question(size: float, one: float, two: float) -> None:
     moments = (size, size * (1 + one * inertia.DEGENERATE), size * (1 + two * inertia.DEGENERATE))
-    first, second, third = inertia.settled(moments)
+    first, second, third = settled = inertia.settled(moments)
     kind = stability.axis_class(moments)
-    assert kind == stability.axis_class((first, second, third))
+    assert kind == stability.axis_class(settled)
     assert (kind == "sphere") == (first == second == third) == (inertia.ratio(first, third) == 0.0 and first == second)
     if kind in ("minimum", "maximum"):
-        assert triaxial.body_nutation_rate((first, second, third), 1.0) != 0.0
+        assert triaxial.body_nutation_rate(settled, 1.0) != 0.0
+
+
+# --- stability -------------------------------------------------------------------------------------------------------
+
+
+def test_axis_class() -> None:
+    kinds = {
+        "minimum": [(3.0, 2.0, 1.5), (2.0, 2.0, 1.0)],
+        "maximum": [(2.0, 3.0, 4.0), (2.0, 2.0, 3.0)],
+        "intermediate": [(2.0, 4.0, 3.0), (3.0, 4.0, 3.0 * (1 + 1e-6))],
+        "degenerate": [(2.0, 3.0, 3.0), (3.0, 4.0, 3.0 * (1 + 1e-13))],
+        "sphere": [(3.0, 3.0, 3.0), (3.0, 3.0 * (1 - 1e-13), 3.0 * (1 + 1e-13))],
+    }
+    for kind, bodies in kinds.items():
+        for first, second, third in bodies:
+            assert stability.axis_class((first, second, third)) == kind
+            assert stability.axis_class((second, first, third)) == kind
+
+
+def test_growth_is_what_integration_shows() -> None:
+    """By 0.5303/s about the middle axis of 2, 3, 4 kg m²; linear where two moments are equal; else none."""
+    for spin in (1.5, -1.5):
+        unstable = stability.growth((2.0, 4.0, 3.0), spin)
+        rate = math.sqrt(unstable.squared_exponent)
+        assert rate == pytest.approx(0.5303, abs=5e-5)
+        assert (unstable.stable, unstable.growth_time) == (False, pytest.approx(1 / rate))
+        # Along the growing direction from 1e-9 rad/s: dω1/dt = (I2 - I3)/I1 ω3 ω2 = p ω1
+        start = reference.Motion(reference.vector(1e-9, 1e-9 * rate * 2.0 / ((4.0 - 3.0) * spin), spin), np.eye(3))
+        (later,) = reference.coast((2.0, 4.0, 3.0), start, np.zeros(3), np.array([10.0]))
+        assert math.log(later.rates[0] / 1e-9) / 10.0 == pytest.approx(rate, rel=1e-6)
+    for moments in ((1.0, 2.0, 2.0), (2.0, 1.0, 2.0)):
+        assert stability.growth(moments, 1.5) == (0.0, False, math.inf)
+    start = reference.Motion(reference.vector(1e-7, 0.0, 1.5), np.eye(3))
+    (later,) = reference.coast((1.0, 2.0, 2.0), start, np.zeros(3), np.array([40.0]))
+    assert later.rates[1] == pytest.approx((2.0 - 1.0) / 2.0 * 1.5 * 1e-7 * 40.0, rel=1e-6)
+    assert stability.growth((2.0, 2.0, 2.0), 1.5) == stability.growth((2.0, 4.0, 3.0), 0.0) == (0.0, True, math.inf)
+
+
+@given(st.tuples(*[st.floats(0.1, 1.0)] * 3), st.floats(0.1, 5.0) | st.floats(-5.0, -0.1))
+def test_stable_is_extreme(sides: tuple[float, float, float], spin: float) -> None:
+    x, y, z = sides
+    first, second, third = moments = (y + z, z + x, x + y)
+    kind, result = stability.axis_class(moments), stability.growth(moments, spin)
+    assert result.stable == (kind in {"minimum", "maximum", "sphere"})
+    assert (result.squared_exponent < 0) == (kind in {"minimum", "maximum"})
+    assert math.isfinite(result.growth_time) == (kind == "intermediate")
+    assert stability.growth(moments, -spin) == result
+    # The eigenvalues of the linear equation are the exponents.
+    matrix = spin * np.array([[0, (second - third) / first], [(third - first) / second, 0]])
+    assert result.squared_exponent == pytest.approx(-float(np.linalg.det(matrix)), abs=1e-7)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-10, 0.01, 0.3])
+def test_principal_tilt(tilt: float) -> None:
+    turn = about((1.0, 0.0, 0.0), tilt)
+    assert stability.principal_tilt(turn) == stability.principal_tilt(-turn) == pytest.approx(tilt, rel=1e-14)
+    _, axes = inertia.principal_axes(turn @ np.diag([120.0, 100.0, 80.0]) @ turn.T)
+    assert stability.principal_tilt(axes) == pytest.approx(tilt, abs=1e-14)
+
+
+@plain_spinners
+def test_nutation_in_three_frames(A: float, C: float, spin: float) -> None:
+    omega0, step, start = 0.2 + 0.1j, 0.1, reference.Motion(reference.vector(0.2, 0.1, spin), np.eye(3))
+    turning = stability.nutation_rates(A, C, abs(omega0), spin)
+    (motion,) = reference.coast((A, A, C), start, np.zeros(3), np.array([step]))
+    # In the body ω turns at K(7); the body has turned by ω3 t in the despun frame, where it turns at K(10).
+    later = complex(motion.rates[0], motion.rates[1])
+    assert later == pytest.approx(omega0 * np.exp(1j * turning.body * step), abs=1e-12)
+    assert later * np.exp(1j * spin * step) == pytest.approx(omega0 * np.exp(1j * turning.despun * step), abs=1e-12)
+    # Inertially the spin axis goes round H, positively, at K(13).
+    z = reference.momentum((A, A, C), start)
+    z /= np.linalg.norm(z)
+    before, after = (axis - z * (z @ axis) for axis in (np.eye(3)[:, 2], motion.rotation[:, 2]))
+    swept = math.atan2(z @ np.cross(before, after), before @ after)
+    assert swept / step == pytest.approx(turning.inertial, rel=1e-11)

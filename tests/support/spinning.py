@@ -1,0 +1,68 @@
+"""Bodies and spins that the tables of unit/physics run over, and their motion under torques that change with time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support.reference import RTOL, Array, Motion, _turning
+
+EPS = float(np.finfo(float).eps)
+
+BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (100.0, 200.0), (100.0, 5.0)]
+"""A, C of a prolate and an oblate body, a sphere, a flat disc and a needle."""
+
+spinners = pytest.mark.parametrize(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in (3.0, -3.0)])
+plain_spinners = pytest.mark.parametrize(("A", "C", "spin"), [(*b, spin) for b in BODIES[:2] for spin in (3.0, -3.0)])
+
+
+def about(axis: Array | Sequence[float], angle: float) -> Array:
+    """Rotation matrix by Rodrigues' formula."""
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
+
+
+def turning(*torques: tuple[complex, float]) -> Callable[[float], tuple[float, float, float]]:
+    """Torque at each moment of transverse torques (N m) that turn in the body at so many rad/s."""
+
+    def torque(t: float) -> tuple[float, float, float]:
+        total = sum((size * complex(math.cos(rate * t), math.sin(rate * t)) for size, rate in torques), 0j)
+        return total.real, total.imag, 0.0
+
+    return torque
+
+
+def driven(
+    moments: Sequence[float],
+    motion: Motion,
+    torque: Callable[[float], Sequence[float]],
+    times: Sequence[float] | Array,
+    growth: float = 0.0,
+) -> list[Motion]:
+    """The motion at ``times[1:]`` under a body torque, from ``motion`` at ``times[0]``, by DOP853.
+
+    With a ``growth`` κ dissipation adds κ H1 cos²θ, κ H2 cos²θ, -κ H3 sin²θ, and the attitude slips as |H| stays.
+    """
+    A, B, C = (float(one) for one in moments)
+
+    def slope(t: float, y: Array) -> list[float]:
+        p, q, r, *rotation = y.tolist()
+        m1, m2, m3 = torque(t)
+        slip = 0.0
+        if growth:
+            h1, h2, h3 = A * p, B * q, C * r
+            size = h1 * h1 + h2 * h2 + h3 * h3
+            m1, m2 = m1 + growth * h1 * h3 * h3 / size, m2 + growth * h2 * h3 * h3 / size
+            m3 -= growth * h3 * (h1 * h1 + h2 * h2) / size
+            slip = growth * h3 / size
+        rates = [(m1 - (C - B) * q * r) / A, (m2 - (A - C) * r * p) / B, (m3 - (B - A) * p * q) / C]
+        return [*rates, *_turning(rotation, p + slip * B * q, q - slip * A * p, r)]
+
+    start = np.concatenate([motion.rates, motion.rotation.ravel()])
+    flown = solve_ivp(slope, (times[0], times[-1]), start, "DOP853", times[1:], rtol=RTOL, atol=0.1 * RTOL)
+    assert flown.success
+    return [Motion(y[:3], y[3:].reshape(3, 3)) for y in flown.y.T]
