@@ -1,4 +1,4 @@
-"""Euler's equations by Taylor series, against DOP853, conservation laws and the growth rate of an unstable spin."""
+"""Euler's equations by series, torques fixed or turning, against DOP853, conservation laws and closed forms."""
 
 from __future__ import annotations
 
@@ -7,52 +7,63 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from support import reference
 from support.cases import spread
+from support.golden import refused
+from support.reference import Array, vector
+from support.spinning import EPS, driven, turning
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude, rigid
+from nutdamp.physics import attitude, rigid, rigid_cases
+from nutdamp.physics import driven as symmetric
+from nutdamp.physics.rigid import Forcing
 
-Array = NDArray[np.float64]
-EPS = float(np.finfo(float).eps)
 FLOWN = 1e-11
 """rad, rad/s; what DOP853 at 1e-13 a step adds up over some tens of radians."""
-
 START = attitude.from_matrix(np.eye(3))
-MOMENTS = {
-    "triaxial": (90.0, 120.0, 70.0),
-    "prolate": (120.0, 120.0, 80.0),
-    "oblate": (80.0, 80.0, 120.0),
-    "sphere": (100.0, 100.0, 100.0),
-    "flat": (30.0, 50.0, 80.0),
+TURNING = ((2.0 - 1.5j, -1.7), (0.4 + 0.1j, 5.0))
+BODY = (90.0, 120.0, 70.0)
+MOMENTS = [BODY, (120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (100.0, 100.0, 100.0), (30.0, 50.0, 80.0)]
+CASES = {
+    "three moments": (BODY, (20.0, -10.0, 0.0), (0.6, -0.3, 2.0)),
+    "three moments, free": (BODY, (0.0, 0.0, 0.0), (0.6, -0.3, 2.0)),
+    "flat, strong": ((30.0, 50.0, 80.0), (500.0, 0.0, 300.0), (0.6, -0.3, 2.0)),
+    "prolate": ((120.0, 120.0, 80.0), (5.0, -3.0, 0.0), (0.1, -0.2, 3.0)),
+    "oblate": ((80.0, 80.0, 120.0), (5.0, -3.0, 2.0), (0.4, 0.3, -2.0)),
+    "sphere": ((100.0, 100.0, 100.0), (1.0, 8.0, -4.0), (0.1, 0.0, 1.0)),
+    "spin reversed": ((120.0, 120.0, 80.0), (1.0, 2.0, -40.0), (0.05, 0.1, 4.0)),
+    "from rest": ((120.0, 120.0, 80.0), (10.0, 5.0, 7.0), (0.0, 0.0, 0.0)),
 }
+Three = tuple[float, float, float]
 
 
-def ends(pieces: list[rigid.Piece], time: float) -> tuple[Array, Array]:
-    """Rates and rotation at ``time`` from the piece that holds it."""
-    piece = next(piece for piece in pieces if time <= piece.start + piece.duration)
-    rates, quaternion = piece.at(np.array([time]))
-    return rates[0], attitude.matrix(quaternion[0])
+def last(moments: Three, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
+    """Rates and quaternion at the end of a flight from `START`."""
+    return rigid.integrate(moments, torque, rates, START, begin, end)[-1].final
 
 
-@spread("torque", [(0.0, 0.0, 0.0), (20.0, -10.0, 0.0), (3.0, 8.0, -15.0), (500.0, 0.0, 300.0)], quick=1, ids=str)
-@spread("moments", MOMENTS.values(), quick=8, ids=MOMENTS)
-def test_motion_under_a_constant_torque(moments: tuple[float, float, float], torque: tuple[float, ...]) -> None:
+@spread("turns", [False, True], quick=2, ids=["fixed", "turning"])
+@spread(("moments", "torque", "rates"), CASES.values(), quick=3, ids=CASES)
+def test_motion_under_fixed_and_turning_torques(moments: Three, torque: Three, rates: Three, turns: bool) -> None:
     """At the ends of the pieces and within them."""
-    rates, times = reference.vector(0.6, -0.3, 2.0), np.linspace(0.7, 7.0, 10)
-    pieces = rigid.integrate(moments, np.array(torque), rates, START, 0.0, 7.0)
-    expected = reference.coast(moments, reference.Motion(rates, np.eye(3)), np.array(torque), times)
-    for time, motion in zip(times, expected, strict=True):
-        got, rotation = ends(pieces, float(time))
+    times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
+    pieces = rigid.integrate(
+        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, Forcing(TURNING if turns else ())
+    )
+    expected = driven(
+        moments, reference.Motion(np.array(rates), np.eye(3)), lambda t: np.add(torque, acting(t)).tolist(), times
+    )
+    for time, motion in zip(times[1:].tolist(), expected, strict=True):
+        piece = next(one for one in pieces if time <= one.start + one.duration)
+        (omega,), (quaternion,) = piece.at(np.array([time]))
         size = float(np.linalg.norm(motion.rates))
-        assert got == pytest.approx(motion.rates, abs=FLOWN * max(1.0, size))
+        assert omega == pytest.approx(motion.rates, abs=FLOWN * max(1.0, size))
         # A torque of 500 N m turns the body through some hundred radians.
-        assert reference.turned(rotation, motion.rotation) < FLOWN * max(1.0, 0.5 * size)
+        assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN * max(1.0, 0.5 * size)
 
 
 def test_pieces_join_without_gap_or_jump() -> None:
-    pieces = rigid.integrate((90.0, 120.0, 70.0), reference.vector(5, 2, 1), reference.vector(1, 2, 3), START, 2.0, 9.0)
+    pieces = rigid.integrate(BODY, vector(5, 2, 1), vector(1, 2, 3), START, 2.0, 9.0)
     assert len(pieces) > 3
     assert pieces[0].start == 2.0
     assert pieces[-1].start + pieces[-1].duration == pytest.approx(9.0, rel=EPS)
@@ -61,78 +72,93 @@ def test_pieces_join_without_gap_or_jump() -> None:
         assert np.array_equal(one.final[0], two.at(np.array([two.start]))[0][0])
 
 
-@pytest.mark.parametrize("moments", MOMENTS.values(), ids=MOMENTS)
-def test_energy_and_momentum_stay_without_torque(moments: tuple[float, float, float]) -> None:
-    rates = reference.vector(0.6, -0.3, 2.0)
-    (got,), (quaternion,) = rigid.integrate(moments, np.zeros(3), rates, START, 0.0, 100.0)[-1].at(np.array([100.0]))
+@pytest.mark.parametrize("moments", MOMENTS)
+def test_energy_and_momentum_stay_without_torque(moments: Three) -> None:
+    rates = vector(0.6, -0.3, 2.0)
+    later, quaternion = last(moments, np.zeros(3), rates, 0.0, 100.0)
     # One rounding in each of about a hundred steps.
-    assert reference.energy(moments, got) == pytest.approx(reference.energy(moments, rates), rel=200 * EPS)
-    h = attitude.rotate(quaternion, got * np.array(moments))
+    assert reference.energy(moments, later) == pytest.approx(reference.energy(moments, rates), rel=200 * EPS)
+    h = attitude.rotate(quaternion, later * np.array(moments))
     assert h == pytest.approx(rates * np.array(moments), abs=400 * EPS * float(np.linalg.norm(h)))
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_spin_about_the_middle_axis_grows_at_the_published_rate(sign: float) -> None:
-    """2, 3, 4 kg m² about the middle axis at 1.5 rad/s: p = 0.5303/s = ω √((I3-I1)(I2-I3)/(I1 I2)), axes reordered."""
-    moments, spin = (2.0, 4.0, 3.0), 1.5 * sign
-    p = abs(spin) * math.sqrt((3.0 - 2.0) * (4.0 - 3.0) / (2.0 * 4.0))
-    assert p == pytest.approx(0.5303, abs=5e-5)
-    # On the growing direction of the linearised equations ω1 and ω2 grow together by e^{pt}.
-    rates = 1e-9 * reference.vector(1.0, p * 2.0 / ((4.0 - 3.0) * spin), 0.0) + reference.vector(0, 0, spin)
-    last, _ = rigid.integrate(moments, np.zeros(3), rates, START, 0.0, 10.0)[-1].final
-    # What rounding puts on the other direction, and second order: 1e-16/1e-9 and (1e-9 e^{10p})².
-    assert last[:2] == pytest.approx(rates[:2] * math.exp(10 * p), rel=1e-6)
-
-
-def test_from_rest_by_a_torque_about_a_principal_axis() -> None:
-    """ω = Mt/I, angle Mt²/(2I): seven and a half turns."""
-    (rates,), (quaternion,) = rigid.integrate((2.0, 3.0, 4.0), reference.vector(0, 0, 4), np.zeros(3), START, 0.0, 9.7)[
-        -1
-    ].at(np.array([9.7]))
+def test_closed_forms() -> None:
+    """Growth about the middle axis, a spin up about a principal axis, rest."""
+    for spin in (1.5, -1.5):
+        # 2, 3, 4 kg m²: on the growing direction of the linearised equations ω1 and ω2 grow together by e^{pt}.
+        p = abs(spin) * math.sqrt((3.0 - 2.0) * (4.0 - 3.0) / (2.0 * 4.0))
+        rates = 1e-9 * vector(1.0, p * 2.0 / ((4.0 - 3.0) * spin), 0.0) + vector(0, 0, spin)
+        later, _ = last((2.0, 4.0, 3.0), np.zeros(3), rates, 0.0, 10.0)
+        # What rounding puts on the other direction, and second order: 1e-16/1e-9 and (1e-9 e^{10p})².
+        assert later[:2] == pytest.approx(rates[:2] * math.exp(10 * p), rel=1e-6)
+    rates, quaternion = last((2.0, 3.0, 4.0), vector(0, 0, 4), np.zeros(3), 0.0, 9.7)
     assert rates == pytest.approx([0, 0, 9.7], abs=100 * EPS)
-    angle = 9.7**2 / 2
-    expected = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
-    assert attitude.matrix(quaternion)[:2, :2] == pytest.approx(np.array(expected), abs=1000 * EPS)
+    half = 9.7**2 / 4  # seven and a half turns
+    assert attitude.matrix(quaternion)[0, :2] == pytest.approx(
+        [math.cos(2 * half), -math.sin(2 * half)], abs=1000 * EPS
+    )
+    for rest, start in zip(
+        last((2.0, 3.0, 4.0), np.zeros(3), np.zeros(3), 0.0, 1e6), (np.zeros(3), START), strict=True
+    ):
+        assert np.array_equal(rest, start)
 
 
-def test_nothing_happens_to_a_body_at_rest() -> None:
-    pieces = rigid.integrate((2.0, 3.0, 4.0), np.zeros(3), np.zeros(3), START, 0.0, 1e6)
-    assert np.array_equal(pieces[-1].final[0], np.zeros(3))
-    assert np.array_equal(pieces[-1].final[1], START)
-
-
-@pytest.mark.parametrize("scale", [1e-12, 1e12])
-def test_units_of_mass_do_not_matter(scale: float) -> None:
-    moments, torque, rates = np.array([90.0, 120.0, 70.0]), reference.vector(5, 2, 1), reference.vector(1, 2, 3)
-    plain = rigid.integrate((90.0, 120.0, 70.0), torque, rates, START, 0.0, 5.0)[-1].final
-    first, second, third = (moments * scale).tolist()
-    scaled = rigid.integrate((first, second, third), torque * scale, rates, START, 0.0, 5.0)[-1].final
-    assert scaled[0] == pytest.approx(plain[0], rel=100 * EPS)
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1e6])
-def test_units_of_time_do_not_matter(scale: float) -> None:
+@pytest.mark.parametrize(("mass", "time"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-9), (1.0, 1e6)])
+def test_units_do_not_matter(mass: float, time: float) -> None:
     """Rates × s, torques × s², times / s: the same path through space."""
-    moments, torque, rates = (90.0, 120.0, 70.0), reference.vector(5, 2, 1), reference.vector(1, 2, 3)
-    plain = rigid.integrate(moments, torque, rates, START, 0.0, 5.0)[-1].final
-    scaled = rigid.integrate(moments, torque * scale**2, rates * scale, START, 0.0, 5.0 / scale)[-1].final
-    assert scaled[0] / scale == pytest.approx(plain[0], rel=200 * EPS)
+    torque, rates, (first, second, third) = vector(5, 2, 1), vector(1, 2, 3), BODY
+    plain = last(BODY, torque, rates, 0.0, 5.0)
+    moments = first * mass, second * mass, third * mass
+    scaled = last(moments, torque * mass * time**2, rates * time, 0.0, 5.0 / time)
+    assert scaled[0] / time == pytest.approx(plain[0], rel=200 * EPS)
     assert scaled[1] == pytest.approx(plain[1], abs=200 * EPS)
 
 
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
     """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
-    torque, start = np.array([0.3, -0.2, 0.1]), np.array([0.2, 0.1, 3.0])
-    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-    late, early = (rigid.integrate((120.0, 100.0, 80.0), torque, start, quaternion, t, t + 64.0) for t in (1e17, 0.0))
+    torque, start = vector(0.3, -0.2, 0.1), vector(0.2, 0.1, 3.0)
+    late, early = (rigid.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
     assert len(late) == len(early)
-    for one, other in zip(late[-1].final, early[-1].final, strict=True):
-        assert one == pytest.approx(other, abs=1e-12)
+    assert np.concatenate(late[-1].final) == pytest.approx(np.concatenate(early[-1].final), abs=1e-12)
 
 
-@pytest.mark.parametrize("torque", [math.nan, math.inf, 1e200, 1e300])
-def test_what_cannot_be_integrated_is_refused(torque: float) -> None:
-    with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
-        rigid.integrate(
-            (120.0, 100.0, 80.0), np.array([torque, 0.0, 0.0]), np.ones(3), np.array([1.0, 0, 0, 0]), 0.0, 1e9
-        )
+def test_what_cannot_be_integrated_is_refused() -> None:
+    for torque in (math.nan, math.inf, 1e200, 1e300):
+        with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
+            last((120.0, 100.0, 80.0), vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
+    body, rates = (120.0, 120.0, 80.0), vector(0.1, 0.0, 3.0)
+    with refused(Infeasible, "physics.too-many-steps"):
+        rigid.integrate(body, vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
+    with refused(Infeasible, "physics.too-long"):
+        last(body, vector(1, 0, 0), rates, 0.0, 1e6)
+
+
+@pytest.mark.parametrize("forcing", [Forcing(), Forcing(TURNING)], ids=["fixed", "turning"])
+def test_few_cases_fly_as_each_alone_does(forcing: Forcing) -> None:
+    """Bodies, motions, torques, begins and durations of their own."""
+    rng, count = np.random.default_rng(12), 7
+    A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))
+    moments = np.array([A, A, 80.0 * (1.0 + 0.2 * rng.normal(size=count))])
+    rates, torque = rng.normal(size=(3, count)), 20.0 * rng.normal(size=(3, count))
+    now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
+    omega, quaternion = rates.copy(), np.repeat(START[:, None], count, axis=1)
+    bodies = rigid_cases.Bodies(moments, np.zeros(3), forcing)
+    rigid_cases.advance(rigid_cases.Stretch(bodies, now, omega, quaternion, torque), duration)
+    for case, (first, second, third) in enumerate(moments.T.tolist()):
+        begin, end = float(now[case]), float(now[case] + duration[case])
+        alone = rigid.integrate((first, second, third), torque[:, case], rates[:, case], START, begin, end, forcing)[
+            -1
+        ].final
+        assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(np.concatenate(alone), abs=1e-12)
+
+
+def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:
+    """A sphere at rest, spun up by so much that its last turns are much faster than the first."""
+    drive = symmetric.Drive(np.array([0.0]), np.array([0.3 + 0.1j]), np.array([0.0]))
+    rest, none, duration = np.zeros(1, dtype=complex), np.zeros(1), np.array([40.0])
+    steps = list(symmetric.steps(drive, rest, none, none, duration, 1))
+    assert steps[0].duration[0] < 40.0 / symmetric.count_for(drive, rest, none, duration)
+    assert sum(len(one.starts) * one.duration[0] for one in steps) == pytest.approx(40.0)
+    turn = symmetric.whole(np.concatenate([one.turn.sum(axis=0) for one in steps], axis=1))
+    angle = 0.5 * abs(0.3 + 0.1j) * 40.0**2  # about one axis: the turn is that of the angle
+    assert turn[0, 0] == pytest.approx(math.cos(0.5 * angle), abs=1e-11)

@@ -1,4 +1,4 @@
-"""Valves: impulse and centroid against the thrust itself, commands there and back, and what the shape does to ω."""
+"""Valves and tanks: impulse and centroid against the thrust itself, commands there and back, and what they do to ω."""
 
 from __future__ import annotations
 
@@ -15,164 +15,124 @@ from nutdamp.physics import rates
 from nutdamp.physics.feed import Cold, Tank
 from nutdamp.physics.valve import Measured, Ramp, Trapezoid, Valve, shape_factor, spread
 
-UNIT = reference.vector(1.0, 0.0, 0.0)
-
 TABLE = Measured(((0.02, 0.015, 0.016), (0.05, 0.046, 0.033), (0.1, 0.095, 0.058)))
-
-
-def thrust_of(valve: Trapezoid, on_time: float) -> list[reference.Swell]:
-    """The thrust as the reference has it, over full thrust."""
-    return reference.through_valve(
-        0.0,
-        on_time,
-        UNIT,
-        opening=valve.open_delay,
-        closing=valve.close_delay,
-        rise=valve.rise_time,
-        fall=valve.fall_time,
-    )
-
-
-def moments_of(swells: list[reference.Swell]) -> tuple[float, float, float]:
-    """∫ f dt, ∫ t f dt / ∫ f dt and ∫ (t - centroid)² f dt / ∫ f dt by quadrature."""
-
-    def integral(power: int, about: float = 0.0) -> float:
-        return math.fsum(
-            quad(lambda t, one=one: (t - about) ** power * float(one.at(t)[0]), one.start, one.end, epsabs=0.0)[0]
-            for one in swells
-        )
-
-    total = integral(0)
-    centroid = integral(1) / total
-    return total, centroid, integral(2, centroid) / total
+PLAIN = Trapezoid(0.008, 0.012, 0.005, 0.010)
 
 
 def random_valves(count: int) -> list[Trapezoid]:
-    chosen = random.Random(14)
-    found = []
+    """Some with no rise, some with no fall."""
+    chosen, valves = random.Random(14), []
     for number in range(count):
-        times = [chosen.uniform(0.0, 0.03) for _ in range(4)]
-        if number % 4 == 1:
-            times[2] = 0.0
-        if number % 4 == 2:
-            times[3] = 0.0
-        found.append(Trapezoid(times[0], times[1], times[2], times[3]))
-    return found
+        opening, closing, rise, fall = (chosen.uniform(0.0, 0.03) for _ in range(4))
+        valves.append(Trapezoid(opening, closing, 0.0 if number % 4 == 1 else rise, 0.0 if number % 4 == 2 else fall))
+    return valves
 
 
-@pytest.mark.parametrize("valve", random_valves(24), ids=repr)
-@pytest.mark.parametrize("on_time", [0.031, 0.05, 0.4], ids=["triangle or not", "short", "long"])
-def test_impulse_and_centroid_are_those_of_the_thrust(valve: Trapezoid, on_time: float) -> None:
-    swells = thrust_of(valve, on_time)
-    found = valve.thrust(on_time)
-    if not swells:
-        assert found.ramps == ()
-        return
-    total, centroid, variance = moments_of(swells)
-    assert found.on_time == pytest.approx(total, rel=1e-12)
-    assert found.centroid == pytest.approx(centroid, rel=1e-12)
-    assert spread(found.ramps, found.centroid) == pytest.approx(math.sqrt(12.0 * variance), rel=1e-9)
-    assert np.array(found.ramps)[:, :2] == pytest.approx(np.array([one[:2] for one in swells]), abs=1e-15)
+@pytest.mark.parametrize("valve", random_valves(12), ids=repr)
+def test_impulse_and_centroid_are_those_of_the_thrust(valve: Trapezoid) -> None:
+    """∫ f dt, ∫ t f dt / ∫ f dt and ∫ (t - centroid)² f dt / ∫ f dt by quadrature; triangles, and none, among them."""
+    unit = reference.vector(1, 0, 0)
+    for on_time in (0.004, 0.031, 0.4):
+        swells = reference.through_valve(
+            0.0,
+            on_time,
+            unit,
+            opening=valve.open_delay,
+            closing=valve.close_delay,
+            rise=valve.rise_time,
+            fall=valve.fall_time,
+        )
+
+        def integral(power: int, about: float = 0.0, swells: list[reference.Swell] = swells) -> float:
+            return math.fsum(
+                quad(lambda t, one=one: (t - about) ** power * float(one.at(t)[0]), one.start, one.end, epsabs=0.0)[0]
+                for one in swells
+            )
+
+        thrust = valve.thrust(on_time)
+        if not swells:
+            assert thrust.ramps == ()
+            continue
+        total = integral(0)
+        centroid = integral(1) / total
+        assert (thrust.on_time, thrust.centroid) == pytest.approx((total, centroid), rel=1e-12)
+        width = math.sqrt(12.0 * integral(2, centroid) / total)
+        assert spread(thrust.ramps, thrust.centroid) == pytest.approx(width, rel=1e-9)
+        assert np.array(thrust.ramps)[:, :2] == pytest.approx(np.array([one[:2] for one in swells]), abs=1e-15)
 
 
-@pytest.mark.parametrize("valve", [*random_valves(24), TABLE], ids=repr)
-def test_commands_there_and_back(valve: Valve) -> None:
-    chosen = random.Random(7)
-    for _ in range(50):
-        on_time = chosen.uniform(0.02, 0.1)
+@pytest.mark.parametrize("valve", [*random_valves(8), TABLE], ids=repr)
+def test_commands_there_and_back_and_reaches_bound_every_lead_and_lag(valve: Valve) -> None:
+    for on_time in np.linspace(0.02, 0.1, 50).tolist():
         acts = valve.thrust(on_time).on_time
         if acts > 0.0:
             assert valve.on_time_for(acts) == pytest.approx(on_time, rel=1e-10, abs=1e-15)
+    lead, lag = valve.reaches(valve.thrust(0.03).on_time, valve.thrust(0.1).on_time)
+    leads, lags = [], []
+    for on_time in np.linspace(0.03, 0.1, 4001).tolist():
+        acts, centroid, ramps = valve.thrust(on_time)
+        if ramps:
+            leads.append(centroid - 0.5 * acts)
+            lags.append(max(ramps[-1].end, on_time) - centroid - 0.5 * acts)
+    assert -1e-15 <= lead - max(leads) < 1e-6
+    assert -1e-15 <= lag - max(lags) < 1e-6
 
 
-def test_full_thrust_by_the_formula() -> None:
-    """F(τ + close - open + (fall - rise)/2), and a triangle that grows with the square of the time open."""
-    valve = Trapezoid(0.008, 0.012, 0.005, 0.010)
-    assert valve.thrust(0.05).on_time == pytest.approx(0.05 + 0.012 - 0.008 + 0.0025, rel=1e-14)
+def test_thrust_by_the_formula() -> None:
+    """F(τ + close - open + (fall - rise)/2); a triangle, with the square of the time open; effective: the impulse."""
+    assert PLAIN.thrust(0.05).on_time == pytest.approx(0.05 + 0.012 - 0.008 + 0.0025, rel=1e-14)
     slow = Trapezoid(0.0, 0.0, 0.1, 0.3)
     assert slow.thrust(0.05).on_time == pytest.approx(0.25 * slow.thrust(0.1).on_time, rel=1e-14)
-
-
-def test_a_valve_of_no_times_is_the_command() -> None:
-    found = Trapezoid().thrust(0.05)
-    assert found[:2] == pytest.approx((0.05, 0.025), rel=1e-15)
-    assert found.ramps == (Ramp(0.0, 0.05, 1.0, 1.0),)
+    acts, centroid, ramps = Trapezoid().thrust(0.05)
+    assert (acts, centroid) == pytest.approx((0.05, 0.025), rel=1e-15)
+    assert ramps == (Ramp(0.0, 0.05, 1.0, 1.0),)
     assert Trapezoid().on_time_for(0.05) == 0.05
-
-
-def test_an_effective_on_time_is_the_impulse() -> None:
-    valve = Trapezoid(0.008, 0.012, 0.005, 0.010, effective=True)
-    command = Trapezoid(0.008, 0.012, 0.005, 0.010).on_time_for(0.05)
-    assert valve.thrust(0.05).on_time == pytest.approx(0.05, rel=1e-14)
-    assert valve.thrust(0.05) == Trapezoid(0.008, 0.012, 0.005, 0.010).thrust(command)
-    assert valve.on_time_for(0.05) == 0.05
+    effective = Trapezoid(0.008, 0.012, 0.005, 0.010, effective=True)
+    assert effective.thrust(0.05).on_time == pytest.approx(0.05, rel=1e-14)
+    assert effective.thrust(0.05) == PLAIN.thrust(PLAIN.on_time_for(0.05))
+    assert effective.on_time_for(0.05) == 0.05
 
 
 def test_a_table_gives_its_rows_and_what_lies_between() -> None:
-    for on_time, effective, centroid in TABLE.rows:
-        found = TABLE.thrust(on_time)
-        assert (found.on_time, found.centroid) == pytest.approx((effective, centroid), rel=1e-14)
-    between = TABLE.thrust(0.035)
-    assert (between.on_time, between.centroid) == pytest.approx((0.0305, 0.0245), rel=1e-14)
-    assert between.ramps[0].begin == pytest.approx(0.0245 - 0.5 * 0.0305)
-
-
-@pytest.mark.parametrize("valve", [*random_valves(12), TABLE], ids=repr)
-def test_reaches_bound_every_lead_and_lag(valve: Valve) -> None:
-    low, high = valve.thrust(0.03).on_time, valve.thrust(0.1).on_time
-    lead, lag = valve.reaches(low, high)
-    leads, lags = [], []
-    for on_time in np.linspace(0.03, 0.1, 4001).tolist():
-        found = valve.thrust(on_time)
-        if not found.ramps:
-            continue
-        leads.append(found.centroid - 0.5 * found.on_time)
-        lags.append(max(found.ramps[-1].end, on_time) - found.centroid - 0.5 * found.on_time)
-    assert -1e-15 <= lead - max(leads) < 1e-6
-    assert -1e-15 <= lag - max(lags) < 1e-6
+    for on_time, effective, centroid in (*TABLE.rows, (0.035, 0.0305, 0.0245)):
+        assert TABLE.thrust(on_time)[:2] == pytest.approx((effective, centroid), rel=1e-14)
+    assert TABLE.thrust(0.035).ramps[0].begin == pytest.approx(0.0245 - 0.5 * 0.0305)
 
 
 @pytest.mark.parametrize("a", [0.333, -0.5, 0.0])
 @pytest.mark.parametrize("axial", [0.0, 4.0])
 def test_the_shape_acts_on_omega_as_dop853_says(a: float, axial: float) -> None:
     """One impulse at the centroid, with the factor, leaves the ω that the trapezoid leaves."""
-    A, spin, valve = 120.0, 3.0, Trapezoid(0.1, 0.2, 0.3, 0.7)
-    C = A * (1.0 - a)
-    moments, torque = (A, A, C), reference.vector(8.0, 3.0, axial)
-    swells = reference.through_valve(0.5, 0.9, torque, opening=0.1, closing=0.2, rise=0.3, fall=0.7)
+    A, C, spin = 120.0, 120.0 * (1.0 - a), 3.0
+    shape = {"opening": 0.1, "closing": 0.2, "rise": 0.3, "fall": 0.7}
+    swells = reference.through_valve(0.5, 0.9, reference.vector(8.0, 3.0, axial), **shape)
     end = swells[-1].end
-    flown = reference.fly(moments, reference.vector(0.05, 0.02, spin), swells, end).rates
-    found = valve.thrust(0.9)
-    factor = shape_factor(a, spin, axial / C, found.ramps, found.centroid)
-    centroid, jump = 0.5 + found.centroid, axial * found.on_time / C
-    turned = cmath.exp(-1j * a * (spin * centroid))
-    omega = (0.05 + 0.02j) * turned + complex(8.0, 3.0) * found.on_time / A * factor
-    omega *= cmath.exp(-1j * a * (spin + jump) * (end - centroid))
+    flown = reference.fly((A, A, C), reference.vector(0.05, 0.02, spin), swells, end).rates
+    acts, centroid, ramps = Trapezoid(*shape.values()).thrust(0.9)
+    factor = shape_factor(a, spin, axial / C, ramps, centroid)
+    jump = axial * acts / C
+    omega = (0.05 + 0.02j) * cmath.exp(-1j * a * spin * (0.5 + centroid)) + (8.0 + 3.0j) * acts / A * factor
+    omega *= cmath.exp(-1j * a * (spin + jump) * (end - 0.5 - centroid))
     assert flown[2] == pytest.approx(spin + jump, rel=1e-12)
     assert complex(flown[0], flown[1]) == pytest.approx(omega, abs=1e-12)
 
 
-@pytest.mark.parametrize(("spin_rate", "growth", "drift"), [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.05, -0.02)])
-def test_the_shape_factor_of_a_rectangle_is_the_width_factor(spin_rate: float, growth: float, drift: float) -> None:
+@pytest.mark.parametrize("turns", [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.05, -0.02)])
+def test_the_shape_factor_of_a_rectangle_is_the_width_factor(turns: tuple[float, float, float]) -> None:
+    """By spin rate, growth and drift."""
     for on_time in (1e-4, 0.3, 9.0):
-        found = Trapezoid().thrust(on_time)
-        shape = shape_factor(0.4, 3.0, spin_rate, found.ramps, found.centroid, growth, drift)
-        assert shape == pytest.approx(rates.width_factor(0.4, 3.0, spin_rate, on_time, growth, drift), abs=1e-13)
+        _, centroid, ramps = Trapezoid().thrust(on_time)
+        factor = shape_factor(0.4, 3.0, turns[0], ramps, centroid, *turns[1:])
+        assert factor == pytest.approx(rates.width_factor(0.4, 3.0, turns[0], on_time, *turns[1:]), abs=1e-13)
 
 
-def test_cold_pulses_warm_up() -> None:
-    cold = Cold(0.9, 4.0)
-    assert cold.factor(0) == pytest.approx(0.9)
-    assert 1.0 - cold.factor(4) == pytest.approx(0.1 / math.e)
-    assert cold.factor(400) == 1.0
-
-
-def test_blowdown_keeps_pressure_times_volume() -> None:
+def test_cold_pulses_warm_up_and_blowdown_keeps_pressure_times_volume() -> None:
     """Boyle: with gas of V0 beside the propellant, p V is the same full and empty, and in between."""
+    cold = Cold(0.9, 4.0)
+    assert [cold.factor(k) for k in (0, 4, 400)] == pytest.approx([0.9, 1.0 - 0.1 / math.e, 1.0])
     tank = Tank(30.0, 22e5, 8e5, 1.0)
-    density = 1000.0
-    gas = 30.0 / density / (22.0 / 8.0 - 1.0)
+    gas = 30.0 / 1000.0 / (22.0 / 8.0 - 1.0)  # of a density of 1000 kg/m³
     for used in (0.0, 7.0, 30.0):
-        assert tank.pressure_after(used) * (gas + used / density) == pytest.approx(22e5 * gas, rel=1e-14)
+        assert tank.pressure_after(used) * (gas + used / 1000.0) == pytest.approx(22e5 * gas, rel=1e-14)
     assert tank.thrust_factor(30.0) == pytest.approx(8.0 / 22.0)
     assert Tank(30.0, 22e5, 8e5, 0.0).thrust_factor(12.0) == 1.0
