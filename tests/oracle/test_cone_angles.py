@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from support import reference
 from support.builders import channel, spinner
 from support.cases import deep, spread
+from support.golden import check_text
 from support.places import case
 from support.process import Run
 
@@ -26,16 +28,20 @@ from nutdamp.schedule import Schedule, channel_pulse
 ROWS = 4001
 """Moments of the reference motion; between them the angle stays below its largest by 1e-6 of its swing."""
 
-BODIES = [
-    ((100.0, 130.0, 180.0), (0.4, 0.0, 2.0)),
-    ((100.0, 130.0, 180.0), (-0.2, 0.3, -2.0)),
-    ((120.0, 100.0, 80.0), (0.05, 0.2, 3.0)),
-    ((38.2, 35.1, 22.7), (0.0, 1e-3, 0.7)),
-    ((100.0, 130.0, 180.0), (1.5, 0.2, 0.3)),  # about axis 1: axis 3 is turned over
-]
 
-
-@pytest.mark.parametrize(("moments", "rates"), BODIES)
+@spread(
+    ("moments", "rates"),
+    [
+        ((100.0, 130.0, 180.0), (1.5, 0.2, 0.3)),  # about axis 1: axis 3 is turned over
+        ((100.0, 130.0, 180.0), (0.4, 0.0, 2.0)),
+        ((100.0, 130.0, 180.0), (-0.2, 0.3, -2.0)),
+        ((120.0, 100.0, 80.0), (0.05, 0.2, 3.0)),
+        ((120.0, 100.0, 80.0), (4.0, 0.0, -1.0)),  # beyond the separatrix
+        ((38.2, 35.1, 22.7), (0.0, 1e-3, 0.7)),
+    ],
+    quick=2,
+    deep=4,
+)
 def test_the_cones_of_an_arc_are_those_where_its_nutation_is_largest(
     moments: tuple[float, float, float], rates: tuple[float, float, float]
 ) -> None:
@@ -44,13 +50,13 @@ def test_the_cones_of_an_arc_are_those_where_its_nutation_is_largest(
     motion = reference.coast(moments, start, np.zeros(3), np.linspace(0.01, 40.0, ROWS))
     angles = [reference.nutation(moments, one.rates, sense) for one in motion]
     widest = int(np.argmax(angles))
-    found = arc_cones(moments, rates, sense)
-    assert found.nutation == pytest.approx(angles[widest], rel=2e-5)
-    body = reference.angle(motion[widest].rates, np.array([0.0, 0.0, sense]))
-    assert found.body == pytest.approx(body, rel=2e-5)
+    cones = arc_cones(moments, rates, sense)
+    assert cones.nutation == pytest.approx(angles[widest], rel=2e-5)
+    assert cones.body == pytest.approx(reference.angle(motion[widest].rates, np.array([0.0, 0.0, sense])), rel=2e-5)
     # From the other end of the axis the largest angle is π less the least.
-    other = arc_cones(moments, rates, -sense)
-    assert other.nutation == pytest.approx(math.pi - min(angles), rel=2e-5)
+    assert arc_cones(moments, rates, -sense).nutation == pytest.approx(math.pi - min(angles), rel=2e-5)
+    left = flight.flown(replace(spinner(moments=moments), omega0=np.array(rates)), Schedule()).residual
+    assert (left.nutation, left.body_cone) == pytest.approx((cones.nutation, cones.body), rel=1e-12)
 
 
 @spread("moments", [(120.0, 100.0, 80.0), (300.0, 316.0, 440.0), (100.0, 110.0, 190.0)], quick=1, deep=2)
@@ -67,14 +73,14 @@ def test_a_small_nutation_turns_as_fast_as_that_of_the_reference(
     second = np.cross(third, first) / np.linalg.norm(third)
     seen = np.array([[one.rotation[:, 2] @ first, one.rotation[:, 2] @ second] for one in motion])
     within = np.array([one.rates[:2] for one in motion])
-    for found, path in ((body.inertial_period, seen), (body.body_period, within)):
+    for period, path in ((body.inertial_period, seen), (body.body_period, within)):
         turned = np.unwrap(np.arctan2(path[:, 1], path[:, 0]))
-        assert math.tau / found == pytest.approx(abs(np.polyfit(times, turned, 1)[0]), rel=2e-4)
+        assert math.tau / period == pytest.approx(abs(np.polyfit(times, turned, 1)[0]), rel=2e-4)
 
 
 @pytest.mark.parametrize("name", ["state-three-moments.yaml", "tensor-microsat.yaml", "disperse-three-moments.yaml"])
 def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
-    """Header, both residuals, track and JSON of a body with I1 ≠ I2."""
+    """Header, both residuals, track, JSON and dispersed closed form of a body with I1 ≠ I2."""
     body = load(case(name))
     assert not body.inertia.symmetric
     until = 3.0 * body.body_period
@@ -84,70 +90,53 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
     assert said["nutation_deg"] == pytest.approx(said["body_cone_deg"] + said["space_cone_deg"], rel=1e-14)
     assert said["nutation_at_start_deg"] == pytest.approx(math.degrees(now), rel=1e-12)
     for fly in (flight.flown, flight.by_impulses):
-        made = fly(body, Schedule(), until)
-        left = residual_json(made.residual)
-        track = made.sampled(2000, until)
+        flown = fly(body, Schedule(), until)
+        left, track = residual_json(flown.residual), flown.sampled(2000, until)
         assert track.nutation[0] == pytest.approx(now, rel=1e-9)
         assert math.degrees(track.nutation.max()) == pytest.approx(said["nutation_deg"], rel=1e-4)
         for key in ("nutation_deg", "body_cone_deg", "space_cone_deg"):
             assert left[key] == pytest.approx(said[key], rel=1e-12)
-        assert f"nutation at most {said['nutation_deg']:.4g} deg" in title(made)
-        assert "at most" in title(made)
+        assert f"nutation at most {said['nutation_deg']:.4g} deg" in title(flown)
+    model = Model(body, Schedule())
+    out = np.empty((len(OUTPUTS), 1))
+    measure(model, ClosedForm(model)(model.cases({})), out)
+    assert out[:3, 0] == pytest.approx([now, 0.0, 0.0], rel=1e-12, abs=1e-12)  # nutation, shift of H, axis error
 
 
 def test_the_angles_around_the_pulses_are_those_of_what_is_left() -> None:
     """So the last line of a table of pulses says what the residual says, and the first what the header says."""
     push = channel("T", 4.0, 1.0, 0.0)
     body = spinner(moments=(100.0, 130.0, 180.0), channels=(push,))
-    made = flight.flown(body, Schedule((channel_pulse(push, 1.0, 0.5), channel_pulse(push, 4.0, 0.7))), 20.0)
-    before, after = made.around_pulses()
-    left = made.residual
-    assert after.nutation[-1] == pytest.approx(left.nutation, rel=1e-12)
-    assert after.body_cone[-1] == pytest.approx(left.body_cone, rel=1e-12)
+    flown = flight.flown(body, Schedule((channel_pulse(push, 1.0, 0.5), channel_pulse(push, 4.0, 0.7))), 20.0)
+    before, after = flown.around_pulses()
+    left = flown.residual
+    assert (after.nutation[-1], after.body_cone[-1]) == pytest.approx((left.nutation, left.body_cone), rel=1e-12)
     assert before.nutation[0] == pytest.approx(body.nutation, rel=1e-12)
     assert before.nutation[1] == pytest.approx(after.nutation[0], rel=1e-10)
     assert before.space_cone + before.body_cone == pytest.approx(before.nutation, rel=1e-12)
-
-
-def test_impulses_at_the_centres_move_a_body_of_three_moments_as_real_widths_do() -> None:
-    """Effective impulses turn by the rate of the true body: at small angles the two agree to their square."""
-    push = channel("T", 4.0, 1.0, 0.0)
+    # Effective impulses turn by the rate of the true body: at small angles both models agree to their square.
     for moments in ((100.0, 130.0, 180.0), (120.0, 100.0, 80.0)):
         body = spinner(moments=moments, degrees=0.01, channels=(push,))
-        made = Schedule((channel_pulse(push, 0.9, 1.2),))
-        wide, sharp = (fly(body, made).residual.nutation for fly in (flight.flown, flight.by_impulses))
-        assert sharp == pytest.approx(wide, rel=2e-4)
+        wide = Schedule((channel_pulse(push, 0.9, 1.2),))
+        real, sharp = (fly(body, wide).residual.nutation for fly in (flight.flown, flight.by_impulses))
+        assert sharp == pytest.approx(real, rel=2e-4)
 
 
-def test_free_motion_has_no_axis_error_in_the_closed_form_either() -> None:
-    model = Model(load(case("disperse-three-moments.yaml")), Schedule())
-    out = np.empty((len(OUTPUTS), 1))
-    measure(model, ClosedForm(model)(model.cases({})), out)
-    nutation, shift, error, *_ = out[:, 0]
-    assert shift == pytest.approx(0.0, abs=1e-12)
-    assert error == pytest.approx(0.0, abs=1e-12)
-    assert nutation == pytest.approx(model.spacecraft.tilt, rel=1e-12)
-
-
-def test_dispersed_free_motion_has_no_axis_error(run: Run, tmp_path: Path) -> None:
-    done = run(
-        *("disperse", str(case("disperse-three-moments.yaml")), "--scheme", "none", "--samples", "100"),
-        *("--json", "disperse.json"),
-    )
-    assert done.returncode == 4, done.stderr
-    found = json.loads((tmp_path / "disperse.json").read_text())["percentiles"]
-    assert found["axis_error_deg"]["max"] == pytest.approx(0.0, abs=1e-9)
-    assert found["nutation_deg"]["max"] == pytest.approx(math.degrees(math.atan2(130.0 * 0.4, 360.0)), abs=1.0)
-
-
-def test_a_state_of_ten_degrees_starts_at_ten_degrees(run: Run) -> None:
-    name = str(case("state-three-moments.yaml"))
+def test_commands_disperse_and_start_free_motion_as_it_is(run: Run, tmp_path: Path) -> None:
+    cases = str(case("disperse-three-moments.yaml")), "--scheme", "none", "--samples", "100", "--json", "disperse.json"
+    assert run("disperse", *cases).returncode == 4
+    percentiles = json.loads((tmp_path / "disperse.json").read_text())["percentiles"]
+    assert percentiles["axis_error_deg"]["max"] == pytest.approx(0.0, abs=1e-9)
+    assert percentiles["nutation_deg"]["max"] == pytest.approx(math.degrees(math.atan2(130.0 * 0.4, 360.0)), abs=1.0)
+    simulate = "simulate", str(case("state-three-moments.yaml")), "--scheme", "none"
     for flown in ((), ("--flown",)):
-        done = run("simulate", name, "--scheme", "none", "--csv", "-", "--samples", "2", *flown)
-        header, first, *_ = done.stdout.splitlines()
+        screen = run(*simulate, "--csv", "-", "--samples", "2", *flown)
+        header, first, *_ = screen.stdout.splitlines()
         row = dict(zip(header.split(","), map(float, first.split(",")), strict=True))
-        assert row["nutation_deg"] == pytest.approx(10.0, rel=1e-12)
-        axis = np.array([row[f"axis_{part}"] for part in "xyz"])
-        momentum = np.array([row[f"momentum_{part}_Nms"] for part in "xyz"])
-        assert math.degrees(reference.angle(axis, momentum)) == pytest.approx(10.0, rel=1e-12)
-    assert "nutation         10 deg at t = 0, at most" in run("simulate", name, "--scheme", "none").stdout
+        axis, momentum = (
+            [row[f"{name}_{part}{unit}"] for part in "xyz"] for name, unit in (("axis", ""), ("momentum", "_Nms"))
+        )
+        apart = math.degrees(reference.angle(np.array(axis), np.array(momentum)))
+        assert (row["nutation_deg"], apart) == pytest.approx((10.0, 10.0), rel=1e-12)
+    nutation = next(line for line in run(*simulate).stdout.splitlines() if line.startswith("nutation  "))
+    check_text("cones.at-start", nutation)

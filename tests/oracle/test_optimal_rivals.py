@@ -19,10 +19,6 @@ def beats(seed: int, rival: float | None) -> None:
         assert flies(spacecraft, free_axis=free_axis).pulses.cost_in("kg") <= 1.01 * rival
 
 
-def test_the_layouts_are_not_too_hard_for_the_rival() -> None:
-    assert sum(row["cost_kg"] is not None for row in GOLDEN) > 0.8 * len(GOLDEN) >= 240
-
-
 @pytest.mark.deep
 @spread("row", GOLDEN[:200], quick=3, deep=0, ids=lambda row: row["seed"])
 def test_as_cheap_as_the_rival(row: dict[str, float]) -> None:
@@ -32,5 +28,5 @@ def test_as_cheap_as_the_rival(row: dict[str, float]) -> None:
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(1000, 1024))
 def test_as_cheap_as_a_rival_searched_for_here(seed: int) -> None:
-    found = rivals.cheapest(*rivals.strong_layout(seed), starts=12, seed=seed)
-    beats(seed, None if found is None else found.cost)
+    rival = rivals.cheapest(*rivals.strong_layout(seed), starts=12, seed=seed)
+    beats(seed, None if rival is None else rival.cost)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
-from support.spinning import EPS, about, plain_spinners
+from support.spinning import EPS, about, spinners
 
 from nutdamp.physics import inertia, stability, triaxial
 
@@ -164,7 +164,7 @@ def test_principal_tilt(tilt: float) -> None:
     assert stability.principal_tilt(axes) == pytest.approx(tilt, abs=1e-14)
 
 
-@plain_spinners
+@spinners
 def test_nutation_in_three_frames(A: float, C: float, spin: float) -> None:
     omega0, step, start = 0.2 + 0.1j, 0.1, reference.Motion(reference.vector(0.2, 0.1, spin), np.eye(3))
     turning = stability.nutation_rates(A, C, abs(omega0), spin)
