@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support.reference import RTOL, Array, Motion, _turning
 
+Triple = tuple[float, float, float]
 EPS = float(np.finfo(float).eps)
 
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (100.0, 200.0), (100.0, 5.0)]

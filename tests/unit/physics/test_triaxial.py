@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
+from operator import mul
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipj, ellipk
 from support import reference
-from support.cases import spread
+from support.cases import deep, spread
 from support.golden import refused
 from support.reference import Array
 
@@ -29,55 +29,30 @@ rate = st.floats(-3.0, 3.0).map(lambda x: x if abs(x) > 1e-100 else 0.0)
 turns = st.lists(rate, min_size=3, max_size=3).map(np.array)
 
 
-def taylor_terms(
-    coupling: tuple[Decimal, Decimal, Decimal], state: list[Decimal], step: Decimal, with_attitude: bool
-) -> list[list[Decimal]]:
-    """Terms of the Taylor series of rates and quaternion over one step of half a radian, to order 30."""
-    series = [[value] for value in state]
-
-    def of(i: int, j: int) -> Decimal:
-        """Last coefficient of the product of two series."""
-        return sum(map(operator.mul, series[i], reversed(series[j])), Decimal(0))
-
-    for k in range(30):
-        f = step / (k + 1)
-        following = [f * coupling[0] * of(1, 2), f * coupling[1] * of(2, 0), f * coupling[2] * of(0, 1)]
-        if with_attitude:
-            following += [
-                -f / 2 * (of(4, 0) + of(5, 1) + of(6, 2)),
-                f / 2 * (of(3, 0) + of(5, 2) - of(6, 1)),
-                f / 2 * (of(3, 1) + of(6, 0) - of(4, 2)),
-                f / 2 * (of(3, 2) + of(4, 1) - of(5, 0)),
-            ]
-        for terms, value in zip(series, following, strict=False):
-            terms.append(value)
-    return series
-
-
-def to_forty_digits(
-    moments: Sequence[float], rates0: Sequence[float], times: Array, with_attitude: bool
-) -> tuple[Array, Array]:
-    """Rates (n, 3) and attitudes (n, 4) by Taylor series of Euler's equations in decimal numbers of 40 digits.
-
-    Attitudes from `START`; zeros without them, which saves three quarters of the work.
-    """
+def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: Array) -> Array:
+    """Rates (n, 3) by Taylor series of Euler's equations in decimal numbers of 40 digits, half a radian a step."""
     track = []
     with localcontext() as context:
         context.prec = 40
         i1, i2, i3 = (Decimal(moment) for moment in moments)
-        coupling = ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)
-        state = [Decimal(float(rate)) for rate in rates0]
-        state += [Decimal(float(q) if with_attitude else 0) for q in START]
-        now = Decimal(0)
+        state, now = [Decimal(float(rate)) for rate in rates0], Decimal(0)
         for time in times.tolist():
             steps = math.ceil((time - float(now)) * math.hypot(*rates0) / 0.5)
             step = (Decimal(time) - now) / steps
             for _ in range(steps):
-                state = [sum(terms, Decimal(0)) for terms in taylor_terms(coupling, state, step, with_attitude)]
+                one, two, three = series = [[value] for value in state]
+                for k in range(1, 31):
+                    products = [
+                        sum(map(mul, u, reversed(v)), Decimal(0)) for u, v in ((two, three), (three, one), (one, two))
+                    ]
+                    for terms, coupling, product in zip(
+                        series, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3), products, strict=True
+                    ):
+                        terms.append(step / k * coupling * product)
+                state = [sum(terms, Decimal(0)) for terms in series]
             now = Decimal(time)
             track.append([float(value) for value in state])
-    result = np.array(track)
-    return result[:, :3], result[:, 3:]
+    return np.array(track)
 
 
 def turned(first: Array, second: Array) -> float:
@@ -108,55 +83,56 @@ def test_jacobi_functions_are_those_of_scipy() -> None:
         assert triaxial._quarter(1.0 - m) == pytest.approx(float(ellipk(m)), rel=1e-14)
 
 
-@pytest.mark.deep
-def test_hundred_periods_to_every_digit() -> None:
-    moments, rates0 = [1.0, 1.5, 2.375], [0.5, -0.25, 0.75]
-    times = np.linspace(0.0, 100.0, 11)[1:] * triaxial.nutation_period(moments, rates0)
-    track, _ = to_forty_digits(moments, rates0, times, with_attitude=False)
-    assert off(triaxial.free_rates(moments, rates0, times), track) < 2e-13
-    _, attitudes = to_forty_digits(moments, rates0, 0.2 * times, with_attitude=True)
-    assert turned(triaxial.free_attitude(moments, rates0, START, 0.2 * times), attitudes) < 4e-13
+def assert_obeys(moments: Sequence[float] | Array, rates0: Sequence[float] | Array, late: float) -> None:
+    """From a point of the track a radian on by DOP853: so short that no separatrix magnifies its errors."""
+    size = max(float(np.linalg.norm(rates0)), 1e-3)
+    times = np.array([late, late + 1.0]) / size
+    track, attitudes = flown(moments, rates0, times)
+    start = reference.Motion(track[0], attitude.matrix(attitudes[0]))
+    (end,) = reference.coast(list(moments), start, np.zeros(3), times[1:] - times[0])
+    assert end.rates == pytest.approx(track[1], abs=1e-12 * size)
+    assert reference.turned(end.rotation, attitude.matrix(attitudes[1])) < 2e-12
 
 
-@spread("nudge", [1e-2, -1e-4, 1e-8, -1e-12, 2.0**-52, -(2.0**-52)], quick=1)
-def test_near_the_separatrix(nudge: float) -> None:
-    """3·1·ω3² = 1.5·0.5·ω1² on it."""
-    moments, rates0 = [1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)]
-    period = triaxial.nutation_period(moments, rates0)
-    times = np.linspace(0.0, 3.0, 31)[1:] * period
-    track, _ = to_forty_digits(moments, rates0, times, with_attitude=False)
-    assert off(triaxial.free_rates(moments, rates0, times), track) < 1e-12
-    assert 20.0 < period < 500.0
+ON_SEPARATRIX = [[0.5, 0.375, 0.25], [-0.5, 0.375, 0.25], [0.5, -0.375, -0.25], [-0.5, -0.375, 0.25], [0.5, 0.0, -0.25]]
+"""Rates of 1.5, 2, 3 kg m²: 3·1·ω3² = 1.5·0.5·ω1²."""
+NUDGES = [2.0**-52, 1e-2, -1e-4, 1e-8, -1e-12, -(2.0**-52)]
+NEARLY = {
+    apart: [
+        ([1.0, 1.0 + apart, 1.0 + 2 * apart], [0.5, 0.25, 1.0], 12.0, 1e-14),  # a sphere
+        ([1.0, 1.5, 1.5 * (1 + apart)], [0.5, 0.25, 1.0], 12.0, 1e-14),  # equal to the spin axis
+        ([1.5 * (1 + apart), 1.0, 1.5], [1e-9, 0.25, 1.0], 12.0, 1e-14),
+    ]
+    for apart in (1e-3, 1e-6, 1e-12, 2.0**-52)
+}
 
 
-@spread("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, 1), (1, 0, -1)], quick=2)
-def test_on_the_separatrix(signs: tuple[int, int, int]) -> None:
-    moments, rates0 = [1.5, 2.0, 3.0], [0.5 * signs[0], 0.375 * signs[1], 0.25 * signs[2]]
-    times = np.linspace(0.0, 40.0, 11)[1:]
-    track, attitudes = to_forty_digits(moments, rates0, times, with_attitude=True)
-    rates, quaternions = flown(moments, rates0, times)
-    assert off(rates, track) < 1e-14
-    assert turned(quaternions, attitudes) < 1e-13
+@pytest.mark.parametrize(
+    ("moments", "rates0", "until", "close"),
+    [
+        deep([1.0, 1.5, 2.375], [0.5, -0.25, 0.75], 1300.0, 2e-13),  # a hundred periods
+        *[([1.5, 2.0, 3.0], rates0, 40.0, 1e-14) for rates0 in ON_SEPARATRIX],
+        *[([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 100.0, 1e-12) for nudge in NUDGES[:2]],
+        *[deep([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 300.0, 1e-12) for nudge in NUDGES[2:]],
+        *NEARLY[2.0**-52],
+        *[deep(*row) for apart in (1e-3, 1e-6, 1e-12) for row in NEARLY[apart]],
+    ],
+)
+def test_rates_to_every_digit(moments: list[float], rates0: list[float], until: float, close: float) -> None:
+    times = np.linspace(0.0, until, 11)[1:]
+    assert off(triaxial.free_rates(moments, rates0, times), forty_digits(moments, rates0, times)) < close
+    for time in (0.0, 0.4 * until, until):
+        assert_obeys(moments, rates0, time * math.hypot(*rates0))
+
+
+@pytest.mark.parametrize("rates0", ON_SEPARATRIX)
+def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[float]) -> None:
+    moments = [1.5, 2.0, 3.0]
     assert triaxial.nutation_period(moments, rates0) == math.inf
     assert extremes(moments, rates0)[1] == pytest.approx(math.pi / 2, rel=1e-15)
-    # It ends in a spin about the middle axis and stays there.
-    end = triaxial.free_rates(moments, rates0, [1e4])[0]
+    (end,) = triaxial.free_rates(moments, rates0, [1e4])
     assert abs(end[[0, 2]]).max() < 1e-300
     assert moments[1] * abs(end[1]) == pytest.approx(np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14)
-
-
-@spread("apart", [1e-3, 1e-6, 1e-12, 2.0**-52], quick=1)
-def test_nearly_a_sphere_and_nearly_equal_to_the_spin_axis(apart: float) -> None:
-    times = np.array([5.0, 12.0])
-    for moments, rates0 in (
-        ([1.0, 1.0 + apart, 1.0 + 2 * apart], [0.5, 0.25, 1.0]),
-        ([1.0, 1.5, 1.5 * (1 + apart)], [0.5, 0.25, 1.0]),
-        ([1.5 * (1 + apart), 1.0, 1.5], [1e-9, 0.25, 1.0]),
-    ):
-        track, attitudes = to_forty_digits(moments, rates0, times, with_attitude=True)
-        rates, quaternions = flown(moments, rates0, times)
-        assert off(rates, track) < 1e-14
-        assert turned(quaternions, attitudes) < 1e-13
 
 
 @spread("moments", [(2.0, 3.0, 4.0), (4.0, 3.0, 2.0), (3.0, 4.0, 2.0), (1.0, 1.9, 1.8), (2.0, 2.0, 3.0)], quick=1)
@@ -170,17 +146,9 @@ def test_against_dop853(moments: tuple[float, float, float], rates0: tuple[float
         assert reference.turned(motion.rotation, attitude.matrix(quaternion)) < 1e-11
 
 
-@settings(max_examples=60)
 @given(moments=bodies, rates0=turns, late=st.floats(0.0, 300.0))
 def test_any_motion_obeys_eulers_equations(moments: Array, rates0: Array, late: float) -> None:
-    """From any point of the track a radian on by DOP853: so short that no separatrix magnifies its errors."""
-    size = max(float(np.linalg.norm(rates0)), 1e-3)
-    times = np.array([late, late + 1.0]) / size
-    track, attitudes = flown(moments, rates0, times)
-    start = reference.Motion(track[0], attitude.matrix(attitudes[0]))
-    (end,) = reference.coast(moments.tolist(), start, np.zeros(3), times[1:] - times[0])
-    assert end.rates == pytest.approx(track[1], abs=1e-12 * size)
-    assert reference.turned(end.rotation, attitude.matrix(attitudes[1])) < 2e-12
+    assert_obeys(moments, rates0, late)
 
 
 @settings(max_examples=80)
