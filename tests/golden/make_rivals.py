@@ -1,8 +1,9 @@
-"""Makes rivals.json: what the independent search of tests/rivals.py finds for 300 layouts of strong thrusters.
+"""Makes rivals.json: what the independent search of support/rivals.py finds for 300 layouts of strong thrusters.
 
     python tests/golden/make_rivals.py
 
-Nothing of nutdamp's planning takes part. Takes some ten minutes of processor time.
+Nothing of nutdamp's planning takes part. Takes some ten minutes of processor time. Each row is the cheapest schedule
+found for one layout: cost in kg (null: none), pulses as channel, start, on-time.
 """
 
 from __future__ import annotations
@@ -18,29 +19,16 @@ if __name__ == "__main__":
 
 from support import rivals
 
-FILE = Path(__file__).with_name("rivals.json")
-
-LAYOUTS = 300
-
-STARTS = 30
-"""Random starts for each layout."""
-
 
 def row(seed: int) -> dict[str, Any]:
-    """The cheapest schedule found for one layout: cost in kg (null: none), pulses as channel, start, on-time."""
-    found = rivals.cheapest(*rivals.strong_layout(seed), starts=STARTS, seed=seed)
-    if found is None:
+    """The row of one layout, of 30 random starts."""
+    best = rivals.cheapest(*rivals.strong_layout(seed), starts=30, seed=seed)
+    if best is None:
         return {"seed": seed, "cost_kg": None}
-    return {"seed": seed, "cost_kg": found.cost, "pulses": [pulse for pulse in found.pulses if pulse[2] > 0.0]}
-
-
-def main() -> None:
-    """Search and write."""
-    with ProcessPoolExecutor() as pool:
-        rows = list(pool.map(row, range(LAYOUTS)))
-    text = ",\n".join(json.dumps(one) for one in rows)
-    FILE.write_text(f"[\n{text}\n]\n", encoding="utf-8")
+    return {"seed": seed, "cost_kg": best.cost, "pulses": [pulse for pulse in best.pulses if pulse[2] > 0.0]}
 
 
 if __name__ == "__main__":
-    main()
+    with ProcessPoolExecutor() as pool:
+        rows = ",\n".join(map(json.dumps, pool.map(row, range(300))))
+    Path(__file__).with_name("rivals.json").write_text(f"[\n{rows}\n]\n", encoding="utf-8")
