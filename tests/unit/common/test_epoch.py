@@ -1,17 +1,20 @@
-"""Moments of UTC: exact, with leap seconds, read and written as ISO 8601."""
+"""Moments of UTC: exact, with leap seconds, read and written as ISO 8601; where the Sun is seen at each."""
 
 from __future__ import annotations
 
 import datetime
+import math
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import orekit
+from support import orekit, places
 from support.golden import check_text
 
 from nutdamp.epoch import FIRST_DAY, LEAP_DAYS, Epoch
+from nutdamp.physics import attitude, sun
 
 
 def test_the_leap_seconds_are_those_of_another_list() -> None:
@@ -111,3 +114,11 @@ def test_days_count_from_j2000_in_terrestrial_time_and_barycentric_time_swings()
     for day, ahead in (("2026-04-04", 1.6e-3), ("2026-10-05", -1.6e-3), ("2026-01-04", 0.0)):
         difference = Epoch.parse(f"{day}T00:00:00", "TT").since(Epoch.parse(f"{day}T00:00:00", "TDB"))
         assert difference == pytest.approx(ahead, abs=1e-4)
+
+
+def test_the_direction_of_the_sun_is_right_to_a_hundredth_of_a_degree_from_1972_to_2100() -> None:
+    """Against ERFA (golden/make_sun.py)."""
+    rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
+    errors = [float(attitude.angle_between(sun.direction(days), row)) for days, *row in rows.tolist()]
+    assert len(errors) == 100
+    assert math.degrees(max(errors)) < 0.01

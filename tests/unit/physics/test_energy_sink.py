@@ -37,7 +37,7 @@ class Body(NamedTuple):
         return np.column_stack([omega.real, omega.imag, spin]), np.array([attitude.matrix(one) for one in turned])
 
     @property
-    def moments(self) -> tuple[float, float, float]:
+    def moments(self) -> Triple:
         return self.A, self.A, self.C
 
     @property

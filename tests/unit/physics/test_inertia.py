@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
-from support.spinning import EPS, about, spinners
+from support.spinning import EPS, Triple, about, spinners
 
 from nutdamp.physics import inertia, stability, triaxial
 
@@ -26,7 +26,7 @@ directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(
 
 @given(st.tuples(*[st.floats(0.5, 1.0)] * 3), directions, st.floats(-math.pi, math.pi), st.sampled_from([1e-6, 1, 1e6]))
 def test_rotated_tensor_is_diagonal_in_its_principal_axes(
-    moments: tuple[float, float, float], axis: tuple[float, float, float], angle: float, scale: float
+    moments: Triple, axis: Triple, angle: float, scale: float
 ) -> None:
     R = about(axis, angle)
     tensor = scale * R @ np.diag(moments) @ R.T
@@ -41,7 +41,7 @@ def test_rotated_tensor_is_diagonal_in_its_principal_axes(
 
 @given(st.permutations([1.0, 0.9, 0.7]), directions, st.floats(-0.5, 0.5))
 def test_axes_are_named_by_the_axes_of_the_file_they_are_near_to(
-    moments: list[float], axis: tuple[float, float, float], angle: float
+    moments: list[float], axis: Triple, angle: float
 ) -> None:
     """A turn of less than 30° permutes nothing: axis 3 nearest the file's third, axis 1 nearest its first."""
     R = about(axis, angle)
@@ -86,9 +86,7 @@ def test_axes_that_the_tensor_leaves_open() -> None:
         ((3.0, 4.0, 3.0 * (1 + 1e-13)), (3.0, 4.0, 3.0 * (1 + 1e-13))),
     ],
 )
-def test_moments_that_differ_by_rounding_are_one(
-    moments: tuple[float, float, float], expected: tuple[float, float, float]
-) -> None:
+def test_moments_that_differ_by_rounding_are_one(moments: Triple, expected: Triple) -> None:
     settled = inertia.settled(moments)
     assert settled == pytest.approx(expected, rel=2 * EPS)
     assert inertia.settled(settled) == settled
@@ -143,7 +141,7 @@ def test_growth_is_what_integration_shows() -> None:
 
 
 @given(st.tuples(*[st.floats(0.1, 1.0)] * 3), st.floats(0.1, 5.0) | st.floats(-5.0, -0.1))
-def test_stable_is_extreme(sides: tuple[float, float, float], spin: float) -> None:
+def test_stable_is_extreme(sides: Triple, spin: float) -> None:
     x, y, z = sides
     first, second, third = moments = (y + z, z + x, x + y)
     kind, result = stability.axis_class(moments), stability.growth(moments, spin)

@@ -11,7 +11,7 @@ from support import reference
 from support.cases import spread
 from support.golden import refused
 from support.reference import Array, vector
-from support.spinning import EPS, driven, turning
+from support.spinning import EPS, Triple, driven, turning
 
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, rigid, rigid_cases
@@ -34,17 +34,16 @@ CASES = {
     "spin reversed": ((120.0, 120.0, 80.0), (1.0, 2.0, -40.0), (0.05, 0.1, 4.0)),
     "from rest": ((120.0, 120.0, 80.0), (10.0, 5.0, 7.0), (0.0, 0.0, 0.0)),
 }
-Three = tuple[float, float, float]
 
 
-def last(moments: Three, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
+def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
     """Rates and quaternion at the end of a flight from `START`."""
     return rigid.integrate(moments, torque, rates, START, begin, end)[-1].final
 
 
 @spread("turns", [False, True], quick=2, ids=["fixed", "turning"])
 @spread(("moments", "torque", "rates"), CASES.values(), quick=3, ids=CASES)
-def test_motion_under_fixed_and_turning_torques(moments: Three, torque: Three, rates: Three, turns: bool) -> None:
+def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple, rates: Triple, turns: bool) -> None:
     """At the ends of the pieces and within them."""
     times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
     pieces = rigid.integrate(
@@ -73,7 +72,7 @@ def test_pieces_join_without_gap_or_jump() -> None:
 
 
 @pytest.mark.parametrize("moments", MOMENTS)
-def test_energy_and_momentum_stay_without_torque(moments: Three) -> None:
+def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
     rates = vector(0.6, -0.3, 2.0)
     later, quaternion = last(moments, np.zeros(3), rates, 0.0, 100.0)
     # One rounding in each of about a hundred steps.

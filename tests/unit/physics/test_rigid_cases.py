@@ -14,7 +14,7 @@ from support import reference
 from support.cases import deep, spread
 from support.golden import refused
 from support.reference import Array, Kick, Motion, Push
-from support.spinning import driven, turning
+from support.spinning import Triple, driven, turning
 
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude
@@ -57,7 +57,7 @@ class Case(NamedTuple):
 
 def cases(
     count: int,
-    moments: tuple[float, float, float] = SYMMETRIC,
+    moments: Triple = SYMMETRIC,
     spin: float = 3.0,
     starts: tuple[float, ...] = (0.4, 2.9),
     on_times: tuple[float, ...] = (0.5, 0.3),
@@ -187,7 +187,7 @@ def forced(case: Case, number: int) -> Motion:
     quick=1,
     ids=["constant", "turning", "growing", "all"],
 )
-def test_disturbances_and_dissipation(moments: tuple[float, float, float], constant: Array, forcing: Forcing) -> None:
+def test_disturbances_and_dissipation(moments: Triple, constant: Array, forcing: Forcing) -> None:
     case = cases(4, moments, constant=constant, forcing=forcing)
     for number in (0, 3):
         assert_is(case.fly(), number, forced(case, number), 1e-11)
@@ -195,7 +195,7 @@ def test_disturbances_and_dissipation(moments: tuple[float, float, float], const
 
 @pytest.mark.deep
 @spread("moments", [SYMMETRIC, OBLATE], quick=1)
-def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: tuple[float, float, float]) -> None:
+def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: Triple) -> None:
     growth = math.copysign(1 / 40, moments[0] - moments[2])
     case = cases(6, moments, starts=(0.5, 200.0), on_times=(0.5, 0.0), forcing=Forcing(growth=growth))
     case.rates[:2, 0] = 3.0  # far out already

@@ -16,6 +16,7 @@ from support import reference
 from support.cases import deep, spread
 from support.golden import refused
 from support.reference import Array
+from support.spinning import Triple
 
 from nutdamp.physics import attitude, cones, rates, triaxial
 
@@ -137,7 +138,7 @@ def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[
 
 @spread("moments", [(2.0, 3.0, 4.0), (4.0, 3.0, 2.0), (3.0, 4.0, 2.0), (1.0, 1.9, 1.8), (2.0, 2.0, 3.0)], quick=1)
 @spread("rates0", [(0.3, 0.2, 1.0), (0.3, -0.2, -1.0), (-1.0, 0.1, 0.3), (0.3, 1.0, 0.2)], quick=8)
-def test_against_dop853(moments: tuple[float, float, float], rates0: tuple[float, float, float]) -> None:
+def test_against_dop853(moments: Triple, rates0: Triple) -> None:
     times = np.linspace(0.0, 60.0, 13)[1:]
     theirs = reference.coast(moments, reference.Motion(np.array(rates0), attitude.matrix(START)), np.zeros(3), times)
     track, attitudes = flown(moments, rates0, times)
@@ -235,7 +236,7 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
         ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0)),
     ],
 )
-def test_rates_that_stay(moments: tuple[float, float, float], rates0: tuple[float, float, float]) -> None:
+def test_rates_that_stay(moments: Triple, rates0: Triple) -> None:
     times, size = np.linspace(0.0, 100.0, 11), math.hypot(*rates0)
     track, attitudes = flown(moments, rates0, times)
     assert track == pytest.approx(np.tile(rates0, (11, 1)), rel=1e-15)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from support import reference
+from support.spinning import Triple
 
 from nutdamp.physics import rates
 from nutdamp.physics.feed import Cold, Tank
@@ -118,7 +119,7 @@ def test_the_shape_acts_on_omega_as_dop853_says(a: float, axial: float) -> None:
 
 
 @pytest.mark.parametrize("turns", [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.05, -0.02)])
-def test_the_shape_factor_of_a_rectangle_is_the_width_factor(turns: tuple[float, float, float]) -> None:
+def test_the_shape_factor_of_a_rectangle_is_the_width_factor(turns: Triple) -> None:
     """By spin rate, growth and drift."""
     for on_time in (1e-4, 0.3, 9.0):
         _, centroid, ramps = Trapezoid().thrust(on_time)

@@ -1,22 +1,14 @@
-"""Where the Sun is seen, against ERFA (golden/make_sun.py) and, where it runs, Orekit."""
+"""Where the Sun is seen, against Orekit."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
-from support import orekit, places
+from support import orekit
 
 from nutdamp.epoch import Epoch
 from nutdamp.physics import attitude, sun
-
-
-def test_the_direction_is_right_to_a_hundredth_of_a_degree_from_1972_to_2100() -> None:
-    rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
-    errors = [float(attitude.angle_between(sun.direction(days), row)) for days, *row in rows.tolist()]
-    assert len(errors) == 100
-    assert math.degrees(max(errors)) < 0.01
 
 
 @pytest.mark.orekit
