@@ -1,16 +1,21 @@
-"""Flights: exact arcs, the impulse sum and the real widths, against conservation laws and the reference integrator."""
+"""Flights: exact arcs, the impulse sum and the real widths, against conservation laws and the reference integrator,
+of this moment and as golden/make_golden.py kept it.
+"""
 
 from __future__ import annotations
 
 import cmath
 import itertools
+import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from make_golden import FILE, event, fly
 from scipy.optimize import brentq
 from support import reference
 from support.builders import events, pulse, spinner, transverse
@@ -18,7 +23,7 @@ from support.spinning import EPS, about
 
 from nutdamp import flight
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Pulse, Schedule
 from nutdamp.spacecraft import Attitude, Inertia, Spacecraft, Vector
 
 UNTIL = 12.0
@@ -182,9 +187,9 @@ def test_a_pulse_of_nothing_changes_nothing_and_the_mirror_body_flies_the_mirror
 ) -> None:
     """Spin reversed, torques mirrored: mirrored rates, and the same angles."""
     more = Schedule((*made, pulse(max(time, 0.5 * on_time), on_time, np.zeros(3), "idle")))
-    for fly in (flight.flown, flight.by_impulses) if spacecraft.inertia.symmetric else (flight.flown,):
+    for model in (flight.flown, flight.by_impulses) if spacecraft.inertia.symmetric else (flight.flown,):
         assert_same(
-            state_at(fly(spacecraft, more, 13.0), 13.0), state_at(fly(spacecraft, made, 13.0), 13.0), 1e-12, 1e-12
+            state_at(model(spacecraft, more, 13.0), 13.0), state_at(model(spacecraft, made, 13.0), 13.0), 1e-12, 1e-12
         )
     pulses = (pulse(one.t, one.on_time, mirrored(one.impulse), one.channel) for one in made)
     other_body = replace(spacecraft, omega0=mirrored(spacecraft.omega0))
@@ -204,7 +209,9 @@ def test_the_impulse_sum_gives_the_rates_after_real_widths_exactly(spacecraft: S
     ends = sorted((one.start, one.end, one.impulse[2]) for one in made)
     if any(later[0] < earlier[1] for earlier, later in itertools.pairwise(ends)):
         made = Schedule(tuple(pulse(one.t, one.on_time, one.impulse * (1, 1, 0)) for one in made))
-    summed, flown = (state_at(fly(spacecraft, made, 13.0), 13.0).rates for fly in (flight.by_impulses, flight.flown))
+    summed, flown = (
+        state_at(model(spacecraft, made, 13.0), 13.0).rates for model in (flight.by_impulses, flight.flown)
+    )
     assert summed == pytest.approx(flown, abs=1e-11 * max(1.0, float(np.linalg.norm(flown))))
 
 
@@ -215,8 +222,8 @@ def test_the_direction_of_h_after_real_widths_is_not_that_of_the_impulse_sum() -
     a_factor, factor = (math.sin(x) / x for x in (0.5 * 3.0 * tau / 3, 0.5 * 3.0 * tau))
     assert flight.effective_impulses(spacecraft, made)[0] == pytest.approx(1e-3 * a_factor, rel=4 * EPS)
     # Second order in angles of 1e-5 rad.
-    for fly, share in ((flight.flown, factor), (flight.by_impulses, a_factor)):
-        assert fly(spacecraft, made).residual.momentum_shift == pytest.approx(1e-3 * share / (80.0 * 3.0), rel=1e-4)
+    for model, share in ((flight.flown, factor), (flight.by_impulses, a_factor)):
+        assert model(spacecraft, made).residual.momentum_shift == pytest.approx(1e-3 * share / (80.0 * 3.0), rel=1e-4)
     ideal = Schedule((pulse(1.0, 0.0, np.array([3.0, -4.0, 50.0])), pulse(2.0, 0.0, np.array([0.0, 1.0, 0.0]))))
     assert flight.effective_impulses(spinner(), ideal) == pytest.approx([3.0 - 4.0j, 1.0j], rel=2 * EPS)
 
@@ -244,3 +251,50 @@ def test_residuals_without_pulses_after_spin_reversal_and_of_a_pulse_that_the_cl
     sphere = spinner(120.0, 120.0)  # so that only the pulse changes ω
     settled = flight.flown(sphere, Schedule((pulse(1e5, 1e-12, np.array([6.0, 0.0, 0.0])),))).settled
     assert settled.omega - transverse(sphere.omega0) == pytest.approx(6.0 / 120.0, rel=1e-6)
+
+
+# --- golden numbers --------------------------------------------------------------------------------------------------
+
+GOLDEN: dict[str, dict[str, Any]] = json.loads(FILE.read_text(encoding="utf-8"))
+CLOSE = 1e-10
+"""rad, and relative for rates and H; the reference adds up a few 1e-12."""
+
+
+def fired(given: dict[str, Any]) -> Pulse:
+    one = event(given)
+    if isinstance(one, reference.Kick):
+        return Pulse(one.t, 0.0, "T", one.impulse)
+    on_time = one.end - one.start
+    return Pulse(one.start + 0.5 * on_time, on_time, "T", one.torque * on_time, one.torque)
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_flown_is_golden(name: str) -> None:
+    golden = GOLDEN[name]
+    first, second, third = golden["moments_kgm2"]
+    body = Spacecraft(name, Inertia((first, second, third)), np.array(golden["rates_rad_s"]))
+    flown = flight.flown(body, Schedule(tuple(fired(one) for one in golden["pulses"])))
+    end = flown.settled
+    size = float(np.linalg.norm(golden["end_rates_rad_s"]))
+    assert end.rates == pytest.approx(golden["end_rates_rad_s"], abs=CLOSE * size)
+    # Frame N of a body of three different moments is laid by the H of its equivalent symmetric one.
+    start = attitude.matrix(body.initial.quaternion)
+    to_n = reference.frame_n(golden["moments_kgm2"], body.omega0) @ start.T
+    assert reference.turned(to_n @ attitude.matrix(end.quaternion), np.array(golden["end_rotation"])) < CLOSE
+    h = to_n @ attitude.rotate(end.quaternion, end.rates * np.array(flown.moments))
+    assert h == pytest.approx(golden["momentum_Nms"], abs=CLOSE * float(np.linalg.norm(h)))
+    left = flown.residual
+    assert left.momentum_shift == pytest.approx(golden["momentum_shift_rad"], abs=CLOSE)
+    assert flown.sampled(2, flown.legs[-1].end).nutation[-1] == pytest.approx(golden["nutation_rad"], abs=CLOSE)
+    assert left.space_cone + left.body_cone == pytest.approx(left.nutation, abs=1e-15 * math.pi)
+    if body.inertia.symmetric:
+        assert left.nutation == pytest.approx(golden["nutation_rad"], abs=CLOSE)
+    else:  # the largest on the arc that follows
+        assert left.nutation >= golden["nutation_rad"] - CLOSE
+
+
+@pytest.mark.parametrize("name", ["prolate, wide pulses", "three different moments, coast and pulses"])
+def test_the_script_makes_what_the_file_holds(name: str) -> None:
+    """So that the script cannot rot."""
+    for key, value in fly(GOLDEN[name]).items():
+        assert np.array(GOLDEN[name][key]) == pytest.approx(np.array(value), abs=1e-9)

@@ -66,7 +66,7 @@ BODIES = {
 every_body = pytest.mark.parametrize("one", BODIES.values(), ids=BODIES)
 
 
-@spread("one", BODIES.values(), quick=4, deep=5, ids=BODIES)
+@spread("one", BODIES.values(), quick=2, deep=7, ids=BODIES)
 def test_the_arc_agrees_with_dop853(one: Body) -> None:
     """On H in space and the attitude. Energy falls, the size of H stays."""
     times = np.linspace(0.0, 100.0, 6)
@@ -93,18 +93,6 @@ def test_the_example_of_the_course() -> None:
     # In the end flat, at 30 rpm.
     assert rates[7, 2] == pytest.approx(0.0, abs=1e-100)
     assert across[7] * 30 / math.pi == pytest.approx(30.0, rel=1e-3)
-
-
-@given(st.sampled_from(sorted(BODIES)), st.floats(0.0, 1e4), st.floats(0.0, 1e4))
-def test_an_arc_is_made_of_arcs(name: str, first: float, second: float) -> None:
-    one = BODIES[name]
-    omega, spin, middle = energy_sink.arc_end(one.A, one.C, one.growth, QUATERNION, one.omega, one.spin, first)
-    omega, spin, end = energy_sink.arc_end(one.A, one.C, one.growth, middle, omega, spin, second)
-    rates, turned = one.arc(first + second)
-    # Near flat spin, what the first arc's rounding does to θ is what the second makes of it: up to e^{κt} as much.
-    loose = 1e-9 if one.growth < 0.0 or second < 500.0 else 1e-6
-    assert [omega.real, omega.imag, spin] == pytest.approx(rates[0].tolist(), abs=loose)
-    assert reference.turned(attitude.matrix(end), turned[0]) < loose
 
 
 @every_body

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad
 from support import reference
 from support.spinning import BODIES, driven, plain_spinners, spinners, turning
 
@@ -45,18 +44,6 @@ def test_stepwise_torques_8_9_10(A: float, C: float, spin: float) -> None:
     omega, spins = forced.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
     expected = np.array([motion.rates for motion in motions])
     assert np.abs(np.column_stack([omega.real, omega.imag, spins]) - expected).max() < 1e-11
-
-
-def test_real_form_9_is_the_complex_one() -> None:
-    A, C, spin = PROLATE
-    torque, omega0, t = (4.0, -7.0), (0.1, 0.2), 2.3
-    one = quad(lambda s: (torque[0] * math.cos(RATE * (t - s)) + torque[1] * math.sin(RATE * (t - s))) / A, 0, t)[0]
-    two = quad(lambda s: (torque[1] * math.cos(RATE * (t - s)) - torque[0] * math.sin(RATE * (t - s))) / A, 0, t)[0]
-    omega1 = omega0[0] * math.cos(RATE * t) + omega0[1] * math.sin(RATE * t) + one
-    omega2 = omega0[1] * math.cos(RATE * t) - omega0[0] * math.sin(RATE * t) + two
-    edges, torques = np.array([0.0, t]), np.array([[*torque, 0.0]])
-    omega, _ = forced.stepwise_torque(np.array([t]), complex(*omega0), spin, A, C, edges, torques)
-    assert omega[0] == pytest.approx(complex(omega1, omega2), abs=1e-14)
 
 
 @given(st.floats(-30, 30), st.floats(-5, 5) | st.sampled_from([0.0, 1e-9, -1e-6, 1e-3]), st.floats(0.01, 15))
@@ -108,19 +95,6 @@ def test_rotating_torques_23_24(A: float, C: float, spin: float) -> None:
     omega = rotating(times, 0.2 - 0.1j, A, C, spin, *torques)
     assert omega[0] == pytest.approx(0.2 - 0.1j)
     assert np.abs(omega[1:] - expected).max() < 1e-11
-
-
-def test_omega0_of_the_print_of_24_is_an_integration_constant() -> None:
-    """With ω(0) given it is ω(0) + iΣ m_p/(a + b_p); read as ω(0) itself, (24) is wrong."""
-    A, C, spin = PROLATE
-    a, alpha, b, m, start = (A - C) / A, spin * 2.0, 0.6, (2.0 + 1.0j) / (A * spin), 0.2 - 0.1j
-    omega = rotating([2.0], start, A, C, spin, (m * A * spin, b * spin))[0]
-
-    def printed(omega0: complex) -> complex:
-        return omega0 * cmath.exp(-1j * a * alpha) - 1j * m / (a + b) * cmath.exp(1j * b * alpha)
-
-    assert omega == pytest.approx(printed(start + 1j * m / (a + b)), abs=1e-14)
-    assert abs(omega - printed(start)) > 1e-3
 
 
 @pytest.mark.parametrize("detuning", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])

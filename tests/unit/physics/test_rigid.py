@@ -44,11 +44,16 @@ def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float)
 @spread("turns", [False, True], quick=2, ids=["fixed", "turning"])
 @spread(("moments", "torque", "rates"), CASES.values(), quick=3, ids=CASES)
 def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple, rates: Triple, turns: bool) -> None:
-    """At the ends of the pieces and within them."""
+    """At the ends of the pieces, which join without gap or jump, and within them."""
     times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
     pieces = rigid.integrate(
         moments, np.array(torque), np.array(rates), START, 1.3, 10.0, Forcing(TURNING if turns else ())
     )
+    assert (len(pieces) > 3, pieces[0].start) == (True, 1.3)
+    assert pieces[-1].start + pieces[-1].duration == pytest.approx(10.0, rel=EPS)
+    for one, two in itertools.pairwise(pieces):
+        assert one.start + one.duration == pytest.approx(two.start, rel=EPS)
+        assert one.final[0] == pytest.approx(two.at(np.array([two.start]))[0][0], abs=1e-15)
     expected = driven(
         moments, reference.Motion(np.array(rates), np.eye(3)), lambda t: np.add(torque, acting(t)).tolist(), times
     )
@@ -59,16 +64,6 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
         assert omega == pytest.approx(motion.rates, abs=FLOWN * max(1.0, size))
         # A torque of 500 N m turns the body through some hundred radians.
         assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN * max(1.0, 0.5 * size)
-
-
-def test_pieces_join_without_gap_or_jump() -> None:
-    pieces = rigid.integrate(BODY, vector(5, 2, 1), vector(1, 2, 3), START, 2.0, 9.0)
-    assert len(pieces) > 3
-    assert pieces[0].start == 2.0
-    assert pieces[-1].start + pieces[-1].duration == pytest.approx(9.0, rel=EPS)
-    for one, two in itertools.pairwise(pieces):
-        assert one.start + one.duration == pytest.approx(two.start, rel=EPS)
-        assert np.array_equal(one.final[0], two.at(np.array([two.start]))[0][0])
 
 
 @pytest.mark.parametrize("moments", MOMENTS)
