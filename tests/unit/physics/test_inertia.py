@@ -73,24 +73,20 @@ def test_axes_that_the_tensor_leaves_open() -> None:
     assert axes == pytest.approx(np.eye(3), abs=4 * EPS)
 
 
-@pytest.mark.parametrize(
-    ("moments", "expected"),
-    [
-        ((100.00000003, 100.0, 100.0), (100.0, 100.0, 100.0)),
-        ((100.0, 100.0000000002, 100.0000000001), (100.0000000001,) * 3),  # I3 in the middle
-        ((100.0, 100.0, 100.00000009), (100.00000009,) * 3),
-        ((100.0, 100.00000015, 100.00000008), (100.00000008,) * 3),  # each within reach of I3, not of one another
-        ((120.0, 120.0 * (1 + 5e-10), 80.0), (120.0 * (1 + 2.5e-10), 120.0 * (1 + 2.5e-10), 80.0)),
-        ((120.0, 120.0 * (1 + 2e-9), 80.0), (120.0, 120.0 * (1 + 2e-9), 80.0)),
-        ((100.0, 100.0, 100.0000002), (100.0, 100.0, 100.0000002)),
-        ((3.0, 4.0, 3.0 * (1 + 1e-13)), (3.0, 4.0, 3.0 * (1 + 1e-13))),
-    ],
-)
-def test_moments_that_differ_by_rounding_are_one(moments: Triple, expected: Triple) -> None:
-    settled = inertia.settled(moments)
-    assert settled == pytest.approx(expected, rel=2 * EPS)
-    assert inertia.settled(settled) == settled
-    assert [settled[0] == one for one in settled] == [expected[0] == one for one in expected]
+def test_moments_that_differ_by_rounding_are_one() -> None:
+    apart, same = 120.0 * (1 + 2e-9), 120.0 * (1 + 2.5e-10)
+    for moments, expected in {
+        (100.00000003, 100.0, 100.0): (100.0, 100.0, 100.0),
+        (100.0, 100.0000000002, 100.0000000001): (100.0000000001,) * 3,  # I3 in the middle
+        (100.0, 100.0, 100.00000009): (100.00000009,) * 3,
+        (100.0, 100.00000015, 100.00000008): (100.00000008,) * 3,  # each within reach of I3, not of one another
+        (120.0, 120.0 * (1 + 5e-10), 80.0): (same, same, 80.0),
+        **{one: one for one in ((120.0, apart, 80.0), (100.0, 100.0, 100.0000002), (3.0, 4.0, 3.0 * (1 + 1e-13)))},
+    }.items():
+        settled = inertia.settled(moments)
+        assert settled == pytest.approx(expected, rel=2 * EPS)
+        assert inertia.settled(settled) == settled
+        assert [settled[0] == one for one in settled] == [expected[0] == one for one in expected]
 
 
 @given(st.floats(1e-3, 1e6), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))

@@ -16,7 +16,6 @@ from support import reference
 from support.cases import deep
 from support.golden import refused
 from support.reference import Array
-from support.spinning import Triple
 
 from nutdamp.physics import attitude, cones, rates, triaxial
 
@@ -202,26 +201,19 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
         assert rate == pytest.approx((first - axial) / first * spin, rel=1e-15 + 5 * apart)
 
 
-@pytest.mark.parametrize(
-    ("moments", "rates0"),
-    [
-        *[
-            ((2.0, 3.0, 4.0), rates0)
-            for rates0 in ((0.0, 0.0, -2.0), (0.0, 2.0, 0.0), (-2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        ],
-        ((3.0, 3.0, 3.0), (1.0, 2.0, -3.0)),
-        ((2.0, 2.0, 3.0), (1.0, 2.0, 0.0)),
-        ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0)),
-    ],
-)
-def test_rates_that_stay(moments: Triple, rates0: Triple) -> None:
-    times, size = np.linspace(0.0, 100.0, 11), math.hypot(*rates0)
-    track, attitudes = flown(moments, rates0, times)
-    assert track == pytest.approx(np.tile(rates0, (11, 1)), rel=1e-15)
-    half = 0.5 * size * times[:, None]
-    by_spin = attitude.multiply(START, np.hstack([np.cos(half), np.sin(half) * np.array(rates0) / (size or 1.0)]))
-    assert turned(attitudes, by_spin) < 2e-13
-    assert len(set(extremes(moments, rates0))) == 1
+def test_rates_that_stay() -> None:
+    """About each principal axis, at rest, and wherever moments are equal."""
+    times, body = np.linspace(0.0, 100.0, 11), (2.0, 3.0, 4.0)
+    for moments, rates0 in (
+        *[(body, (0.0, 0.0, -2.0)), (body, (0.0, 2.0, 0.0)), (body, (-2.0, 0.0, 0.0)), (body, (0.0, 0.0, 0.0))],
+        *[((3.0,) * 3, (1.0, 2.0, -3.0)), ((2.0, 2.0, 3.0), (1.0, 2.0, 0.0)), ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0))],
+    ):
+        size, (track, attitudes) = math.hypot(*rates0), flown(moments, rates0, times)
+        assert track == pytest.approx(np.tile(rates0, (11, 1)), rel=1e-15)
+        half = 0.5 * size * times[:, None]
+        by_spin = attitude.multiply(START, np.hstack([np.cos(half), np.sin(half) * np.array(rates0) / (size or 1.0)]))
+        assert turned(attitudes, by_spin) < 2e-13
+        assert len(set(extremes(moments, rates0))) == 1
 
 
 def test_period_has_its_limits() -> None:

@@ -29,37 +29,32 @@ def random_valves(count: int) -> list[Trapezoid]:
     return valves
 
 
+def thrust_of(valve: Trapezoid, start: float, on_time: float, torque: reference.Array) -> list[reference.Swell]:
+    """As the reference has it."""
+    delays = {"opening": valve.open_delay, "closing": valve.close_delay}
+    return reference.through_valve(start, on_time, torque, **delays, rise=valve.rise_time, fall=valve.fall_time)
+
+
+def integral(swells: list[reference.Swell], power: int, about: float = 0.0) -> float:
+    return math.fsum(
+        quad(lambda t, one=one: (t - about) ** power * float(one.at(t)[0]), one.start, one.end, epsabs=0.0)[0]
+        for one in swells
+    )
+
+
 @pytest.mark.parametrize("valve", random_valves(12), ids=repr)
 def test_impulse_and_centroid_are_those_of_the_thrust(valve: Trapezoid) -> None:
     """∫ f dt, ∫ t f dt / ∫ f dt and ∫ (t - centroid)² f dt / ∫ f dt by quadrature; triangles, and none, among them."""
-    unit = reference.vector(1, 0, 0)
     for on_time in (0.004, 0.031, 0.4):
-        swells = reference.through_valve(
-            0.0,
-            on_time,
-            unit,
-            opening=valve.open_delay,
-            closing=valve.close_delay,
-            rise=valve.rise_time,
-            fall=valve.fall_time,
-        )
-
-        def integral(power: int, about: float = 0.0, swells: list[reference.Swell] = swells) -> float:
-            return math.fsum(
-                quad(lambda t, one=one: (t - about) ** power * float(one.at(t)[0]), one.start, one.end, epsabs=0.0)[0]
-                for one in swells
-            )
-
-        thrust = valve.thrust(on_time)
-        if not swells:
-            assert thrust.ramps == ()
-            continue
-        total = integral(0)
-        centroid = integral(1) / total
-        assert (thrust.on_time, thrust.centroid) == pytest.approx((total, centroid), rel=1e-12)
-        width = math.sqrt(12.0 * integral(2, centroid) / total)
-        assert spread(thrust.ramps, thrust.centroid) == pytest.approx(width, rel=1e-9)
-        assert np.array(thrust.ramps)[:, :2] == pytest.approx(np.array([one[:2] for one in swells]), abs=1e-15)
+        swells, thrust = thrust_of(valve, 0.0, on_time, reference.vector(1, 0, 0)), valve.thrust(on_time)
+        assert len(thrust.ramps) == len(swells)
+        if swells:
+            total = integral(swells, 0)
+            centroid = integral(swells, 1) / total
+            assert (thrust.on_time, thrust.centroid) == pytest.approx((total, centroid), rel=1e-12)
+            width = math.sqrt(12.0 * integral(swells, 2, centroid) / total)
+            assert spread(thrust.ramps, thrust.centroid) == pytest.approx(width, rel=1e-9)
+            assert np.array(thrust.ramps)[:, :2] == pytest.approx(np.array([one[:2] for one in swells]), abs=1e-15)
 
 
 @pytest.mark.parametrize("valve", [*random_valves(8), TABLE], ids=repr)
@@ -105,11 +100,11 @@ def test_a_table_gives_its_rows_and_what_lies_between() -> None:
 def test_the_shape_acts_on_omega_as_dop853_says(a: float, axial: float) -> None:
     """One impulse at the centroid, with the factor, leaves the ω that the trapezoid leaves."""
     A, C, spin = 120.0, 120.0 * (1.0 - a), 3.0
-    shape = {"opening": 0.1, "closing": 0.2, "rise": 0.3, "fall": 0.7}
-    swells = reference.through_valve(0.5, 0.9, reference.vector(8.0, 3.0, axial), **shape)
+    valve = Trapezoid(0.1, 0.2, 0.3, 0.7)
+    swells = thrust_of(valve, 0.5, 0.9, reference.vector(8.0, 3.0, axial))
     end = swells[-1].end
     flown = reference.fly((A, A, C), reference.vector(0.05, 0.02, spin), swells, end).rates
-    acts, centroid, ramps = Trapezoid(*shape.values()).thrust(0.9)
+    acts, centroid, ramps = valve.thrust(0.9)
     factor = shape_factor(a, spin, axial / C, ramps, centroid)
     jump = axial * acts / C
     omega = (0.05 + 0.02j) * cmath.exp(-1j * a * spin * (0.5 + centroid)) + (8.0 + 3.0j) * acts / A * factor
