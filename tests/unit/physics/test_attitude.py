@@ -43,15 +43,9 @@ def start_of(A: float, C: float, theta: float, spin: float) -> tuple[complex, re
     return omega, reference.Motion(reference.vector(omega.real, omega.imag, spin), about((1, -2, 0.5), 1.2))
 
 
-def test_scalar_first_and_body_to_inertial() -> None:
-    """A quarter turn about axis 3 takes body axis 1 to y."""
-    quarter = np.array([math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)])
-    assert attitude.rotate(quarter, np.array([1.0, 0.0, 0.0])) == pytest.approx([0, 1, 0], abs=2 * EPS)
-
-
 @given(axes, angles, axes, angles, vectors)
 def test_quaternions_are_rodrigues_formula(axis: Array, angle: float, other: Array, by: float, vector: Array) -> None:
-    """A product turns by the right one first; `from_matrix` is the inverse of `matrix` but for the sign."""
+    """Scalar first, body to inertial; a product turns by the right one first; `from_matrix` is the inverse."""
     left, right = quaternion_of(axis, angle), quaternion_of(other, by)
     assert attitude.rotate(left, vector) == pytest.approx(about(axis, angle) @ vector, abs=100 * EPS)
     assert attitude.matrix(left) == pytest.approx(about(axis, angle), abs=10 * EPS)
@@ -110,11 +104,6 @@ def test_arc_is_the_motion_of_the_integrated_body(A: float, C: float, theta: flo
     assert attitude.arc_end(A, C, begin, omega, spin, float(times[2])) == pytest.approx(quaternions[2], abs=50 * EPS)
 
 
-def test_a_body_at_rest_stays() -> None:
-    quaternion = np.array([0.5, 0.5, 0.5, 0.5])
-    assert np.array_equal(attitude.arc(3.0, 2.0, quaternion, 0j, 0.0, np.array([7.0])), [quaternion])
-
-
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0)])
 def test_frame_n(A: float, C: float, spin: float) -> None:
@@ -136,7 +125,9 @@ def test_frame_n(A: float, C: float, spin: float) -> None:
     assert rotation @ sense == pytest.approx([0, 0, 1], abs=2 * EPS)
 
 
-def test_angular_momentum_in_body_axes() -> None:
+def test_angular_momentum_in_body_axes_and_rest() -> None:
+    quaternion = np.array([0.5, 0.5, 0.5, 0.5])
+    assert np.array_equal(attitude.arc(3.0, 2.0, quaternion, 0j, 0.0, np.array([7.0])), [quaternion])
     assert np.array_equal(attitude.angular_momentum(120.0, 80.0, 0.5 - 0.25j, -3.0), [60.0, -30.0, -240.0])
 
 
@@ -209,9 +200,3 @@ def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: fl
     x, y, z = sense * start.rotation[:, 2]
     assert sense * opposite.rotation[:, 2] == pytest.approx([-x, -y, z], abs=1e-11)
     assert sense * back.rotation[:, 2] == pytest.approx([x, y, z], abs=1e-11)
-
-
-def test_magnus_22_small_angle_form() -> None:
-    """Δt = πA/(Cω3) to second order in the nutation angle."""
-    size = cones.transverse_rate(120.0, 80.0, 1e-3, 3.0)
-    assert cones.half_turn(120.0, 80.0, size, 3.0) == pytest.approx(math.pi / 2 * (1 - 1e-6 / 2), rel=1e-11)
