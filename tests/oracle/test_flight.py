@@ -85,7 +85,7 @@ def by_reference(spacecraft: Spacecraft, made: Schedule, until: float) -> refere
 # --- against the reference -------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=16)
+@settings(max_examples=12)
 @given(any_spinners, schedules())
 def test_flown_is_the_motion_of_the_reference_integrator(spacecraft: Spacecraft, made: Schedule) -> None:
     """Overlapping pulses, axial torques, spin reversal and three different moments included; to 1e-9 rad."""
@@ -238,7 +238,8 @@ def test_a_long_pulse_takes_all_the_nutation_for_more_than_the_floor_and_moves_h
 
 def test_residuals_without_pulses_after_spin_reversal_and_of_a_pulse_that_the_clock_can_hardly_tell() -> None:
     left = flight.flown(spinner(degrees=5.0), Schedule()).residual
-    assert (math.degrees(left.nutation), left.momentum_shift) == (pytest.approx(5.0, rel=4 * EPS), 0.0)
+    assert math.degrees(left.nutation) == pytest.approx(5.0, rel=4 * EPS)
+    assert left.momentum_shift == 0.0
     # ω3 from 3 to -1 rad/s: H now points nearly along -e3, and nutation counts from the same end of the body.
     reversed_ = Schedule((pulse(1.0, 0.5, np.array([0.0, 0.0, -320.0])),))
     left = flight.flown(spinner(spin=3.0, degrees=2.0), reversed_).residual

@@ -40,7 +40,7 @@ def turning(*torques: tuple[complex, float]) -> Callable[[float], tuple[float, f
 def driven(
     moments: Sequence[float],
     motion: Motion,
-    torque: Callable[[float], Sequence[float]],
+    torque: Callable[[float], Sequence[float] | Array],
     times: Sequence[float] | Array,
     growth: float = 0.0,
 ) -> list[Motion]:

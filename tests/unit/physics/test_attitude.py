@@ -85,7 +85,7 @@ def test_angle_between_keeps_small_angles_whole_and_those_near_a_half_turn() -> 
         assert rest == pytest.approx(short, abs=2 * EPS * math.pi)
 
 
-@spread("spin", [2.0, -2.0], quick=2)
+@spread("spin", [2.0, -2.0], quick=1)
 @spread("theta", [0.0, 1e-9, math.radians(10), math.radians(60), math.radians(89)], quick=2, deep=3)
 @pytest.mark.parametrize(("A", "C"), BODIES.values(), ids=BODIES)
 def test_arc_is_the_motion_of_the_integrated_body(A: float, C: float, theta: float, spin: float) -> None:

@@ -39,8 +39,8 @@ def test_magnus_17_is_the_motion(A: float, C: float, spin: float) -> None:
     steps = [(0.5, -2), (1.5, -1), (2.2, -2), (4.0, -2)]
     axial = [reference.Kick(t, reference.vector(10 * t, -5, math.copysign(C, spin) * step)) for t, step in steps]
     for kicks, ends in ((across, spin), (axial, -4 * math.copysign(1, spin))):
-        (found,) = summed(A, C, start, kicks, 6.0)
-        assert found == pytest.approx(reference.fly((A, A, C), start, kicks, 6.0).rates, abs=FLOWN)
+        (found,) = summed(A, C, start, kicks, 4.5)
+        assert found == pytest.approx(reference.fly((A, A, C), start, kicks, 4.5).rates, abs=FLOWN)
         assert found[2] == pytest.approx(ends, rel=2 * EPS)
 
 

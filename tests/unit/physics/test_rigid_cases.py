@@ -168,8 +168,8 @@ def forced(case: Case, number: int) -> Motion:
         on = [push.torque for push in pushes if push.start < 0.5 * (begin + end) < push.end]
         steady = np.sum([case.bodies.constant, *on], axis=0)
 
-        def torque(t: float, steady: Array = steady) -> list[float]:
-            return np.add(steady, turned(t)).tolist()
+        def torque(t: float, steady: Array = steady) -> Array:
+            return np.asarray(steady + turned(t))
 
         (motion,) = driven(case.bodies.moments[:, number].tolist(), motion, torque, [begin, end], forcing.growth)
     return motion
