@@ -59,7 +59,7 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
     )
     for time, motion in zip(times[1:].tolist(), expected, strict=True):
         piece = next(one for one in pieces if time <= one.start + one.duration)
-        (omega,), (quaternion,) = piece.at(np.array([time]))
+        (_, omega), (_, quaternion) = piece.at(np.array([piece.start, time]))
         size = float(np.linalg.norm(motion.rates))
         assert omega == pytest.approx(motion.rates, abs=FLOWN * max(1.0, size))
         # A torque of 500 N m turns the body through some hundred radians.
