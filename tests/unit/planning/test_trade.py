@@ -198,7 +198,7 @@ def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_p
 
 def test_nothing_feasible_ends_with_status_3_and_a_reason(run: Run) -> None:
     text = "name: x\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"
-    text += "thrusters: [{name: T, torque: [1, 0, 0]}]\nlimits: {horizon: 0.1}\n"
+    text += "thrusters: [{name: T, torque: [1, 0, 0], min_on_time: 1 s}]\nlimits: {horizon: 0.1}\n"
     done = run("trade", "-", "--points", "1", "--allow", "any", stdin=text, columns=200)
     assert done.returncode == 3
     check_text("plan.trade-none", "\n".join(line.strip() for line in done.stdout.splitlines() if "none" in line))
