@@ -118,7 +118,7 @@ def test_where_nothing_is_better_the_plan_recommended_for_nominal_values_stays_o
     assert best(found).plan.pulses.cost <= min(close) * 1.001
 
 
-@pytest.mark.parametrize("moments", [deep(None), weekly((122.0, 118.0, 80.0))])
+@pytest.mark.parametrize("moments", [deep(None), deep((122.0, 118.0, 80.0))])
 @pytest.mark.usefixtures("untightened")
 def test_the_plan_in_which_most_cases_comply_by_flights_one_by_one(moments: tuple[float, float, float] | None) -> None:
     """Whatever the nominal plan costs; of those within the sampling error of the best the cheapest."""
