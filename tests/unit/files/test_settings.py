@@ -116,7 +116,7 @@ NO_SETTINGS = ("", "mass", "=3", "a..b=1", ".a=1", "a[=1", "a[1=2", "a]=1", "'a=
 
 
 def test_a_fault_names_the_setting_as_its_place() -> None:
-    lines = []
+    lines = list[str]()
     for setting in FAULTY:
         faults = faults_of(THRUSTERS + "limits: {horizon: 120 s}\n", setting)
         assert faults
