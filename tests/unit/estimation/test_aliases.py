@@ -52,7 +52,7 @@ def test_ratio_and_moments_are_told_with_their_sigmas_and_those_of_the_file() ->
     assert {key: rows[key].prior for key in ("C/A", "a", "A", "C")} == pytest.approx(
         {"C/A": both, "a": both, "A": 36.0, "C": 24.0}
     )
-    assert (rows["A"].change, rows["a"].source, rows["A"].file) == (pytest.approx(-2.0 / 36.0), "data", 120.0)
+    assert rows["A"].change == pytest.approx(-2.0 / 36.0)
+    assert (rows["a"].source, rows["A"].file) == ("data", 120.0)
     sure = told(nutdamp.example().replace(dispersions=None), silent("omega_1", "omega_2"), {}, {})
-    assert {one.key for one in estimates(sure, 0.0)} >= {"C/A", "a", "C"} - {"A"}
-    assert "A" not in {one.key for one in estimates(sure, 0.0)}
+    assert {one.key for one in estimates(sure, 0.0)} & {"C/A", "a", "A", "C"} == {"C/A", "a", "C"}

@@ -79,7 +79,8 @@ def test_without_nutation_there_is_an_empty_schedule_and_none_is_free_motion() -
         check_text("plan.nothing-to-damp", "\n".join(remarks(made)))
     free = plan(spinner(degrees=5.0), "none")
     assert free.flown is not None
-    assert (len(free.pulses), math.degrees(free.flown.nutation)) == (0, pytest.approx(5.0, rel=1e-14))
+    assert len(free.pulses) == 0
+    assert math.degrees(free.flown.nutation) == pytest.approx(5.0, rel=1e-14)
     body = spinner(moments=(121.2, 120.0, 80.0), channels=cross(8.0))
     check_text("plan.no-rounding", "\n".join(remarks(plan(body, "one-pulse"))))
 
