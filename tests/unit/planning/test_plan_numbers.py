@@ -11,11 +11,10 @@ import pytest
 from scipy.integrate import simpson
 from support import reference
 from support.builders import channel, cross, events, spinner
-from support.cases import spread
+from support.cases import deep
 
 from nutdamp.actuators import STANDARD_GRAVITY
 from nutdamp.planning import Plan, plan
-from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
@@ -30,6 +29,7 @@ JETS = (
     jet("T2", (0.5, 0.0, 0.8), (8.0, 2.0, 0.0)),
     jet("T3", (0.0, -0.5, 0.8), (0.0, -10.0, -3.0)),
 )
+BODY, REVERSED = spinner(channels=JETS, mass=250.0), spinner(spin=-3.0, channels=JETS, mass=250.0)
 
 
 def flown_force(body: Spacecraft, made: Schedule) -> Vector:
@@ -44,41 +44,32 @@ def flown_force(body: Spacecraft, made: Schedule) -> Vector:
         pushing = [one for one in made if one.start < 0.5 * (begin + end) < one.end]
         if pushing:
             start = reference.fly(moments, body.omega0, events(made), begin, rotation)
-            times = np.linspace(0.0, end - begin, 4001)
+            times = np.linspace(0.0, end - begin, 2001)
             torque, force = (np.sum([getattr(one, of) for one in pushing], axis=0) for of in ("torque", "force"))
             motions = [start, *reference.coast(moments, start, torque, times[1:])]
             gained += simpson(np.array([motion.rotation @ force for motion in motions]), x=times, axis=0)
     return gained
 
 
-@spread("scheme", CLASSIC, quick=1)
-@pytest.mark.parametrize("spin", [3.0, -3.0])
-def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(scheme: str, spin: float) -> None:
-    made = plan(spinner(spin=spin, channels=JETS, mass=250.0), scheme)
-    assert made.feasible, infeasibility(made)
-    expected = flown_force(made.spacecraft, made.pulses) / 250.0
-    assert made.delta_v == pytest.approx(expected, abs=1e-10 * float(np.linalg.norm(expected)))
-
-
 @pytest.mark.parametrize(
-    ("body", "pulses"),
+    ("body", "fired"),
     [
+        *((BODY, "one-pulse"), deep(BODY, "two-pulse"), deep(BODY, "four-pulse")),
+        *(deep(REVERSED, "one-pulse"), deep(REVERSED, "two-pulse"), (REVERSED, "four-pulse")),
         # Stretches are cut by how fast the body turns at either end of the pulse, not as it begins.
         (spinner(2.0, 1.0, 0.1, mass=10.0), [(channel("up", 0.0, 1.2, 1.0, force=(1.0, 0.0, 0.5)), 5.0, 10.0)]),
-        (spinner(mass=250.0), [(JETS[0], 2.0, 1.0), (JETS[1], 2.4, 1.0)]),
-        (spinner(mass=250.0), [(channel("couple", 0.0, 20.0, 0.0, force=(0.0, 0.0, 0.0)), 2.0, 1.0)]),
+        (BODY, [(JETS[0], 2.0, 1.0), (JETS[1], 2.4, 1.0)]),  # overlapping
+        (BODY, [(channel("couple", 0.0, 20.0, 0.0, force=(0.0, 0.0, 0.0)), 2.0, 1.0)]),
     ],
-    ids=["spun up", "overlapping", "a couple"],
 )
-def test_delta_v_of_pulses_by_hand(body: Spacecraft, pulses: list[tuple[Channel, float, float]]) -> None:
-    made = Plan(body, "by hand", Schedule(tuple(channel_pulse(*one) for one in pulses)))
-    expected = flown_force(body, made.pulses) / (body.mass or 0.0)
-    assert made.delta_v == pytest.approx(expected, abs=1e-9 * float(np.linalg.norm(expected)))
-
-
-def test_delta_v_needs_mass_and_every_force() -> None:
-    made = plan(spinner(channels=JETS, mass=250.0), "four-pulse")
-    assert replace(made, spacecraft=replace(made.spacecraft, mass=None)).delta_v is None
+def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(
+    body: Spacecraft, fired: str | list[tuple[Channel, float, float]]
+) -> None:
+    by_hand = isinstance(fired, list)
+    made = Plan(body, "", Schedule(tuple(channel_pulse(*one) for one in fired))) if by_hand else plan(body, str(fired))
+    expected = flown_force(made.spacecraft, made.pulses) / (body.mass or 0.0)
+    assert made.delta_v == pytest.approx(expected, abs=(1e-9 if by_hand else 1e-10) * float(np.linalg.norm(expected)))
+    assert replace(made, spacecraft=replace(body, mass=None)).delta_v is None
     unknown = replace(made.pulses.pulses[0], force=None)
     assert replace(made, schedule=Schedule((unknown, *made.pulses.pulses[1:]))).delta_v is None
 
@@ -86,8 +77,8 @@ def test_delta_v_needs_mass_and_every_force() -> None:
 @pytest.mark.parametrize("scheme", CLASSIC)
 def test_spin_change_and_propellant(scheme: str) -> None:
     """By the reference integrator, by the sum of axial impulses, and by F t / (Isp g0)."""
-    made = plan(spinner(channels=JETS), scheme)
-    end = reference.fly(made.spacecraft.inertia.moments, made.spacecraft.omega0, events(made.pulses), made.pulses.end)
+    made = plan(BODY, scheme)
+    end = reference.fly(BODY.inertia.moments, BODY.omega0, events(made.pulses), made.pulses.end)
     assert made.spin_change == pytest.approx(end.rates[2] - 3.0, abs=1e-11)
     assert made.spin_change == pytest.approx(math.fsum(one.impulse[2] for one in made.pulses) / 80.0, abs=1e-13)
     thrust = {one.name: one.thrusters[0].thrust or 0.0 for one in JETS}
@@ -96,21 +87,17 @@ def test_spin_change_and_propellant(scheme: str) -> None:
     assert STANDARD_GRAVITY == 9.80665
 
 
-def test_propellant_of_a_channel_is_that_of_all_its_thrusters_and_one_unknown_makes_the_sum_unknown() -> None:
+def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> None:
     pulse = channel_pulse(Channel("both", tuple(one.thrusters[0] for one in JETS[:2])), 3.0, 2.0)
     thrust = math.hypot(10.0, 1.0) + math.hypot(8.0, 2.0)
     assert pulse.propellant == pytest.approx(thrust * 2.0 / (220.0 * 9.80665), rel=1e-15)
     assert np.array_equal(pulse.impulse, 2.0 * (JETS[0].torque + JETS[1].torque))
-    assert pulse.force is not None
-    assert np.array_equal(pulse.force, [8.0, 12.0, 1.0])
+    assert (None if pulse.force is None else pulse.force.tolist()) == [8.0, 12.0, 1.0]
     unknown = channel_pulse(cross(20.0)[0], 6.0, 1.0)
     known = [Schedule(some).propellant is not None for some in ((), (pulse,), (pulse, unknown))]
     assert known == [True, True, False]
-
-
-def test_propellant_of_a_steerable_torquer_is_by_its_lever_arm() -> None:
-    made = plan(spinner(steerable=Steerable(torque=20.0, isp=220.0, lever_arm=0.8)), "two-pulse")
-    assert made.pulses.propellant == pytest.approx(made.pulses.total_impulse / 0.8 / (220.0 * 9.80665), rel=1e-14)
+    made = plan(spinner(steerable=Steerable(torque=20.0, isp=220.0, lever_arm=0.8)), "two-pulse").pulses
+    assert made.propellant == pytest.approx(made.total_impulse / 0.8 / (220.0 * 9.80665), rel=1e-14)
     assert plan(spinner(steerable=Steerable(20.0)), "two-pulse").pulses.propellant is None
 
 
@@ -119,7 +106,5 @@ def test_impulses_and_the_end_of_a_schedule_in_the_order_of_its_centres() -> Non
     made = plan(body, "two-pulse").pulses
     assert body.least_impulse == pytest.approx(80.0 * 3.0 * math.tan(math.radians(5.0)), rel=1e-15)
     assert made.total_impulse == math.fsum(float(np.linalg.norm(one.impulse)) for one in made)
-    late, early = channel_pulse(JETS[0], 9.0, 4.0), channel_pulse(JETS[1], 8.0, 0.5)
-    ordered = Schedule((late, early))
-    assert [pulse.t for pulse in ordered] == [8.0, 9.0]
-    assert ordered.end == 11.0
+    ordered = Schedule((channel_pulse(JETS[0], 9.0, 4.0), channel_pulse(JETS[1], 8.0, 0.5)))
+    assert ([pulse.t for pulse in ordered], ordered.end) == ([8.0, 9.0], 11.0)

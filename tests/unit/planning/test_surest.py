@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -33,23 +34,19 @@ from nutdamp.tolerances import Dispersions, Tolerance
 
 EARLY = ("earliest end", "by ")
 """How variants begin that end as early as they can, or little later."""
-
 SAMPLES = 4_096
-
-
-def relative(size: float) -> Tolerance:
-    return Tolerance("normal", size, relative=True)
+share_of = partial(normal, relative=True)
 
 
 def a_body(A: float = 120.0, C: float = 80.0, spin: float = 3.0, **changes: object) -> Spacecraft:
     """Small nutation, so that first order is all there is; pulses short against the turns."""
     channels = (channel("T1", 9.0, 2.0, 0.0), channel("T2", -6.0, 7.0, 0.0))
     tolerances = Dispersions(
-        A=relative(0.005),
-        C=relative(0.005),
+        A=share_of(0.005),
+        C=share_of(0.005),
         omega0=(normal(1e-4), normal(1e-4), normal(0.004)),
-        thrust={"T1": relative(0.02), "T2": relative(0.03)},
-        thrust_per_pulse=relative(0.01),
+        thrust={"T1": share_of(0.02), "T2": share_of(0.03)},
+        thrust_per_pulse=share_of(0.01),
         timing=Tolerance("uniform", 0.004),
         timing_offset=Tolerance("triangular", 0.01),
     )
@@ -58,10 +55,15 @@ def a_body(A: float = 120.0, C: float = 80.0, spin: float = 3.0, **changes: obje
     return replace(body, dispersions=replace(tolerances, **changes))  # type: ignore[arg-type]
 
 
-def at(body: Spacecraft, pulses: list[tuple[int, float, float]]) -> tuple[surest._Search, Columns]:
-    """The program of a body, with given pulses (channel, centre, on-time) as its columns."""
+def columns_of(pulses: list[tuple[int, float, float]]) -> Columns:
+    """Given pulses (channel, centre, on-time) as columns of the program."""
     channels, times, widths = (np.array(one) for one in zip(*pulses, strict=True))
-    return surest._Search(body, body), Columns(channels, times, widths, np.full(len(times), -1))
+    return Columns(channels, times, widths, np.full(len(times), -1))
+
+
+def robustly(body: Spacecraft, *schemes: str, most: int | None = None) -> robust.RobustComparison:
+    compared = compare(body, schemes)
+    return robust.compare(compared, robust.attempts(compared)[:most], samples=SAMPLES)
 
 
 CORRELATED = (("A", "C", 0.9), ("thrust T1", "thrust T2", -0.5))
@@ -70,11 +72,8 @@ CORRELATED = (("A", "C", 0.9), ("thrust T1", "thrust T2", -0.5))
 @pytest.mark.parametrize(
     ("shape", "pairs"),
     [
-        ((120.0, 80.0, 3.0), CORRELATED),
-        ((100.0, 150.0, 2.0), ()),
-        ((120.0, 80.0, -3.0), CORRELATED),
-        deep((100.0, 150.0, 2.0), CORRELATED),
-        deep((120.0, 80.0, 3.0), ()),
+        *(((120.0, 80.0, 3.0), CORRELATED), ((100.0, 150.0, 2.0), ()), ((120.0, 80.0, -3.0), CORRELATED)),
+        *(deep((100.0, 150.0, 2.0), CORRELATED), deep((120.0, 80.0, 3.0), ())),
     ],
 )
 def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
@@ -85,7 +84,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     channels = [one.name for one in body.channels]
     pulses = [(channels.index(one.channel), one.t, one.on_time) for one in plan(body, "optimal").pulses]
     assert len(pulses) >= 2
-    search, columns = at(body, pulses)
+    search, columns = surest._Search(body, body), columns_of(pulses)
     made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
     model = Model(body, made)
     names = [one.name for one in model.inputs.drawn]
@@ -110,22 +109,18 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
 def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
     body = replace(a_body(), requirement=Requirement(math.radians(0.05), None, 0.95))
     search = surest._Search(body, body)
-    chance = search.chance
-    costs = []
+    chance, costs, turns = search.chance, [], np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
+    channels = [one.name for one in search.program.channels]
     for margin in (0.0, 1.0, 2.0):
         found = chance.solve(margin)
         assert found.excess == pytest.approx(0.0, abs=1e-9)
-        channels = [one.name for one in search.program.channels]
-        rows = [(channels.index(one.channel.name), one.t, one.on_time, -1) for one in found.burns]
-        columns = Columns(*(np.array(one) for one in zip(*rows, strict=True)))
+        columns = columns_of([(channels.index(one.channel.name), one.t, one.on_time) for one in found.burns])
         shared, _, own = chance.model.spread(0, columns, columns.width)
         left = chance.model.left(columns, columns.width)[0]
-        turns = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
-        along = (np.conj(turns)[:, None] * shared).real
-        alone = (np.conj(turns)[:, None, None] * own).real
+        along, alone = (np.conj(turns)[:, None] * shared).real, (np.conj(turns)[:, None, None] * own).real
         used = (np.conj(turns) * left).real + margin * np.sqrt((along**2).sum(1) + (alone**2).sum((1, 2)))
         assert used.max() == pytest.approx(search.limits[0].most, rel=0.02)
-        costs.append(sum(b.impulse for b in found.burns))
+        costs.append(sum(burn.impulse for burn in found.burns))
     assert costs == sorted(costs)
     assert costs[0] < 0.8 * body.least_impulse  # a quarter of the nutation may stay
 
@@ -134,8 +129,7 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
 def test_the_built_in_example_complies_for_less_propellant_than_the_best_scheme() -> None:
     """85.6 % of cases comply with two-pulse, more only with plans that end as early as possible, which cost more."""
     body = nutdamp.example()
-    compared = compare(body, ("two-pulse", "optimal"))
-    found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
+    found = robustly(body, "two-pulse", "optimal")
     assert found.chosen is not None
     assert found.meets_requirement
     assert "against dispersions" in found.chosen.variant
@@ -155,17 +149,18 @@ def test_limits_and_windows_are_kept() -> None:
     limits = Limits(earliest=1.0, gap=0.2, tick=0.01, max_pulses=6, blackout=((3.0, 4.5),), horizon=40.0)
     known = cross(8.0, min_on_time=0.05)
     body = spinner(channels=known, limits=limits, requirement=Requirement(math.radians(0.6), None, 0.95))
-    body = replace(body, dispersions=Dispersions(A=relative(0.004), thrust={one.name: relative(0.02) for one in known}))
+    body = replace(body, dispersions=Dispersions(A=share_of(0.004), thrust={one.name: share_of(0.02) for one in known}))
     made = [made for _, made in surest.plans(body)]
     assert made
-    for one in made:
-        assert violations(body, one.pulses) == []
+    assert [violations(body, one.pulses) for one in made] == [[]] * len(made)
 
 
-def test_nothing_where_nothing_is_required() -> None:
+def test_nothing_where_nothing_is_required_and_nothing_has_to_shrink_where_enough_cases_comply() -> None:
     body = a_body()
     assert list(surest.plans(replace(body, requirement=None))) == []
     assert list(surest.plans(replace(body, dispersions=None))) == []
+    found = robustly(replace(body, requirement=Requirement(math.radians(0.15), None, 0.5)), "optimal", most=1)
+    assert (found.tightening, robust_verdicts.tightened(found)) == (None, "")
 
 
 @pytest.mark.parametrize(("probability", "named", "looser"), [deep(0.95, {"A"}, 1.6), weekly(0.997, {"A", "C"}, 1.3)])
@@ -181,12 +176,10 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
         monkeypatch.setattr(tightening, "SAMPLES", 4_096)
     given = Requirement(math.radians(0.5), math.radians(0.2), probability)
     body = replace(nutdamp.example(), requirement=given)
-    compared = compare(body, ("two-pulse",))
-    found = robust.compare(compared, robust.attempts(compared)[:1], samples=SAMPLES)
+    found = robustly(body, "two-pulse", most=1)
     assert found.chosen is not None
     needed, pulses = found.tightening, found.chosen.plan.pulses
     assert needed is not None
-    assert body.dispersions is not None
     assert {one.tolerance for one, _ in needed.inputs} == named
 
     def complying(factor: float, seed: int, cases: int) -> Results:
@@ -204,40 +197,25 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
     assert 0.99 * 0.5 * needed.factor <= float(shown[1]) <= 0.5 * needed.factor
 
 
-@pytest.mark.parametrize(
-    ("kind", "unit", "relative", "size", "nominal", "text"),
-    [
+def test_sizes_are_those_of_the_file_and_never_rounded_up() -> None:
+    for kind, unit, relative, size, nominal, text in (
         ("triangular", "", False, 0.0146789, 1.0, "1.46 %"),
         ("uniform", "m", False, 0.004999, 0.0, "4.99 mm"),
         ("normal", "kg m²", True, 0.6, 120.0, "0.5 %"),
         ("normal", "kg m²", False, 0.6, 120.0, "0.6 kg m²"),
         ("normal", "rad/s", False, 0.0, 0.0, "0 deg/s"),
-    ],
-)
-def test_sizes_are_those_of_the_file_and_never_rounded_up(
-    kind: str, unit: str, relative: bool, size: float, nominal: float, text: str
-) -> None:
-    assert stated_text(Input("x", "x", kind, size, nominal, unit), relative, down=True) == text
-
-
-def test_where_enough_cases_comply_nothing_has_to_shrink() -> None:
-    body = replace(a_body(), requirement=Requirement(math.radians(0.15), None, 0.5))
-    compared = compare(body, ("optimal",))
-    found = robust.compare(compared, robust.attempts(compared)[:1], samples=SAMPLES)
-    assert found.tightening is None
-    assert robust_verdicts.tightened(found) == ""
+    ):
+        assert stated_text(Input("x", "x", kind, size, nominal, unit), relative, down=True) == text
 
 
 @pytest.mark.weekly
 def test_two_channels_that_fire_one_after_the_other_share_the_time_between_them() -> None:
     """Long burns of channels at right angles overlap in the program, where they may be on together."""
-    body = spinner(
-        120.0, 101.5, -4.26, 7.22, phase=1.53, channels=cross(8.95, max_on_time=3.0), limits=Limits(gap=0.02)
-    )
-    tolerances = Dispersions(
-        A=relative(0.004), C=relative(0.004), thrust={one.name: relative(0.02) for one in body.channels}
-    )
+    channels, limits = cross(8.95, max_on_time=3.0), Limits(gap=0.02)
+    body = spinner(120.0, 101.5, -4.26, 7.22, phase=1.53, channels=channels, limits=limits)
+    thrust = {one.name: share_of(0.02) for one in channels}
     requirement = Requirement(math.radians(0.55), math.radians(0.48), 0.997)
+    tolerances = Dispersions(A=share_of(0.004), C=share_of(0.004), thrust=thrust)
     body = replace(body, dispersions=tolerances, requirement=requirement)
     shares = [run(Results(study_of(body, one.pulses), SAMPLES)).met_fraction or 0.0 for _, one in surest.plans(body)]
     assert max(shares) > 0.9
@@ -249,22 +227,18 @@ def random_body(seed: int) -> Spacecraft:
     C = 120.0 * (draw.uniform(0.5, 0.85) if draw.random() < 0.6 else draw.uniform(1.15, 1.7))
     spin, degrees = draw.choice([-1, 1]) * draw.uniform(1.5, 5.0), draw.uniform(2.0, 8.0)
     torque, kind = 10.0 ** draw.uniform(0.6, 1.5), int(draw.integers(0, 3))
+    made = cross(torque, max_on_time=3.0) if kind == 0 else cross(torque, min_on_time=0.02)[:2]
     if kind == 2:
         angles = np.cumsum(draw.uniform(0.6, 2.4, 3)).tolist()
-        channels = [channel(f"T{at}", torque * math.cos(x), torque * math.sin(x), 0.0) for at, x in enumerate(angles)]
-    else:
-        channels = list(cross(torque, max_on_time=3.0) if kind == 0 else cross(torque, min_on_time=0.02)[:2])
-    known = tuple(
-        replace(one, thrusters=tuple(replace(part, thrust=10.0, isp=220.0) for part in one.thrusters))
-        for one in channels
-    )
+        made = tuple(channel(f"T{at}", torque * math.cos(x), torque * math.sin(x), 0.0) for at, x in enumerate(angles))
+    channels = tuple(one.of(thrust=10.0, isp=220.0) for one in made)
     size = 10.0 ** draw.uniform(-0.3, 0.3)
     tolerances = Dispersions(
-        A=relative(0.005 * size),
-        C=relative(0.005 * size),
+        A=share_of(0.005 * size),
+        C=share_of(0.005 * size),
         omega0=(normal(0.0015 * size),) * 3,
-        thrust={one.name: relative(0.03 * size) for one in known},
-        thrust_per_pulse=relative(0.01 * size),
+        thrust={one.name: share_of(0.03 * size) for one in channels},
+        thrust_per_pulse=share_of(0.01 * size),
         timing=Tolerance("uniform", 0.004),
         timing_offset=Tolerance("bias", 0.001),
     )
@@ -273,7 +247,7 @@ def random_body(seed: int) -> Spacecraft:
     requirement = Requirement(nutation, shift, 0.997 if draw.random() < 0.5 else 0.95)
     phase = draw.uniform(0.0, 6.28)
     limits = Limits(earliest=float(draw.choice([0.0, 1.0])), gap=0.02)
-    body = spinner(120.0, C, spin, degrees, phase, channels=known, requirement=requirement, limits=limits)
+    body = spinner(120.0, C, spin, degrees, phase, channels=channels, requirement=requirement, limits=limits)
     return replace(body, dispersions=tolerances)
 
 
@@ -283,8 +257,7 @@ def gained(seed: int) -> float:
     Of all plans, those that end early too, it is checked that none complies more often, or as often for less.
     """
     body = random_body(seed)
-    compared = compare(body, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
-    found = robust.compare(compared, robust.attempts(compared), samples=SAMPLES)
+    found = robustly(body, "one-pulse", "two-pulse", "four-pulse", "optimal")
     others = [one for one in found.candidates if "against dispersions" not in one.variant]
     assert found.chosen is not None
     assert violations(body, found.chosen.plan.pulses) == []

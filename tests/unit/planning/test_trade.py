@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ STEERED = str(places.CONFIGS / "steerable-stage.yaml")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Found(Plan):
+class Given(Plan):
     """A plan of optimal whose distance of H from its target is given, rad."""
 
     off: float = 0.0
@@ -44,54 +44,50 @@ class Found(Plan):
         return SimpleNamespace(residual=SimpleNamespace(axis_error=self.off))
 
 
-def found(end: float, cost: float, degrees: float = 0.0, least: float = 0.1, within: float = 40.0) -> Found:
+def given(end: float, cost: float, degrees: float = 0.0, least: float = 0.1, within: float = 40.0) -> Given:
     pulse = Pulse(end, 0.0, "+1", np.array([1.0, 0.0, 0.0]), propellant=cost)
-    return Found(
+    return Given(
         BODY, "optimal", Schedule((pulse,), bounds=Bounds(least, None, "kg", within)), off=math.radians(degrees)
     )
 
 
-def points(front: fronts.Front) -> list[tuple[float, float]]:
-    return [(point.plan.pulses.end, point.cost) for point in front.points]
+def points(plans: list[Given]) -> list[fronts.Point]:
+    return [fronts.Point(one, 40.0, "kg") for one in plans]
+
+
+def figures(points: tuple[fronts.Point, ...]) -> list[tuple[float, float]]:
+    return [(point.plan.pulses.end, point.cost) for point in points]
 
 
 def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Searches: the whole horizon, the fastest, and horizons between evenly by their ratios; from strict to free."""
-    given = iter(
+    results = iter(
         [
-            *(found(30.0, 1.0), found(10.0, 3.0), found(16.0, 2.0), found(25.0, 2.1)),
-            *(found(28.0, 0.9, 5.0), found(8.0, 2.5), found(18.0, 1.5, 2.0), found(20.0, 1.4995, 2.0)),
+            *(given(30.0, 1.0), given(10.0, 3.0), given(16.0, 2.0), given(25.0, 2.1)),
+            *(given(28.0, 0.9, 5.0), given(8.0, 2.5), given(18.0, 1.5, 2.0), given(20.0, 1.4995, 2.0)),
         ]
     )
-    asked, done = list[tuple[OptimalOptions, float]](), list[int]()
+    asked, done = list[tuple[str, bool, float]](), list[int]()
 
     def search(body: Spacecraft, name: str, options: OptimalOptions) -> Plan:
         assert name == "optimal"
-        asked.append((options, body.horizon))
-        return next(given)
+        asked.append((options.least, options.free_axis, body.horizon))
+        return next(results)
 
     monkeypatch.setattr(fronts, "plan", search)
     made = fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf), progress=done.append)
     assert [front.shift for front in made] == [0.0, math.inf]
     # The fastest of the free front keeps H too; what saves less than a thousandth is no point.
-    assert points(made[0]) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
-    assert points(made[1]) == [(8.0, 2.5), (16.0, 2.0), (18.0, 1.5), (28.0, 0.9)]
-    assert [(one.least, one.free_axis) for one, _ in asked] == [
-        (least, free) for free in (False, True) for least in ("propellant", "time", "propellant", "propellant")
-    ]
-    tried = [
-        40.0,
-        40.0,
-        10.0 * 4.0 ** (1 / 3),
-        10.0 * 4.0 ** (2 / 3),
-        40.0,
-        40.0,
-        8.0 * 5.0 ** (1 / 3),
-        8.0 * 5.0 ** (2 / 3),
-    ]
-    assert [horizon for _, horizon in asked] == pytest.approx(tried)
+    assert figures(made[0].points) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
+    assert figures(made[1].points) == [(8.0, 2.5), (16.0, 2.0), (18.0, 1.5), (28.0, 0.9)]
+    for free, first in ((False, 10.0), (True, 8.0)):
+        horizons = [40.0, 40.0, first * (40.0 / first) ** (1 / 3), first * (40.0 / first) ** (2 / 3)]
+        leasts = ["propellant", "time", "propellant", "propellant"]
+        searches = asked[4 * free : 4 * free + 4]
+        assert [(least, freed) for least, freed, _ in searches] == [(least, free) for least in leasts]
+        assert [horizon for *_, horizon in searches] == pytest.approx(horizons)
     assert done == list(range(1, 9))
     numbers = [(number, front.shift) for number, front, _ in fronts.numbered(made)]
     assert numbers == [(number, 0.0 if number < 4 else math.inf) for number in range(1, 8)]
@@ -99,41 +95,27 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
 
 def test_the_first_order_least_of_a_front_never_rises_with_time() -> None:
     """A schedule that a stricter front found has the least of that one, which may be more than this front needs."""
-    plans = found(10.0, 3.0, 0.0, 2.0, 10.0), found(20.0, 2.0, 0.0, 2.2, 20.0), found(30.0, 1.0, 0.0, 0.7, 40.0)
-    front = fronts.Front(0.0, tuple(fronts.Point(one, 40.0, "kg") for one in plans))
+    plans = [given(10.0, 3.0, 0.0, 2.0, 10.0), given(20.0, 2.0, 0.0, 2.2, 20.0), given(30.0, 1.0, 0.0, 0.7, 40.0)]
+    front = fronts.Front(0.0, tuple(points(plans)))
     assert [front.least(point) for point in front.points] == [2.0, 2.0, 0.7]
-
-
-class Made(NamedTuple):
-    """What `fronts.undominated` looks at."""
-
-    end: float
-    cost: float
-
-    @property
-    def plan(self) -> Made:
-        return self
-
-    @property
-    def pulses(self) -> Made:
-        return self
 
 
 def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
     """Random clouds: what allows more is nowhere dearer, and no front has two points that cost the same."""
     draw = np.random.default_rng(5)
-    for _ in range(100):
-        strict = [Made(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist()]
-        free = [*strict, *(Made(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist())]
-        first = fronts.undominated(cast("list[fronts.Point]", strict))
-        second = fronts.undominated(cast("list[fronts.Point]", free), first)
-        for one, two in (*itertools.pairwise(first), *itertools.pairwise(second)):
-            assert one.plan.pulses.end < two.plan.pulses.end
-            assert one.cost > two.cost
-        for point in first:
-            assert min(one.cost for one in second if one.plan.pulses.end <= point.plan.pulses.end) <= point.cost
+    for _ in range(50):
+        strict, more = (
+            points([given(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist()]) for _ in range(2)
+        )
+        first = fronts.undominated(strict)
+        second = fronts.undominated([*strict, *more], first)
+        for one, two in (*itertools.pairwise(figures(first)), *itertools.pairwise(figures(second))):
+            assert one[0] < two[0]
+            assert one[1] > two[1]
+        for end, cost in figures(first):
+            assert min(other for ended, other in figures(second) if ended <= end) <= cost
         assert all(one.cost > two.cost * (1.0 + SAME_COST) for one, two in itertools.pairwise(first))
-        assert first[-1].cost <= min(made.cost for made in strict) / (1.0 - SAME_COST)
+        assert first[-1].cost <= min(point.cost for point in strict) / (1.0 - SAME_COST)
 
 
 @pytest.mark.weekly
@@ -161,11 +143,7 @@ def test_fronts_that_are_searched_fly() -> None:
 @pytest.mark.weekly
 def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known() -> None:
     """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all others."""
-    fuelled = tuple(
-        replace(one, thrusters=tuple(replace(each, isp=220.0, thrust=10.0) for each in one.thrusters))
-        for one in BODY.channels
-    )
-    body = replace(BODY, channels=fuelled)
+    body = replace(BODY, channels=tuple(one.of(isp=220.0, thrust=10.0) for one in BODY.channels))
     (front,) = fronts.fronts(body, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
     (known,) = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
     assert [{point.bounds.unit for point in one.points} for one in (front, known)] == [{"N m s"}, {"kg"}]
@@ -193,20 +171,15 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(monkeypatch: p
     made = planning.plan(body, "optimal")
     monkeypatch.setattr(work, "FRONTS", 4_000.0)
     (front,) = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
-    assert [point.plan.end for point in front.points] == [made.end]
-    assert front.why is None
+    assert ([point.plan.end for point in front.points], front.why) == ([made.end], None)
 
 
 def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_path: Path) -> None:
     shown = run("trade", STEERED, "--points", "2", "--csv", "t.csv", columns=200)
     rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text("utf-8"))))
-    assert [(row["scheme"], row["meets_requirement"]) for row in rows] == [
-        ("two-pulse", "true"),
-        ("one-pulse", "false"),
-        ("two-pulse", "true"),
-    ]
+    expected = [("two-pulse", "true"), ("one-pulse", "false"), ("two-pulse", "true")]
+    assert [(row["scheme"], row["meets_requirement"]) for row in rows] == expected
     assert float(rows[0]["end_s"]) == planning.plan(nutdamp.load(STEERED), "two-pulse").end
-    assert "2 ✗" in shown.stdout
     lines = [line.strip() for line in shown.stdout.splitlines() if "no schedule of optimal" in line or "✗ " in line]
     check_text("plan.trade-others", "\n".join(lines))
 
@@ -226,8 +199,8 @@ def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_p
 
 def test_nothing_feasible_ends_with_status_3_and_a_reason(run: Run) -> None:
     text = "name: x\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n"
-    text += "thrusters: [{name: T, torque: [1, 0, 0]}]\nlimits: {horizon: 0.1}\n"
-    done = run("trade", "-", "--points", "2", "--allow", "any", stdin=text, columns=200)
+    text += "thrusters: [{name: T, torque: [1, 0, 0], min_on_time: 1 s}]\nlimits: {horizon: 0.1}\n"
+    done = run("trade", "-", "--points", "1", "--allow", "any", stdin=text, columns=200)
     assert done.returncode == 3
     check_text("plan.trade-none", "\n".join(line.strip() for line in done.stdout.splitlines() if "none" in line))
     assert run("trade", "--allow", "-1deg").returncode == 2
