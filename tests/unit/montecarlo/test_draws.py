@@ -1,85 +1,180 @@
-"""Draws: their distributions, and that only seed, input and case decide on them."""
+"""Draws: their distributions and correlations, and that only seed, input and case decide on them."""
 
 from __future__ import annotations
 
+import itertools
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import dblquad
+from scipy.stats import kstest, multivariate_normal, norm, triang, uniform
+from support import dispersed
+from support.cases import deep
+from support.golden import refused
 
+from nutdamp.dispersion.cases import Model
+from nutdamp.dispersion.correlation import grouped, groups_of, mixing, normal_of, together, value_of
 from nutdamp.dispersion.draws import BLOCK, Source
 from nutdamp.dispersion.inputs import Input
+from nutdamp.dispersion.study import Results, Study, run
 from nutdamp.errors import BadRequest
 
+LAWS = {"normal": norm(scale=2.0), "uniform": uniform(-2.0, 4.0), "triangular": triang(0.5, -2.0, 4.0)}
+"""Of inputs of size 2."""
 
-def an_input(kind: str, size: float, name: str = "A") -> Input:
-    return Input(name, "A", kind, size, 100.0, "kg m²")
-
-
-def source(*inputs: Input, seed: int = 1) -> Source:
-    return Source(inputs, seed, lambda _: True)
+Pair = tuple[str, str, float]
 
 
-def sample(entry: Input, blocks: int = 12) -> np.ndarray:
-    drawn = source(entry)
-    return np.concatenate([np.array(drawn.block(number)[0][entry.name]) for number in range(blocks)])
+def an_input(name: str = "A", kind: str = "normal", size: float = 1.0) -> Input:
+    return Input(name, name, kind, size, 100.0, "kg m²")
 
 
-@pytest.mark.parametrize(
-    ("kind", "excess"),
-    [("normal", 0.0), ("uniform", -1.2), ("triangular", -0.6)],
-)
+def drawn(*inputs: Input, pairs: tuple[Pair, ...] = (), seed: int = 1, block: int = 0) -> dict[str, np.ndarray]:
+    draws, _ = Source(inputs, seed, lambda _: True, groups_of(pairs)).block(block)
+    return {name: np.asarray(draw) for name, draw in draws.items()}
+
+
+@pytest.mark.parametrize(("kind", "excess"), [("normal", 0.0), ("uniform", -1.2), ("triangular", -0.6)])
 def test_draws_have_the_moments_of_their_kind(kind: str, excess: float) -> None:
-    entry = an_input(kind, 2.0)
-    values = sample(entry)
-    count = len(values)
-    assert abs(values.mean()) < 4.0 * entry.sigma / np.sqrt(count)
+    entry = an_input(kind=kind, size=2.0)
+    values = np.concatenate([drawn(entry, block=block)["A"] for block in range(12)])
+    assert abs(values.mean()) < 4.0 * entry.sigma / np.sqrt(len(values))
     assert values.std() == pytest.approx(entry.sigma, rel=0.01)
     assert ((values / entry.sigma) ** 3).mean() == pytest.approx(0.0, abs=0.03)
     assert ((values / entry.sigma) ** 4).mean() - 3.0 == pytest.approx(excess, abs=0.06)
-    if kind != "normal":
-        assert 1.9 < np.abs(values).max() <= 2.0
+    assert kind == "normal" or 1.9 < np.abs(values).max() <= 2.0
 
 
 def test_a_bias_is_the_same_in_every_case() -> None:
-    assert source(an_input("bias", -0.3)).block(0)[0] == {"A": -0.3}
+    assert Source((an_input(kind="bias", size=-0.3),), 1, lambda _: True).block(0)[0] == {"A": -0.3}
 
 
 def test_neighbours_are_independent() -> None:
     """Inputs, blocks and seeds: correlations of 16,384 numbers stay within four times their scatter."""
-    drawn = source(an_input("normal", 1.0, "A"), an_input("normal", 1.0, "C"))
-    first, _ = drawn.block(0)
-    rows = [np.array(first["A"]), np.array(first["C"])]
-    rows.append(np.array(drawn.block(1)[0]["A"]))
-    rows.append(np.array(source(an_input("normal", 1.0, "A"), seed=2).block(0)[0]["A"]))
-    off = np.corrcoef(rows) - np.eye(4)
-    assert np.abs(off).max() < 4.0 / np.sqrt(BLOCK)
+    both = an_input("A"), an_input("C")
+    rows = [*drawn(*both).values(), drawn(*both, block=1)["A"], drawn(*both, seed=2)["A"]]
+    assert np.abs(np.corrcoef(rows) - np.eye(4)).max() < 4.0 / np.sqrt(BLOCK)
 
 
 def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
     """So two studies of which one has a tighter tolerance see the same cases otherwise."""
-    alone = np.array(source(an_input("normal", 1.0, "C")).block(3)[0]["C"])
-    drawn = source(an_input("uniform", 5.0, "A"), an_input("normal", 2.0, "C"), an_input("bias", 1.0, "x"))
-    assert np.array_equal(2.0 * alone, drawn.block(3)[0]["C"])
+    others = an_input("A", "uniform", 5.0), an_input("C", size=2.0), an_input("x", "bias")
+    assert np.array_equal(2.0 * drawn(an_input("C"), block=3)["C"], drawn(*others, block=3)["C"])
 
 
 def test_what_cannot_be_is_drawn_again_and_reported() -> None:
     """Values above one sigma are refused: 15.87 % are drawn again, of those again 15.87 % and so on."""
-    entry = an_input("normal", 1.0)
-    drawn = Source([entry], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
-    draws, redrawn = drawn.block(0)
-    values = np.array(draws["A"])
+    draws, redrawn = Source([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0).block(0)
+    values, free = np.array(draws["A"]), drawn(an_input())["A"]
+    kept = free <= 1.0
     assert values.max() <= 1.0
     assert len(redrawn) == pytest.approx(BLOCK * 0.15866 / (1.0 - 0.15866), rel=0.05)
-    free = np.array(source(entry).block(0)[0]["A"])
-    kept = free <= 1.0
     assert np.array_equal(values[kept], free[kept])
     assert set(np.flatnonzero(~kept)) == set(redrawn.tolist())
     # A normal cut at one sigma has the mean -φ(1)/Φ(1).
     assert values.mean() == pytest.approx(-0.24197 / 0.84134, abs=0.02)
-    again = Source([entry], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
+    again = Source([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
     again.block(5)
     assert np.array_equal(values, again.block(0)[0]["A"])
 
 
 def test_dispersions_that_allow_nothing_are_refused() -> None:
-    with pytest.raises(BadRequest, match="almost all draws"):
-        Source([an_input("normal", 1.0)], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool)).block(0)
+    source = Source([an_input()], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool))
+    with refused(BadRequest, "montecarlo.nothing-possible"):
+        source.block(0)
+
+
+def test_normal_draws_have_the_correlation_and_the_others_stay_to_the_last_bit() -> None:
+    inputs = [an_input(name, size=size) for name, size in zip("ABCD", (1.0, 2.0, 0.1, 3.0), strict=True)]
+    plain = drawn(*inputs)
+    correlated = drawn(*inputs, pairs=(("A", "B", 0.9), ("B", "C", -0.4)))
+    expected = [[1.0, 0.9, 0.0, 0.0], [0.9, 1.0, -0.4, 0.0], [0.0, -0.4, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    assert np.corrcoef(list(correlated.values())) == pytest.approx(np.array(expected), abs=4.0 / math.sqrt(BLOCK))
+    for name in "AD":  # the first of a group, and what is in none
+        assert np.array_equal(correlated[name], plain[name])
+    for entry in inputs:
+        assert kstest(correlated[entry.name] / entry.size, norm.cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("kinds", list(itertools.combinations_with_replacement(LAWS, 2)))
+def test_each_keeps_its_distribution_and_the_correlation_of_values_is_known(kinds: tuple[str, str]) -> None:
+    """The share of cases with both above a level is that of the bivariate normal law, which the copula is."""
+    inputs = [an_input(name, kind, 2.0) for name, kind in zip("AB", kinds, strict=True)]
+    pairs = (("A", "B", 0.8),)
+    values = np.hstack([list(drawn(*inputs, pairs=pairs, seed=seed).values()) for seed in range(1, 9)])
+    laws = [LAWS[kind] for kind in kinds]
+    for law, value in zip(laws, values, strict=True):
+        assert kstest(value, law.cdf).pvalue > 1e-3
+    both = (values[0] > laws[0].ppf(0.7)) & (values[1] > laws[1].ppf(0.7))
+    expected = multivariate_normal(cov=[[1.0, 0.8], [0.8, 1.0]]).cdf([norm.ppf(0.3)] * 2)
+    assert both.mean() == pytest.approx(expected, abs=0.006)
+    matrix = mixing(inputs, grouped(pairs))
+    assert (matrix @ matrix.T)[0, 1] == pytest.approx(np.corrcoef(values)[0, 1], abs=0.01)
+
+
+@pytest.mark.parametrize("kinds", [("uniform", "uniform"), ("normal", "uniform"), ("uniform", "triangular")])
+def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, str]) -> None:
+    inputs, rho = [an_input(name, kind) for name, kind in zip("AB", kinds, strict=True)], -0.6
+
+    def integrand(y: float, x: float) -> float:
+        other = rho * x + math.sqrt(1.0 - rho**2) * y
+        product = value_of(inputs[0], np.array(x)) * value_of(inputs[1], np.array(other))
+        return float(product) * math.exp(-0.5 * (x * x + y * y)) / (2.0 * math.pi)
+
+    integral, _ = dblquad(integrand, -7.0, 7.0, -7.0, 7.0, epsabs=1e-6, epsrel=1e-6)
+    matrix = mixing(inputs, grouped([("A", "B", rho)]))
+    assert (matrix @ matrix.T)[0, 1] == pytest.approx(integral / (inputs[0].sigma * inputs[1].sigma), abs=1e-4)
+
+
+def test_normals_and_values_are_inverse() -> None:
+    for kind in LAWS:
+        entry, normals = an_input("A", kind, 0.3), np.linspace(-5.0, 5.0, 101)
+        assert normal_of(entry, value_of(entry, normals)) == pytest.approx(normals, abs=1e-9), kind
+
+
+def test_which_others_are_drawn_makes_no_difference() -> None:
+    """A case is the same body for every schedule, whichever thrusters it fires."""
+    pairs = (("thrust T1", "A", 0.5), ("thrust T2", "thrust T1", 0.7))
+    whole = drawn(*map(an_input, ("A", "thrust T1", "thrust T2")), pairs=pairs)
+    for name in ("A", "thrust T2"):
+        assert np.array_equal(drawn(an_input(name), pairs=pairs)[name], whole[name])
+
+
+def test_a_case_drawn_again_is_correlated_too() -> None:
+    groups = groups_of([("A", "B", 0.95)])
+    source = Source([an_input("A"), an_input("B")], 1, lambda draws: np.asarray(draws["A"]) > 0.0, groups)
+    draws, redrawn = source.block(0)
+    assert len(redrawn) > BLOCK // 2
+    residual = np.asarray(draws["B"]) - 0.95 * np.asarray(draws["A"])
+    assert residual.mean() == pytest.approx(0.0, abs=0.01)
+    assert residual.std() == pytest.approx(math.sqrt(1.0 - 0.95**2), rel=0.02)
+
+
+def test_correlations_make_groups_or_are_refused() -> None:
+    assert [group.names for group in groups_of([("A", "B", 0.9), ("D", "E", 0.1)])] == [("A", "B"), ("D", "E")]
+    with refused(BadRequest, "montecarlo.impossible-correlation"):
+        groups_of((("A", "B", 0.9), ("B", "C", 0.9), ("A", "C", -0.5)))
+
+
+@pytest.mark.parametrize("rho", [0.95, deep(-0.95), deep(0.0)])
+def test_the_budget_of_a_pair_is_the_variance_of_what_both_do_together(rho: float) -> None:
+    """Of A and C with one relative size, most cancels where they are correlated: the motion knows only C/A."""
+    model = dispersed.exact_two_pulse(0.02).model
+    assert model.spacecraft.dispersions is not None
+    tolerances = replace(model.spacecraft.dispersions, correlation=(("C", "A", rho),))
+    study = Study(Model(replace(model.spacecraft, dispersions=tolerances), model.schedule), seed=3)
+    results, first = run(Results(study, BLOCK)), study.first_order
+    names = [entry.name for entry in first.inputs]
+    pair = [names.index(name) for name in "AC"]
+    effects = first.jacobian[:2, pair] * first.sigmas[pair]  # what one sigma of each does to the nutation
+    variance = (effects**2).sum() + 2.0 * rho * (effects[:, 0] @ effects[:, 1])
+    others = (first.effects("nutation")[[row for row in range(len(names)) if row not in pair]] ** 2).sum()
+    share = variance / (variance + others)
+    assert first.shares("nutation")[pair].sum() == pytest.approx(share, rel=1e-9)
+    assert first.shares("nutation").sum() == pytest.approx(1.0, rel=1e-12)
+    assert sum(results.shares[name]["nutation"] for name in "AC") == pytest.approx(share, abs=0.03)
+    vectors = results.early[:2, : results.done]
+    assert np.sqrt(vectors.var(axis=1).sum()) == pytest.approx(first.sigma("nutation"), rel=0.03)
+    assert together(first.inputs, study.model.groups)[0] == pair[::-1]
