@@ -45,9 +45,7 @@ def axis_path(spacecraft: Spacecraft, made: Schedule, until: float, dense: int =
 
 
 BODY_ERRORS = Dispersions(
-    A=normal(0.03, relative=True),
-    C=normal(0.03, relative=True),
-    omega0=(normal(0.01), normal(0.01), normal(0.05)),
+    A=normal(0.03, relative=True), C=normal(0.03, relative=True), omega0=(normal(0.01), normal(0.01), normal(0.05))
 )
 """Errors of the body alone: then `sun_pulses.fired` fires the same pulses."""
 

@@ -120,7 +120,7 @@ def expect_close(found: Fit, truth: Mapping[str, float]) -> None:
 
 @pytest.mark.parametrize("spin", [3.0, deep(-2.0)])
 def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float) -> None:
-    body, times = nutdamp.load(FILE, set={"state.spin": spin}), np.linspace(0.05, 60.0, 120)
+    body, times = nutdamp.load(FILE, set={"state.spin": spin}), np.linspace(0.05, 60.0, 200)
     motions, up = flown(times, body), np.array([0.0, 0.0, math.copysign(1.0, spin)])
     found = fit(body, Record(times, axes(motions, up[2], np.random.default_rng(1))))
     size = math.hypot(found.named["omega_1"], found.named["omega_2"])

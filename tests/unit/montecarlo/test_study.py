@@ -1,23 +1,30 @@
-"""Running studies: the same numbers whatever threads and interruptions; what is counted and kept."""
+"""Studies: what is counted, whatever threads and interruptions; percentiles, intervals; sensitivities and shares."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import betaincinv
 from support import dispersed
+from support.cases import deep
 from support.golden import refused
 
 from nutdamp.dispersion import study as study_module
 from nutdamp.dispersion import study_of
+from nutdamp.dispersion.binomial import binomial_interval, cases_to_show
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.draws import BLOCK
-from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.kernel import ClosedForm
+from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
 from nutdamp.dispersion.rounds import PORTION
-from nutdamp.dispersion.study import Results, Study, run
+from nutdamp.dispersion.sensitivity import first_order, sampled_shares
+from nutdamp.dispersion.statistics import Exact, Sketch, Worst
+from nutdamp.dispersion.study import EARLY, Results, Study, run
 from nutdamp.errors import BadRequest
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Goal, Requirement
@@ -58,16 +65,14 @@ def stop_after(calls: int) -> Callable[[], bool]:
 def test_threads_change_nothing_and_what_is_done_is_told(plain: Results) -> None:
     seen: list[int] = []
     collected: list[tuple[int, int]] = []
-    watched = run(
-        Results(a_study(), MANY),
-        threads=3,
-        watch=seen.append,
-        collect=lambda first, values: collected.append((first, values.shape[1])),
-    )
+
+    def collect(first: int, values: np.ndarray) -> None:
+        collected.append((first, values.shape[1]))
+
+    watched = run(Results(a_study(), MANY), threads=3, watch=seen.append, collect=collect)
     same(plain, watched)
-    assert seen[-1] == MANY
     assert seen == sorted(seen)
-    assert collected == [(0, MANY)]
+    assert (seen[-1], collected) == (MANY, [(0, MANY)])
 
 
 def test_a_stopped_run_keeps_the_first_cases_and_goes_on(plain: Results) -> None:
@@ -147,18 +152,171 @@ def test_a_failure_in_a_thread_is_a_failure_of_the_run() -> None:
         run(Results(study, MANY), threads=2)
 
 
-def test_a_study_of_biases_alone_has_one_outcome() -> None:
+def test_biases_alone_no_dispersions_and_unknown_propellant() -> None:
     body = replace(JETS.spacecraft, dispersions=Dispersions(A=Tolerance("bias", 0.01, True)))
     nutation = run(Results(study_of(body, JETS.schedule), 2_000)).distribution("nutation")
     assert nutation is not None
     assert nutation.minimum == nutation.maximum
-
-
-def test_without_dispersions_there_is_no_study() -> None:
     with refused(BadRequest, "montecarlo.no-dispersions"):
-        study_of(replace(JETS.spacecraft, dispersions=None), JETS.schedule)
-
-
-def test_propellant_that_is_not_known_stays_unknown() -> None:
+        study_of(replace(body, dispersions=None), JETS.schedule)
     pulses = Schedule(tuple(replace(pulse, propellant=None) for pulse in JETS.schedule))
     assert run(Results(Study(Model(JETS.spacecraft, pulses)), 10)).distribution("propellant") is None
+
+
+PROBABILITIES = np.array([0.0, 0.003, 0.5, 0.9, 0.95, 0.99, 0.997, 1.0])
+
+
+def sketched(values: np.ndarray, portions: int = 1) -> Sketch:
+    sketch = Sketch()
+    for part in np.array_split(values, portions):
+        sketch.add(part)
+    return sketch
+
+
+def test_exact_percentiles_are_those_of_numpy_and_leave_the_order_of_cases() -> None:
+    values = np.random.default_rng(1).normal(size=1001)
+    before = values.copy()
+    assert np.array_equal(Exact(values).quantiles(PROBABILITIES), np.quantile(before, PROBABILITIES))
+    assert np.array_equal(values, before)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_sketched_percentiles_are_right_to_a_thousandth_whatever_the_portions_and_order(scale: float) -> None:
+    generator, size = np.random.default_rng(2), 50_000
+    draws = (generator.lognormal(sigma=2.0, size=size), generator.normal(size=size), -generator.rayleigh(size=size))
+    for values in (scale * one for one in draws):
+        whole = sketched(values)
+        rough = whole.quantiles(PROBABILITIES)
+        assert rough == pytest.approx(np.quantile(values, PROBABILITIES, method="lower"), rel=0.0005)
+        assert (rough[0], rough[-1]) == (values.min(), values.max())
+        for other in (sketched(values, 7), sketched(values[::-1].copy(), 3)):
+            assert np.array_equal(whole.counts, other.counts)
+            assert (whole.minimum, whole.maximum) == (other.minimum, other.maximum)
+    extremes = sketched(np.array([0.0, 0.0, -0.0, 1e-300, 1e300]))
+    assert extremes.quantiles(np.array([0.5, 1.0])).tolist() == [0.0, 1e300]
+    assert int(extremes.counts.sum()) == 5
+
+
+def test_histograms_of_both_agree() -> None:
+    values, edges = np.random.default_rng(4).rayleigh(size=100_000), np.linspace(0.0, 4.0, 21)
+    exact, rough = Exact(values).histogram(edges), sketched(values).histogram(edges)
+    assert exact.sum() == np.count_nonzero(values <= 4.0)
+    # Each edge may be off by 0.05 % of its value x, where x times the density is 2/e at most.
+    assert rough == pytest.approx(exact, abs=2 * 0.0005 * 2 / math.e * len(values))
+
+
+@pytest.mark.parametrize("trials", [1, 2, 20, 1000, 10**6, 10**7])
+def test_the_interval_is_that_of_scipy(trials: int) -> None:
+    """Whose inverse of the incomplete beta function comes from Boost, and shares nothing with nutdamp's."""
+    some = np.random.default_rng(trials).integers(trials + 1, size=4).tolist()
+    within = 1e-12 + 1e-15 * trials
+    for seen in {0, 1, trials // 2, round(0.997 * trials), trials - 1, trials, *some}:
+        for confidence in (0.9, 0.95, 0.997):
+            low, high = binomial_interval(seen, trials, confidence)
+            tail, failures = 0.5 * (1.0 - confidence), trials - seen
+            assert low == pytest.approx(betaincinv(seen, failures + 1, tail) if seen else 0.0, rel=within)
+            assert high == pytest.approx(betaincinv(seen + 1, failures, 1.0 - tail) if failures else 1.0, rel=within)
+    few = cases_to_show(0.997)  # how many it takes
+    assert binomial_interval(few, few)[0] >= 0.997 > binomial_interval(few - 1, few - 1)[0]
+
+
+def test_the_worst_cases_are_found_whatever_the_portions() -> None:
+    severities = np.round(np.random.default_rng(5).normal(size=5_000), 2)  # with many ties
+    order = sorted(range(5_000), key=lambda case: (-severities[case], case))[:40]
+    for cuts in ([], [1], [10, 2000, 2001], list(range(0, 5000, 77))):
+        worst = Worst(40)
+        for begin, end in itertools.pairwise([0, *cuts, 5_000]):
+            worst.add(begin, severities[begin:end])
+        assert worst.cases.tolist() == order
+        assert worst.severities.tolist() == [severities[case] for case in order]
+
+
+def outcomes(model: Model, draws: dict[str, np.ndarray]) -> np.ndarray:
+    out = np.empty((ROWS, len(next(iter(draws.values())))))
+    vectors(model, ClosedForm(model)(model.cases(draws)), out)
+    return out
+
+
+@pytest.mark.parametrize(
+    "model",
+    [JETS, dispersed.steered(spin=-3.0), dispersed.sinking(JETS), dispersed.with_jets(moments=(120.0, 105.0, 80.0))],
+    ids=["jets", "steered", "jets, dissipation", "three moments"],
+)
+def test_derivatives_agree_with_central_differences(model: Model) -> None:
+    first = first_order(model)
+    for column, entry in enumerate(first.inputs):
+        step = 1e-4 * entry.size
+        ends = outcomes(model, {entry.name: np.array([-step, step])})
+        scale = np.abs(first.jacobian[:, column]).max()
+        assert scale > 0.0 or entry.name == "position T1 y", entry.name  # which moves the force along itself
+        slope = (ends[:, 1] - ends[:, 0]) / (2.0 * step)
+        assert first.jacobian[:, column] == pytest.approx(slope, abs=1e-6 * scale), entry.name
+
+
+@pytest.mark.parametrize("study", [dispersed.exact_two_pulse(0.02), Study(dispersed.with_jets(scale=0.02))])
+def test_covariances_of_the_cases_agree_within_3_percent_for_small_dispersions(study: Study) -> None:
+    flown = outcomes(study.model, dispersed.first_cases(study, BLOCK))
+    for output in OUTPUTS:
+        analytic = study.first_order.covariance(output)
+        drawn = np.atleast_2d(np.cov(flown[VECTORS[output]]))
+        assert np.linalg.norm(drawn - analytic) <= 0.03 * np.linalg.norm(analytic), output
+
+
+def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> None:
+    """The length of a plane normal vector, by its covariance alone: 99 % percentile within 3 %."""
+    tolerance = Tolerance("normal", 1e-5, True)
+    study = dispersed.exact_two_pulse(0.02, timing=None, timing_offset=None, A=tolerance)
+    covariance = study.first_order.covariance("nutation")
+    normal = np.random.default_rng(6).multivariate_normal(np.zeros(2), covariance, 200_000)
+    nutation = run(Results(study, 50_000)).distribution("nutation")
+    assert nutation is not None
+    expected = np.quantile(np.linalg.norm(normal, axis=1), 0.99)
+    assert nutation.quantiles(np.array([0.99]))[0] == pytest.approx(expected, rel=0.03)
+
+
+def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the_axis_points() -> None:
+    requested = JETS.spacecraft.dispersions
+    assert requested is not None
+    biased = replace(requested, C=Tolerance("bias", 0.8))
+    first = first_order(Model(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
+    names = [entry.name for entry in first.inputs]
+    for output in OUTPUTS:
+        assert first.shares(output).sum() == pytest.approx(1.0)
+        assert first.shares(output)[names.index("C")] == 0.0
+        effect = first.effects(output)[names.index("attitude x")]
+        assert effect > 1e-3 if output == "axis_error" else effect == pytest.approx(0.0, abs=1e-15)
+    assert first.effects("nutation")[names.index("C")] > 0.0
+    nothing = first_order(Model(replace(JETS.spacecraft, dispersions=None), JETS.schedule))
+    assert nothing.jacobian.shape == (ROWS, 0)
+    assert nothing.sigma("nutation") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("row", "output", "expected", "within"),
+    [
+        (0, "nutation", [9 / 14, 4 / 14, 1 / 14, 0.0], 0.015),  # a linear sum has its shares, what does nothing none
+        (8, "spin_change", [2 / 3, 0.0, 0.0, 0.0], 0.03),  # curvature counts, interplay does not
+        ((0, 1), "nutation", [0.8, 0.2, 0.0, 0.0], 0.015),  # a plane vector counts as one outcome
+    ],
+)
+def test_sampled_shares(row: int | tuple[int, int], output: str, expected: list[float], within: float) -> None:
+    draws = dict(zip("xyzn", np.random.default_rng(7).normal(size=(4, EARLY)), strict=True))
+    x, y, z, _ = draws.values()
+    made = {"nutation": 3.0 * x + 2.0 * y + z, "spin_change": x**2 + y * z}[output]
+    out = np.zeros((ROWS, EARLY))
+    out[row, :] = (2.0 * x, y) if isinstance(row, tuple) else made
+    shares = sampled_shares(draws, out)
+    assert [share[output] for share in shares.values()] == pytest.approx(expected, abs=within)
+    assert shares["x"]["axis_error"] == 0.0
+    for count in (1, 2, 63, 64, 5000):  # few cases give no nonsense
+        few = sampled_shares({name: draw[:count] for name, draw in draws.items()}, out[:, :count])
+        assert all(0.0 <= share[output] <= 1.0 for share in few.values())
+
+
+@pytest.mark.parametrize(("scale", "within"), [deep(0.02, 0.02), (0.3, 0.05)])
+def test_the_first_order_shares_are_those_of_the_cases_as_far_as_it_is_linear(scale: float, within: float) -> None:
+    results = run(Results(dispersed.exact_two_pulse(scale), EARLY))
+    first = results.study.first_order
+    for output in ("nutation", "momentum_shift", "axis_error"):
+        sampled = [results.shares[entry.name][output] for entry in first.inputs]
+        assert sampled == pytest.approx(first.shares(output), abs=within)
