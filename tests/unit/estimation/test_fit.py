@@ -40,38 +40,38 @@ def test_the_prior_is_the_covariance_of_the_file(rho: float) -> None:
     assert made[1].prior == pytest.approx(80 / 120 * math.sqrt(0.02**2 + 0.01**2 - 2 * rho * 0.02 * 0.01), rel=1e-12)
 
 
-def off_by(found: Fit, truth: dict[str, float]) -> Vector:
+def off_by(fitted: Fit, truth: dict[str, float]) -> Vector:
     """The estimates less the true values."""
     named = truth | {"C/A": truth["C"] / truth["A"]}
-    return np.asarray(found.values - [named[one.name] for one in found.model.parameters])
+    return np.asarray(fitted.values - [named[one.name] for one in fitted.model.parameters])
 
 
 def of_gyros(seed: int) -> tuple[bool, float, float]:
     """Of one record: whether the true values are in the 95 % region; C/A off, over its sigma and over the bound."""
     case = gyro_case(seed)
-    found = fit(case.spacecraft, case.record)
-    assert not found.model.unequal
-    off, at = off_by(found, case.truth), found.index("C/A")
+    fitted = fit(case.spacecraft, case.record)
+    assert not fitted.model.unequal
+    off, at = off_by(fitted, case.truth), fitted.index("C/A")
     assert at is not None
-    inside = off @ np.linalg.solve(found.covariance, off) < chi2.ppf(0.95, len(off))
+    inside = off @ np.linalg.solve(fitted.covariance, off) < chi2.ppf(0.95, len(off))
     # The Cramér-Rao bound at the true values, with the true noise, steps included.
     noise = np.hypot(
         case.noise, np.array([quantisation(case.record.signals[name]) for name in GYROS]) / math.sqrt(12.0)
     )
-    slopes = derivatives(found, found.values - off) / noise[found.model.signal][:, None]
-    rows = np.concatenate([slopes, found.model.prior[0]])
+    slopes = derivatives(fitted, fitted.values - off) / noise[fitted.model.signal][:, None]
+    rows = np.concatenate([slopes, fitted.model.prior[0]])
     scale = np.linalg.norm(rows, axis=0)
     bound = math.sqrt(float(np.linalg.inv((rows / scale).T @ (rows / scale))[at, at])) / scale[at]
-    return bool(inside), float(off[at] / found.sigmas[at]), float(off[at] / bound)
+    return bool(inside), float(off[at] / fitted.sigmas[at]), float(off[at] / bound)
 
 
-def predicted(found: Fit, values: Vector) -> Vector:
-    return found.model.predicted(dict(zip((one.name for one in found.model.parameters), values, strict=True)))
+def predicted(fitted: Fit, values: Vector) -> Vector:
+    return fitted.model.predicted(dict(zip((one.name for one in fitted.model.parameters), values, strict=True)))
 
 
-def derivatives(found: Fit, values: Vector) -> Vector:
-    steps = np.diag([one.step for one in found.model.parameters])
-    columns = [predicted(found, values + step) - predicted(found, values - step) for step in steps]
+def derivatives(fitted: Fit, values: Vector) -> Vector:
+    steps = np.diag([one.step for one in fitted.model.parameters])
+    columns = [predicted(fitted, values + step) - predicted(fitted, values - step) for step in steps]
     return np.column_stack(columns) / (2.0 * np.diag(steps))
 
 
@@ -92,11 +92,11 @@ def test_the_true_values_are_in_the_95_percent_region_and_attain_the_bound(seeds
         assert math.sqrt(np.mean(over_bound**2)) < 1.2
 
 
-def cost(found: Fit, values: Vector) -> float:
+def cost(fitted: Fit, values: Vector) -> float:
     """-2 ln(likelihood), but for a constant, with the noise of the fit."""
-    left = (found.model.measured - predicted(found, values)) / found.noise[found.model.signal]
-    rows, nominal = found.model.prior
-    return float(np.sum(left[found.used] ** 2) + np.sum((rows @ values - nominal) ** 2))
+    left = (fitted.model.measured - predicted(fitted, values)) / fitted.noise[fitted.model.signal]
+    rows, nominal = fitted.model.prior
+    return float(np.sum(left[fitted.used] ** 2) + np.sum((rows @ values - nominal) ** 2))
 
 
 def of_kind(folder: Path, seed: int) -> tuple[bool, float, float]:
@@ -106,14 +106,14 @@ def of_kind(folder: Path, seed: int) -> tuple[bool, float, float]:
     its region is a thin curved one.
     """
     case = telemetry(folder, seed)
-    found = fit(case.spacecraft, case.record)  # raises where it refuses
-    assert not found.model.unequal, (seed, case.kind)
-    off, at = off_by(found, case.truth), found.index("attitude_3")
+    fitted = fit(case.spacecraft, case.record)  # raises where it refuses
+    assert not fitted.model.unequal, (seed, case.kind)
+    off, at = off_by(fitted, case.truth), fitted.index("attitude_3")
     if at is not None:
         off[at] = math.remainder(off[at], 2.0 * math.pi)
-    within = cost(found, found.values - off) - cost(found, found.values) < chi2.ppf(0.95, len(off))
-    off = off / found.sigmas
-    return within, float(off[found.index("C/A") or 0]), float(off[found.index("omega_1") or 0])
+    within = cost(fitted, fitted.values - off) - cost(fitted, fitted.values) < chi2.ppf(0.95, len(off))
+    off = off / fitted.sigmas
+    return within, float(off[fitted.index("C/A") or 0]), float(off[fitted.index("omega_1") or 0])
 
 
 def of_kinds(folder: Path, seeds: Iterable[int]) -> tuple[float, Vector]:

@@ -107,14 +107,14 @@ def felt(times: Array, growth: float = 0.0, body: Spacecraft = BODY) -> Array:
     return np.asarray((np.cross(change, arm) + np.cross(rates, np.cross(rates, arm)))[:, 2])
 
 
-def estimate(found: Fit, key: str) -> Estimate:
-    return next(one for one in estimates(found, 0.0) if one.key == key)
+def estimate(fitted: Fit, key: str) -> Estimate:
+    return next(one for one in estimates(fitted, 0.0) if one.key == key)
 
 
-def expect_close(found: Fit, truth: Mapping[str, float]) -> None:
+def expect_close(fitted: Fit, truth: Mapping[str, float]) -> None:
     """All within 4 of their sigmas."""
-    sigmas = dict(zip((one.name for one in found.model.parameters), found.sigmas, strict=True))
-    off = {name: (found.named[name] - value) / sigmas[name] for name, value in truth.items()}
+    sigmas = dict(zip((one.name for one in fitted.model.parameters), fitted.sigmas, strict=True))
+    off = {name: (fitted.named[name] - value) / sigmas[name] for name, value in truth.items()}
     assert not {name: value for name, value in off.items() if not abs(value) < 4.0}
 
 
@@ -122,12 +122,12 @@ def expect_close(found: Fit, truth: Mapping[str, float]) -> None:
 def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float) -> None:
     body, times = nutdamp.load(FILE, set={"state.spin": spin}), np.linspace(0.05, 60.0, 200)
     motions, up = flown(times, body), np.array([0.0, 0.0, math.copysign(1.0, spin)])
-    found = fit(body, Record(times, axes(motions, up[2], np.random.default_rng(1))))
-    size = math.hypot(found.named["omega_1"], found.named["omega_2"])
+    fitted = fit(body, Record(times, axes(motions, up[2], np.random.default_rng(1))))
+    size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
     assert size == pytest.approx(float(np.hypot(*motions[0].rates[:2])), rel=3e-3)
-    expect_close(found, {"A": A, "C/A": C / A, "omega_3": float(motions[0].rates[2])})
-    assert "omega_3" in found.kept  # no signal shows the spin: it stays as the file has it
-    axis = attitude.rotate(carried(found, float(times[-1])).state.quaternion, up)
+    expect_close(fitted, {"A": A, "C/A": C / A, "omega_3": float(motions[0].rates[2])})
+    assert "omega_3" in fitted.kept  # no signal shows the spin: it stays as the file has it
+    axis = attitude.rotate(carried(fitted, float(times[-1])).state.quaternion, up)
     assert reference.angle(axis, motions[-1].rotation @ up) < 5e-5
 
 
@@ -136,10 +136,10 @@ def test_the_phase_of_the_axis_alone_is_that_of_the_file() -> None:
     times = np.linspace(0.05, 60.0, 300)
     motions = flown(times, BODY)
     seen = axes(motions, 1.0, np.random.default_rng(1))
-    found = fit(BODY, Record(times, seen))
-    phase = estimate(found, "phase")
+    fitted = fit(BODY, Record(times, seen))
+    phase = estimate(fitted, "phase")
     assert (phase.source, phase.sigma) == ("file", math.inf)
-    check_text("estimation.axis-alone", "\n".join(doubts(found)))
+    check_text("estimation.axis-alone", "\n".join(doubts(fitted)))
     phase = estimate(fit(BODY, Record(times, seen | gyros(motions, 2))), "phase")
     assert phase.source == "data"
     assert phase.sigma < math.radians(0.5)
@@ -158,9 +158,9 @@ def test_an_accelerometer_feels_dissipation_and_tells_what_it_feels_by_its_kinem
     assert np.abs(predicted - shown).max() < 1e-5 * np.abs(shown).max()
     body = nutdamp.load(FILE, set={"loop": ACCELEROMETER})
     noise = 0.002 + 1e-4 * np.random.default_rng(3).normal(size=150)
-    found = fit(body, Record(times, {ACCELERATION: felt(times) + noise}))
+    fitted = fit(body, Record(times, {ACCELERATION: felt(times) + noise}))
     truth = {f"omega_{at + 1}": float(one) for at, one in enumerate(flown(times[:1], body)[0].rates)}
-    expect_close(found, truth | {"C/A": C / A, "bias_acceleration": 0.002})
+    expect_close(fitted, truth | {"C/A": C / A, "bias_acceleration": 0.002})
 
 
 @pytest.mark.deep
@@ -171,11 +171,11 @@ def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> No
     signals = gyros(motions, 2, bias - np.cross([0.004, -0.003, 0.0], rates))
     wobble = np.array([[1, 0, 0.002], [0, 1, -0.001], [0, 0, 1]])
     wobbling = [one._replace(rotation=one.rotation @ wobble) for one in motions]
-    found = fit(BODY, Record(times, signals | axes(wobbling, 1.0, np.random.default_rng(3))))
+    fitted = fit(BODY, Record(times, signals | axes(wobbling, 1.0, np.random.default_rng(3))))
     truth = {"misalignment_1": 0.004, "misalignment_2": -0.003, "wobble_1": 0.001, "wobble_2": 0.002}
     truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
-    expect_close(found, truth | {"C/A": C / A, "omega_3": float(rates[0, 2])})
-    assert found.sigmas[found.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)  # which gyros alone do not tell
+    expect_close(fitted, truth | {"C/A": C / A, "omega_3": float(rates[0, 2])})
+    assert fitted.sigmas[fitted.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)  # which gyros alone do not tell
 
 
 @pytest.mark.deep
@@ -187,10 +187,10 @@ def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     turns = -(np.unwrap(np.arctan2(seen[:, 1], seen[:, 0])) - math.radians(35.0)) / (2.0 * math.pi)
     passed = np.interp(np.arange(math.ceil(turns[0]), turns[-1]), turns, grid)
     signals = gyros(flown(times, BODY), 5, np.array([0.0, 0.0, 5e-4]))
-    found = fit(BODY, Record(times, signals, passed + 5e-4 * draw.normal(size=len(passed))))
-    expect_close(found, {"C/A": C / A, "bias_omega_3": 5e-4})
-    assert found.sigmas[found.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)
-    assert found.noise[-1] == pytest.approx(5e-4, rel=0.4)
+    fitted = fit(BODY, Record(times, signals, passed + 5e-4 * draw.normal(size=len(passed))))
+    expect_close(fitted, {"C/A": C / A, "bias_omega_3": 5e-4})
+    assert fitted.sigmas[fitted.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)
+    assert fitted.noise[-1] == pytest.approx(5e-4, rel=0.4)
 
 
 @pytest.mark.weekly
@@ -202,27 +202,27 @@ def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
         for one in fired
         if one.torque is not None
     )
-    found = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
-    of_A = found.index("A") or 0
+    fitted = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
+    of_A = fitted.index("A") or 0
     for name, factor in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
-        at = found.index(f"thrust {name}")
+        at = fitted.index(f"thrust {name}")
         assert at is not None
-        apart = math.sqrt(found.covariance[at, at] - found.covariance[at, of_A] ** 2 / found.covariance[of_A, of_A])
-        assert abs(found.values[at] / found.named["A"] * A - factor) < 4.0 * apart
+        apart = math.sqrt(fitted.covariance[at, at] - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A])
+        assert abs(fitted.values[at] / fitted.named["A"] * A - factor) < 4.0 * apart
         assert apart < 0.002
-    expect_close(found, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
+    expect_close(fitted, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
     after = flown(np.array([40.0]), BODY, events)[0].rates
-    assert carried(found, 40.0).values[2:5] == pytest.approx(after, abs=6.0 * NOISE)
+    assert carried(fitted, 40.0).values[2:5] == pytest.approx(after, abs=6.0 * NOISE)
 
 
 @pytest.mark.deep
 def test_unequal_transverse_moments_are_seen_and_their_axes_and_equal_ones_not_taken_for_them() -> None:
     times, turn, size = np.linspace(0.0, 60.0, 300), math.radians(25.0), 1.5 / 120.0
     about = turning(turn)
-    found = fit(BODY, noisy(times, motion((121.5, 118.5, 84.2), about.T @ BODY.omega0, times) @ about.T, 6))
-    assert found.model.unequal
+    fitted = fit(BODY, noisy(times, motion((121.5, 118.5, 84.2), about.T @ BODY.omega0, times) @ about.T, 6))
+    assert fitted.model.unequal
     two = {"unequal_1": size * math.cos(2 * turn), "unequal_2": size * math.sin(2 * turn)}
-    expect_close(found, two | {"C/A": 84.2 / 120.0})
+    expect_close(fitted, two | {"C/A": 84.2 / 120.0})
     for seed in range(5):
         assert not fit(BODY, noisy(times, motion((A, A, C), BODY.omega0, times), seed)).model.unequal
 
@@ -259,18 +259,18 @@ def test_a_moment_without_tolerance_stays_as_it_is(tolerances: tuple[str, ...], 
 
 
 def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> None:
-    found = fit(EXAMPLE, of_example(np.linspace(0.0, 60.0, 121), spin=-SPIN))
-    nutation = estimate(found, "nutation")
+    fitted = fit(EXAMPLE, of_example(np.linspace(0.0, 60.0, 121), spin=-SPIN))
+    nutation = estimate(fitted, "nutation")
     expected = math.atan2(120.0 * math.hypot(0.14, 0.12), 80.4 * SPIN)
     assert nutation.value == pytest.approx(expected, abs=4.0 * nutation.sigma)
-    check_text("estimation.other-sense", "\n".join(doubts(found)))
+    check_text("estimation.other-sense", "\n".join(doubts(fitted)))
 
 
 @pytest.mark.deep
 def test_a_tolerance_that_leaves_one_rate_is_said_to_decide() -> None:
-    found = fit(EXAMPLE, of_example(np.linspace(0.0, 600.0, 61)))
-    assert found.named["C/A"] == pytest.approx(0.67, abs=2e-4)
-    check_text("estimation.sampled-below", "\n".join(doubts(found)))
+    fitted = fit(EXAMPLE, of_example(np.linspace(0.0, 600.0, 61)))
+    assert fitted.named["C/A"] == pytest.approx(0.67, abs=2e-4)
+    check_text("estimation.sampled-below", "\n".join(doubts(fitted)))
 
 
 @pytest.mark.deep

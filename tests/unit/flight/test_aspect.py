@@ -232,6 +232,7 @@ def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) ->
     assert "axis from Star" in run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=BROKEN).stdout
 
 
+@pytest.mark.deep
 def test_disperse_shows_one_angle_of_the_nominal_case_and_no_warning_of_numpy(run: Run) -> None:
     """Thrust alone is dispersed: derivatives are of the pulses, and not of body or rates."""
     shown = run("disperse", "-", "--scheme", "one-pulse", "--samples", "2", stdin=BROKEN)

@@ -61,7 +61,7 @@ def test_rotations_of_forces_and_of_the_attitude() -> None:
         assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
     vector, tilt = np.array([[1.0, 0.2], [-0.3, 0.5], [2.0, 3.0]]), np.array([[0.3, 0.0], [-0.4, 0.7]])
     expected = Rotation.from_rotvec(np.column_stack([*tilt, np.zeros(2)])).apply(vector.T)
-    assert np.column_stack(rotated(tuple(vector), tuple(tilt))) == pytest.approx(expected, abs=1e-14)  # type: ignore[arg-type]
+    assert np.column_stack(rotated(tuple(vector), tuple(tilt))) == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_steerable_pulse_is_turned_in_the_1_2_plane() -> None:
@@ -98,7 +98,7 @@ def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
     assert np.array(cases.impulses[0]) == pytest.approx(0.5 * jet.torque + more)
     # A scales both transverse moments, and is their mean.
     assert np.array(cases.moments) == pytest.approx([1.01 * moments[0], 1.01 * moments[1], moments[2]])
-    assert float(cases.A) == pytest.approx(0.505 * (moments[0] + moments[1]))  # type: ignore[arg-type]
+    assert float(cases.A) == pytest.approx(0.505 * (moments[0] + moments[1]))
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,10 +55,10 @@ LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
 LEAKING = Model(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
 
 
-def outputs(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, object]) -> NDArray[np.float64]:
+def outputs(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, Any]) -> NDArray[np.float64]:
     """Of all cases, (5, n)."""
     out = np.empty((len(OUTPUTS), max(map(np.size, draws.values()), default=1)))
-    measure(model, fly(model)(model.cases(draws)), out)  # type: ignore[arg-type]
+    measure(model, fly(model)(model.cases(draws)), out)
     return out
 
 

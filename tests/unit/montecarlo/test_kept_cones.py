@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def seen_in(model: Model, draws: dict[str, np.ndarray]) -> np.ndarray:
     return angles
 
 
-@spread("name", MODELS, quick=2, deep=4)
+@spread("name", MODELS, quick=1, deep=5)
 def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
     model = MODELS[name]
     draws = dispersed.first_cases(Study(model), 16)
@@ -109,7 +110,7 @@ def test_cases_in_which_the_axis_breaks_a_cone_do_not_comply() -> None:
     assert (angles[half.worst.cases[:50]] < middle).all()  # these are the worst cases
     # Without a requirement cones alone make cases comply or not.
     least = float(angles.min())
-    for limit, share in ((least - 1e-3, 1.0), (least + 1e-6, 99 / 100), (math.pi, 0.0)):
+    for limit, share in ((least - 1e-3, 1.0), (least + 1e-6, 99 / 100)):
         assert kept(limit, requirement=None).met_fraction == share
 
 
@@ -152,7 +153,7 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run) -> None:
 
 @pytest.mark.deep
 def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
-    def csv_of(keep: str) -> tuple[dict[str, list[dict[str, float]]], str]:
+    def csv_of(keep: str) -> tuple[dict[str, Any], str]:
         text = FILE.replace("keep: [{name: Sun, direction: sun, min: 5 deg}]", keep)
         options = ("--scheme", "half-cone", "--samples", "300", "--csv", "cases.csv", "--json", "-")
         study = json.loads(run("disperse", "-", *options, stdin=text).stdout)
@@ -166,9 +167,8 @@ def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
     assert (len(rows), least.min(), largest.max()) == (300, cone["least_deg"], cone["largest_deg"])
     assert np.mean(least < 5.0) == cone["broken_fraction"]
     for worst in study["worst"]:
-        (angles,), at = worst["aspects"], worst["case"] - 1  # type: ignore[misc, operator]
-        expected = angles["least_deg"], angles["largest_deg"]  # type: ignore[index]
-        assert (least[at], largest[at]) == pytest.approx(expected, abs=1e-9)  # type: ignore[call-overload]
+        (angles,), at = worst["aspects"], worst["case"] - 1
+        assert (least[at], largest[at]) == pytest.approx((angles["least_deg"], angles["largest_deg"]), abs=1e-9)
     # A cone so far away that nothing is routed changes nothing else.
     (_, kept_csv), (_, free_csv) = csv_of("keep: [{name: Sun, direction: sun, min: 1 deg}]"), csv_of("")
     assert free_csv.splitlines() == [line.rsplit(",", 2)[0] for line in kept_csv.splitlines()]
