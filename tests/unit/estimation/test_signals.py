@@ -348,7 +348,7 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(
 @pytest.mark.deep
 def test_a_nutation_below_the_noise_is_none() -> None:
     still = nutdamp.load(FILE, set={"state.nutation": "0.001 deg"})
-    check_text("estimation.no-nutation", refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 61))))
+    check_text("estimation.no-nutation", refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 200))))
 
 
 def test_the_spin_of_sun_pulses_in_a_column_is_no_surer_than_its_samples_allow() -> None:
