@@ -1,114 +1,267 @@
-"""The motion as arrays, and how far the spin axis strays."""
+"""The motion as arrays: rows round each pulse, tracks in pieces and as CSV, and how far the spin axis strays."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
+import tracemalloc
+from collections.abc import Iterable
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from support import reference
-from support.builders import spinner
+from support.builders import channel, pulse, spinner
+from support.process import Run
 
 from nutdamp import flight, track
-from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Attitude, Vector
+from nutdamp.files.output import number
+from nutdamp.files.track_csv import HEADER, track_array, write_track
+from nutdamp.flight import Flight
+from nutdamp.physics import attitude, cones
+from nutdamp.rounding import SAME_ANGLE
+from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft import Attitude
+from nutdamp.track import Track
 
 EPS = float(np.finfo(float).eps)
-
-
-def pointing(axes: list[tuple[float, float]]) -> track.Track:
-    """Rows whose spin axis has these right ascensions and declinations in degrees; H at the start along z."""
-    rows = len(axes)
-    unit = np.array(
-        [
-            (math.cos(d) * math.cos(r), math.cos(d) * math.sin(r), math.sin(d))
-            for r, d in (np.radians(pair) for pair in axes)
-        ]
+FLIES = (flight.by_impulses, flight.flown)
+WIDE = Schedule(
+    (
+        pulse(2.0, 0.5, np.array([5.0, 0.0, 0.0]), "one"),
+        pulse(4.0, 1.0, np.array([0.0, -5.0, 2.0]), "two"),
+        pulse(6.5, 0.0, np.array([3.0, 3.0, 0.0]), "kick"),
     )
-    nothing = np.zeros(rows)
-    return track.Track(
-        t=np.arange(float(rows)),
-        rates=np.zeros((rows, 3)),
-        quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)),
-        axis=unit,
-        momentum=np.tile([0.0, 0.0, 5.0], (rows, 1)),
-        nutation=nothing,
-        body_cone=nothing,
-        space_cone=nothing,
-        pulse=np.zeros(rows, dtype=np.int64),
-    )
+)
+UNTIL, FEW = 40.0, 7
 
 
-def degrees(pair: tuple[float, float]) -> list[float]:
-    return [math.degrees(angle) for angle in pair]
+def some_flight() -> Flight:
+    """A flight with coasts and wide pulses, the first of them at once."""
+    push = channel("T", 4.0, 1.0, 0.5)
+    made = Schedule(tuple(channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))))
+    return flight.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
 
 
-def test_ranges_of_right_ascension_and_declination() -> None:
-    found = track.extremes([pointing([(10, 5), (50, -20), (30, 40)])])
-    assert degrees(found.right_ascension) == pytest.approx([10, 50], abs=1e-12)
-    assert degrees(found.declination) == pytest.approx([-20, 40], abs=1e-12)
+def cut(whole: Track, edges: Iterable[int]) -> list[Track]:
+    """The rows between ``edges``, as tracks of their own."""
+    return [
+        Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(Track)})
+        for begin, end in pairwise([0, *edges, len(whole.t)])
+        if end > begin
+    ]
 
 
-def test_right_ascension_that_wraps_is_the_short_way_round() -> None:
-    """From 350° over 0° to 20°: not from 0° to 355°."""
-    found = track.extremes([pointing([(350, 0), (355, 1), (5, 2), (20, 0)])])
-    assert degrees(found.right_ascension) == pytest.approx([350, 380], abs=1e-12)
+@pytest.mark.parametrize("fly", FLIES)
+def test_a_track_goes_from_zero_to_its_end_in_order_and_no_row_comes_twice(fly: object) -> None:
+    for samples in (1, 2, 11, 1000):
+        whole = fly(spinner(), WIDE, 10.0).sampled(samples, 10.0)  # type: ignore[operator]
+        assert (whole.t[0], whole.t[-1]) == (0.0, 10.0)
+        assert np.all(np.diff(whole.t) >= 0.0)
+        assert np.all(np.diff(whole.pulse) >= 0)
+        assert set(np.linspace(0.0, 10.0, samples)) <= set(whole.t)
+        rows = np.column_stack([whole.t, whole.rates, whole.quaternion])
+        assert len(np.unique(rows, axis=0)) == len(rows)
 
 
-def test_right_ascension_of_a_standing_axis_is_a_point() -> None:
-    found = track.extremes([pointing([(200, 10), (200, 10)])])
-    assert degrees(found.right_ascension) == pytest.approx([200, 200], abs=1e-12)
+def test_by_impulses_there_is_a_row_before_and_one_after_each_pulse() -> None:
+    rows = flight.by_impulses(spinner(), WIDE, 10.0).sampled(3, 10.0)
+    effective = flight.effective_impulses(spinner(), WIDE)
+    for index, (one, acting) in enumerate(zip(WIDE, effective, strict=True)):
+        at = np.flatnonzero(rows.t == one.t)
+        assert rows.pulse[at].tolist() == [index, index + 1]
+        jump = np.diff(rows.rates[at], axis=0)[0] * np.array([120.0, 120.0, 80.0])
+        assert jump == pytest.approx([acting.real, acting.imag, one.impulse[2]], abs=1e-12)
+        assert rows.quaternion[at[0]] == pytest.approx(rows.quaternion[at[1]], abs=4 * EPS)
 
 
-def test_angles_from_the_planes_of_the_frame() -> None:
-    """x and y: how far the axis leans out of the y-z and the x-z plane."""
-    found = track.extremes([pointing([(0, 80), (90, 70), (180, 60), (270, 85)])])
-    assert degrees(found.x) == pytest.approx([-30, 10], abs=1e-12)
-    assert degrees(found.y) == pytest.approx([-5, 20], abs=1e-12)
+def test_flown_there_is_a_row_as_each_pulse_begins_and_one_as_it_ends() -> None:
+    rows = flight.flown(spinner(), WIDE, 10.0).sampled(3, 10.0)
+    for index, one in enumerate(WIDE):
+        assert index in rows.pulse[rows.t == one.start]
+        assert one.end in rows.t
+    kick = np.flatnonzero(rows.t == 6.5)
+    assert rows.pulse[kick].tolist() == [2, 3]
+    assert np.diff(rows.rates[kick], axis=0)[0] == pytest.approx([3 / 120, 3 / 120, 0], abs=4 * EPS)
+    # The row at the end of a pulse counts it as completed, the last one too.
+    made = Schedule(WIDE.pulses[:2])
+    rows = flight.flown(spinner(), made, made.end).sampled(3, made.end)
+    assert [rows.pulse[rows.t == one.end].max() for one in made] == [1, 2]
 
 
-def test_farthest_and_nearest_to_h_at_the_start_with_their_times() -> None:
-    found = track.extremes([pointing([(0, 80), (90, 70), (180, 60), (270, 85)])])
-    assert found.farthest == pytest.approx((math.radians(30), 2.0), rel=1e-14)
-    assert found.nearest == pytest.approx((math.radians(5), 3.0), rel=1e-14)
+@pytest.mark.parametrize("fly", FLIES)
+def test_an_ideal_impulse_at_zero_has_the_motion_before_it_too(fly: object) -> None:
+    made = Schedule((pulse(0.0, 0.0, np.array([6.0, 0.0, 0.0])),))
+    rows = fly(spinner(), made, 5.0).sampled(5, 5.0)  # type: ignore[operator]
+    assert (rows.t[:2].tolist(), rows.pulse[:3].tolist()) == ([0.0, 0.0], [0, 1, 1])
+    assert np.array_equal(rows.rates[0], spinner().omega0)
+    assert rows.rates[1] - rows.rates[0] == pytest.approx([6 / 120, 0, 0], abs=2 * EPS)
+
+
+@pytest.mark.parametrize("fly", FLIES)
+def test_motion_around_pulses(fly: object) -> None:
+    """|ω| before the first, between, and after the last, as the whole track has it."""
+    flown = fly(spinner(), WIDE, 10.0)  # type: ignore[operator]
+    before, after = flown.around_pulses()
+    assert (before.pulse.tolist(), after.pulse.tolist()) == ([0, 1, 2], [1, 2, 3])
+    assert before.nutation[0] == pytest.approx(spinner().nutation, rel=8 * EPS)
+    assert before.nutation[1:] == pytest.approx(after.nutation[:-1], rel=100 * EPS)
+    assert after.nutation[-1] == pytest.approx(flown.residual.nutation, rel=8 * EPS)
+    coasting = fly(spinner(), Schedule(), 7.0)  # type: ignore[operator]
+    assert np.array_equal(coasting.sampled(8, 7.0).t, np.linspace(0.0, 7.0, 8))
+    assert [len(rows.t) for rows in coasting.around_pulses()] == [0, 0]
+
+
+def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attitude() -> None:
+    body = spinner(spin=-3.0, degrees=20.0)
+    rows = flight.flown(body, WIDE, 10.0).sampled(20, 10.0)
+    omega, spin = np.hypot(rows.rates[:, 0], rows.rates[:, 1]), -rows.rates[:, 2]
+    assert rows.nutation == pytest.approx(cones.nutation_angle(120.0, 80.0, omega, spin), abs=4 * EPS)
+    assert rows.body_cone == pytest.approx(cones.body_cone(omega, spin), abs=4 * EPS)
+    assert rows.space_cone == pytest.approx(cones.space_cone(120.0, 80.0, omega, spin), abs=8 * EPS)
+    between = [reference.angle(h, axis) for h, axis in zip(rows.momentum, rows.axis, strict=True)]
+    assert rows.nutation == pytest.approx(between, abs=1e-13)
+    for quaternion, rates, axis, h in zip(rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True):
+        rotation = attitude.matrix(quaternion)
+        assert axis == pytest.approx(rotation @ [0, 0, -1.0], abs=4 * EPS)
+        expected = reference.momentum(body.inertia.moments, reference.Motion(rates, rotation))
+        assert h == pytest.approx(expected, rel=1e-14, abs=1e-12)
+
+
+def pointing(axes: np.ndarray) -> Track:
+    """Rows whose spin axis is ``axes`` (n, 3), at whole seconds; H at the start along z."""
+    nothing, up = np.zeros(len(axes)), np.tile([0.0, 0.0, 2.0], (len(axes), 1))
+    t, pulses = np.arange(float(len(axes))), np.zeros(len(axes), dtype=np.int64)
+    return Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
+
+
+TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
+"""Out of the y-z and the x-z plane, by x and y."""
+
+
+@pytest.mark.parametrize(
+    ("places", "expected"),
+    [
+        ([(10, 5), (50, -20), (30, 40)], {"right_ascension": (10, 50), "declination": (-20, 40)}),
+        ([(350, 0), (355, 1), (5, 2), (20, 0)], {"right_ascension": (350, 380)}),  # the short way round
+        ([(200, 10), (200, 10)], {"right_ascension": (200, 200)}),
+        (TILTS, {"x": (-30, 10), "y": (-5, 20)}),
+    ],
+)
+def test_ranges_of_the_spin_axis(places: list[tuple[float, float]], expected: dict[str, tuple[float, float]]) -> None:
+    """By right ascensions and declinations, deg."""
+    r, d = np.radians(places).T
+    found = track.extremes([pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))])
+    assert {name: np.degrees(getattr(found, name)) for name in expected} == {
+        name: pytest.approx(ends, abs=1e-12) for name, ends in expected.items()
+    }
+    if places == TILTS:  # how far from H, and when
+        assert found.farthest == pytest.approx((math.radians(30), 2.0), rel=1e-14)
+        assert found.nearest == pytest.approx((math.radians(5), 3.0), rel=1e-14)
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
-    spacecraft = spinner(spin=spin, degrees=12.0)
-    until = spacecraft.inertial_period
-    found = track.extremes([flight.flown(spacecraft, Schedule(), until).sampled(4001, until)])
-    assert degrees(found.x) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
-    assert degrees(found.y) == pytest.approx([-12, 12], abs=1e-4)
-    assert math.degrees(found.farthest[0]) == pytest.approx(12.0, abs=1e-12)
-    assert math.degrees(found.nearest[0]) == pytest.approx(12.0, abs=1e-12)
+    body = spinner(spin=spin, degrees=12.0)
+    until = body.inertial_period
+    found = track.extremes([flight.flown(body, Schedule(), until).sampled(4001, until)])
+    for ends in (found.x, found.y):
+        assert np.degrees(ends) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
+    assert np.degrees([found.farthest[0], found.nearest[0]]) == pytest.approx([12.0, 12.0], abs=1e-12)
 
 
 @pytest.mark.parametrize("right_ascension", [0.0, 90.0, 358.0])
 def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     """H towards a place on the equator: the axis circles it at 12°, across the zero of right ascension or not."""
-    spacecraft = spinner(degrees=12.0)
-    in_n = attitude.matrix(spacecraft.initial.quaternion)
-    r = math.radians(right_ascension)
+    r, until = math.radians(right_ascension), spinner().inertial_period
     # Rows: z of N to the equator at r, x of N to the pole.
-    place: Vector = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
-    there = spinner(degrees=12.0, attitude=Attitude(attitude.from_matrix(place @ in_n)))
-    until = spacecraft.inertial_period
+    place = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
+    facing = attitude.from_matrix(place @ attitude.matrix(spinner(degrees=12.0).initial.quaternion))
+    there = spinner(degrees=12.0, attitude=Attitude(facing))
     found = track.extremes([flight.flown(there, Schedule(), until).sampled(4001, until)])
-    assert degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
-    west, east = degrees(found.right_ascension)
-    assert [west, east] == pytest.approx([(right_ascension - 12) % 360, (right_ascension - 12) % 360 + 24], abs=1e-4)
+    west = (right_ascension - 12) % 360
+    assert np.degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
+    assert np.degrees(found.right_ascension) == pytest.approx([west, west + 24], abs=1e-4)
 
 
-def test_track_has_axis_and_momentum_in_the_inertial_frame() -> None:
-    spacecraft = spinner(spin=-3.0, degrees=20.0)
-    rows = flight.flown(spacecraft, Schedule(), 10.0).sampled(20, 10.0)
-    moments = np.array(spacecraft.inertia.moments)
-    for quaternion, rates, axis, h in zip(rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True):
-        rotation = attitude.matrix(quaternion)
-        assert axis == pytest.approx(rotation @ [0, 0, -1.0], abs=4 * EPS)
-        assert h == pytest.approx(
-            reference.momentum(spacecraft.inertia.moments, reference.Motion(rates, rotation)), rel=1e-14
-        )
-        assert float(np.linalg.norm(h)) == pytest.approx(float(np.linalg.norm(moments * spacecraft.omega0)), rel=1e-14)
+@given(st.integers(1, 60), st.floats(0.0, 10.0), st.floats(0.0, 10.0), st.floats(0.1, 10.0))
+def test_even_times_are_those_of_linspace(samples: int, first: float, second: float, until: float) -> None:
+    start, end = min(first, second), max(first, second)
+    even = np.linspace(0.0, until, samples)
+    parts = list(track.even_times(samples, until, start, end))
+    assert np.concatenate([part.times for part in parts]).tolist() == even[(even > start) & (even < end)].tolist()
+    assert [part.first for part in parts] == [True] + [False] * (len(parts) - 1)
+    assert [part.last for part in parts] == [False] * (len(parts) - 1) + [True]
+
+
+@pytest.mark.parametrize("samples", [1, 2, 50, 333])
+def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = some_flight()
+    whole = made.sampled(samples, UNTIL)
+    for module in (track, flight):
+        monkeypatch.setattr(module, "PIECE", FEW)
+    pieces = list(made.pieces(samples, UNTIL))
+    assert len(pieces) >= len(whole.t) // (2 * FEW)
+    assert max(len(piece.t) for piece in pieces) <= 2 * FEW + 4
+    for one in fields(Track):
+        joined = np.concatenate([getattr(piece, one.name) for piece in pieces])
+        assert joined == pytest.approx(getattr(whole, one.name), rel=1e-14, abs=1e-13)
+
+
+def test_extremes_of_pieces_are_those_of_the_whole() -> None:
+    made, generator = some_flight(), np.random.default_rng(4)
+    for count in (1, 5, 40, 500):
+        whole = made.sampled(count, UNTIL)
+        found = track.extremes([whole])
+        assert track.extremes(cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())) == found
+        assert (found.rows, found.until) == (len(whole.t), UNTIL)
+    # Of what is equal but for rounding the first time counts.
+    angles = np.array([0.1, 0.3, 0.2, 0.3 + 0.4 * SAME_ANGLE, 0.25, 0.3 + 0.9 * SAME_ANGLE, 0.1])
+    whole = pointing(np.column_stack([np.sin(angles), np.zeros(7), np.cos(angles)]))
+    for size in (1, 2, 3, 7):
+        found = track.extremes(cut(whole, range(size, 7, size)))
+        assert found.farthest == pytest.approx((0.3, 1.0), abs=1e-15)
+        assert found.nearest == pytest.approx((0.1, 0.0), abs=1e-15)
+
+
+def test_a_track_is_written_as_it_was_by_numbers() -> None:
+    made, stream = some_flight(), io.BytesIO()
+    whole = made.sampled(100, UNTIL)
+    write_track(cut(whole, [50]), made.spacecraft.inertia, stream)
+    header, *lines, last = stream.getvalue().decode().split("\r\n")
+    assert (header, last) == (",".join(HEADER), "")
+    rows = track_array(whole, made.spacecraft.inertia).tolist()
+    assert lines == [",".join([*map(number, row[:-1]), str(row[-1])]) for row in rows]
+
+
+@pytest.mark.weekly
+def test_memory_does_not_grow_with_the_rows() -> None:
+    """What 4.5e5 rows of 18 columns take as one array alone is 65 MB; several of those stood side by side."""
+    made, peaks = some_flight(), []
+    for samples in (150_000, 450_000):
+        tracemalloc.start()
+        try:
+            track.extremes(made.pieces(samples, UNTIL))
+            with io.BytesIO() as nowhere:
+                nowhere.write = len  # type: ignore[method-assign, assignment]
+                write_track(made.pieces(samples, UNTIL), made.spacecraft.inertia, nowhere)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    assert peaks[1] < min(1.2 * peaks[0], 100e6)
+
+
+@pytest.mark.deep
+def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
+    ended = run("simulate", "--scheme", "two-pulse", "--samples", "45000", "--csv", "track.csv", "--quiet")
+    assert ended.returncode == 0, ended.stderr
+    with (tmp_path / "track.csv").open(newline="") as stream:
+        times = [float(row["t_s"]) for row in csv.DictReader(stream)]
+    assert len(times) == 45_004
+    assert times == sorted(times)
+    assert "45004 rows" in ended.stdout

@@ -1,66 +1,169 @@
-"""Dispersed cases through real widths, against single flights."""
+"""Dispersed cases against an independent integrator and against single flights: by impulse sum and real widths."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from support import dispersed
-from support.single_case import flown_outputs, realised
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from support import dispersed, reference
+from support.builders import cross, spinner
+from support.cases import deep, spread
+from support.flights import by_blocks
+from support.single_case import flown_outputs, realised, timed
+from support.spinners import commanded, flown_by_reference
 
 from nutdamp import flight
+from nutdamp.commands import Block, SunSensor
+from nutdamp.dispersion import study_of
 from nutdamp.dispersion.cases import Model
 from nutdamp.dispersion.flown import RealWidths, largest_nutation
-from nutdamp.dispersion.outputs import measure
-from nutdamp.dispersion.study import Study
+from nutdamp.dispersion.kernel import ClosedForm, nodes_for
+from nutdamp.dispersion.outputs import OUTPUTS, measure
+from nutdamp.dispersion.study import Results, Study, run
 from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Disturbance
+from nutdamp.physics.feed import Cold, Tank
+from nutdamp.physics.rigid_cases import cos_sin
+from nutdamp.physics.valve import Trapezoid
+from nutdamp.schedule import Schedule, steerable_pulse
+from nutdamp.schemes.tools.sun_pulses import fired
+from nutdamp.spacecraft import Disturbance, Inertia, Steerable
+from nutdamp.tolerances import Dispersions, Tolerance
 
 CASES = 40
-MODELS = {
-    "prolate": dispersed.with_jets(),
-    "oblate, spin reversed": dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0),
+PROLATE = dispersed.with_jets()
+STEERED = dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-4.0)
+SYMMETRIC = {
+    "prolate": PROLATE,
+    "prolate, spin reversed": dispersed.with_jets(spin=-3.0),
+    "oblate": dispersed.with_jets(moments=(80.0, 80.0, 120.0), spin=2.0),
+    "near a sphere": dispersed.with_jets(moments=(100.0, 100.0, 100.0)),
+    "steerable, oblate, spin reversed": STEERED,
+    "prolate, dissipation": dispersed.sinking(PROLATE),
+    "oblate, dissipation": dispersed.sinking(STEERED, 4.0),
+}
+THREE = {
     "three moments": dispersed.with_jets(moments=(120.0, 105.0, 80.0)),
     "three moments, oblate, spin reversed": dispersed.with_jets(moments=(80.0, 95.0, 120.0), spin=-2.0),
 }
+LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
+LEAKING = Model(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
 
 
-def disturbed() -> Model:
-    model = MODELS["prolate"]
-    body = replace(
-        model.spacecraft,
-        disturbances=(Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0)),
-        dissipation=400.0,
-    )
-    return Model(body, model.schedule)
+def outputs(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Of all cases, (5, n)."""
+    out = np.empty((len(OUTPUTS), max(map(np.size, draws.values()), default=1)))
+    measure(model, fly(model)(model.cases(draws)), out)
+    return out
 
 
-SINKING = [dispersed.sinking(MODELS["prolate"]), dispersed.sinking(MODELS["oblate, spin reversed"], 5.0)]
-
-
-@pytest.mark.parametrize(
-    "model",
-    [*MODELS.values(), disturbed(), *SINKING],
-    ids=[*MODELS, "disturbances, dissipation", "prolate, dissipation", "oblate, dissipation"],
-)
-def test_each_case_is_the_flight_of_its_own_spacecraft(model: Model) -> None:
+@spread("name", SYMMETRIC, quick=4, deep=3)
+def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> None:
+    """Kicks at the pulse centres; the body is flown by DOP853, with dissipation by H in space and the attitude."""
+    model = SYMMETRIC[name]
     draws = dispersed.first_cases(Study(model), CASES)
-    found = np.empty((5, CASES))
-    measure(model, RealWidths(model)(model.cases(draws)), found)
-    for case in range(0, CASES, 3):
+    by_sum = outputs(ClosedForm, model, draws)
+    estimate = np.asarray(model.spacecraft.inertia.moments) * model.spacecraft.omega0
+    for case in range(0, CASES, 5):
         one = dispersed.one_of(draws, case)
-        assert found[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
+        true, made = realised(model, one)
+        kicks = [
+            reference.Kick(pulse.t, np.array([acting.real, acting.imag, pulse.impulse[2]]))
+            for pulse, acting in zip(made, flight.effective_impulses(true, made), strict=True)
+        ]
+        moments, until = true.inertia.moments, max(pulse.t for pulse in made)
+        end = reference.fly(moments, true.omega0, kicks, until, np.eye(3), true.growth)
+        momentum = reference.momentum(moments, end)
+        # The axis error: H in the estimated body axes, from the true ones by the tilt, against H of the estimate.
+        pointed = Rotation.from_rotvec([one["attitude x"], one["attitude y"], 0.0]).apply(momentum)
+        expected = [
+            reference.nutation(moments, end.rates, math.copysign(1.0, true.spin)),
+            reference.angle(np.asarray(moments) * true.omega0, momentum),
+            reference.angle(pointed, estimate),
+            end.rates[2] - true.spin,
+        ]
+        assert by_sum[:4, case] == pytest.approx(expected, abs=1e-9)
+    assert by_sum[0].std() > 1e-3  # the cases do differ
 
 
-def test_a_case_of_its_own_has_the_attitude_of_the_truth() -> None:
-    model = MODELS["prolate"]
-    true, _ = realised(model, {"attitude x": 0.02})
-    before, after = model.spacecraft.initial.quaternion, true.initial.quaternion
-    turned = 2.0 * math.acos(min(1.0, abs(float(before @ after))))
-    assert turned == pytest.approx(0.02)
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_the_impulse_sum_of_each_case_is_that_of_its_own_spacecraft(name: str) -> None:
+    model = SYMMETRIC[name]
+    draws = dispersed.first_cases(Study(model), CASES)
+    by_sum = outputs(ClosedForm, model, draws)
+    for case in range(0, CASES, 4):
+        left = flight.by_impulses(*realised(model, dispersed.one_of(draws, case))).residual
+        assert by_sum[:2, case] == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
+    left, nominal = flight.by_impulses(model.spacecraft, model.schedule).residual, outputs(ClosedForm, model, {})[:, 0]
+    assert nominal[:3] == pytest.approx([left.nutation, left.momentum_shift, left.axis_error], abs=1e-13)
+    assert nominal[4] == pytest.approx(model.schedule.propellant or math.nan, nan_ok=True)
+
+
+def test_the_impulse_sum_of_three_moments_has_their_H_and_the_body_of_their_mean() -> None:
+    model = THREE["three moments"]
+    body, A = model.spacecraft, 0.5 * (120.0 + 105.0)
+    mean = replace(
+        body, inertia=Inertia((A, A, 80.0)), omega0=np.array([120.0, 105.0, 80.0]) * body.omega0 / [A, A, 80.0]
+    )
+    left = flight.by_impulses(mean, model.schedule).residual
+    nominal = outputs(ClosedForm, model, {})[:2, 0]
+    assert nominal == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
+
+
+def test_pulses_that_change_places_act_in_their_own_order() -> None:
+    """Impulses 20 ms apart, of which a fixed error of 50 ms makes the second the first."""
+    pulses = [steerable_pulse(Steerable(), t, angle, impulse=4.0) for t, angle in ((1.0, 0.3), (1.02, 2.0))]
+    body = replace(spinner(), dispersions=Dispersions(timing=Tolerance("uniform", 0.05)))
+    model, draws = Model(body, Schedule(tuple(pulses))), {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
+    left = flight.by_impulses(*realised(model, draws)).residual
+    by_sum = outputs(ClosedForm, model, draws)[:2, 0]
+    assert by_sum == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
+    body = replace(spinner(steerable=Steerable(20.0)), dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)))
+    model = Model(body, Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),)))
+    assert model.cases({"timing offset": -5.0}).starts == (0.0,)  # one shifted before t = 0 fires at 0
+
+
+def test_a_schedule_without_pulses_leaves_what_is_there() -> None:
+    body = replace(spinner(), dispersions=Dispersions(A=Tolerance("normal", 0.01, True)))
+    nutation, shift, *_ = Study(Model(body, Schedule())).outputs_of({"A": 1.2})
+    assert nutation == pytest.approx(math.atan(1.01 * math.tan(math.radians(5.0))))
+    assert shift == 0.0
+    body = THREE["three moments"].spacecraft
+    left = flight.flown(body, Schedule()).residual
+    assert Study(Model(body, Schedule())).outputs_of({})[0] == pytest.approx(left.nutation)
+
+
+def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
+    for phase in (0.0, 1e-9, 0.1, 1.0, 3.0, 10.0, 40.0):
+        places, weights = np.polynomial.legendre.leggauss(nodes_for(phase))
+        mean = 0.5 * float(weights @ np.cos(phase * places))
+        assert mean == pytest.approx(np.sinc(phase / np.pi), abs=1e-14), phase
+    angle = np.concatenate([np.linspace(-400.0, 400.0, 20_001), [0.0, np.pi, -np.pi, 1e-300]])
+    assert np.abs(np.subtract(cos_sin(angle), (np.cos(angle), np.sin(angle)))).max() < 1e-15
+
+
+FLOWN = {
+    "steerable, oblate, spin reversed": STEERED,
+    "disturbances, dissipation": LEAKING,
+    "prolate, dissipation": SYMMETRIC["prolate, dissipation"],
+    "oblate, dissipation": dispersed.sinking(STEERED, 5.0),
+    **THREE,
+}
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name: str) -> None:
+    model = FLOWN[name]
+    draws = dispersed.first_cases(Study(model), CASES)
+    flown = outputs(RealWidths, model, draws)
+    for case in range(0, CASES, 6):
+        one = dispersed.one_of(draws, case)
+        assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
 
 
 def test_largest_nutation_of_many_is_that_of_each() -> None:
@@ -69,14 +172,108 @@ def test_largest_nutation_of_many_is_that_of_each() -> None:
     moments = generator.uniform(50.0, 100.0, (3, 400))
     momentum = generator.normal(size=(3, 400)) * [[30.0], [30.0], [200.0]]
     momentum[:2, :20] *= 1e-7
-    found = largest_nutation(moments, tuple(momentum), 1.0)
+    largest = largest_nutation(moments, tuple(momentum), 1.0)
     for case in range(400):
         first, second, third = (float(moment) for moment in moments[:, case])
         expected = arc_cones((first, second, third), momentum[:, case] / moments[:, case], 1.0)
-        assert found[case] == pytest.approx(expected.nutation, rel=1e-9, abs=1e-15), case
+        assert largest[case] == pytest.approx(expected.nutation, rel=1e-9, abs=1e-15), case
 
 
-def test_a_schedule_without_pulses_flies() -> None:
-    model = Model(MODELS["three moments"].spacecraft, Schedule())
-    left = flight.flown(model.spacecraft, Schedule()).residual
-    assert Study(model).outputs_of({})[0] == pytest.approx(left.nutation)
+BLOCKS = {
+    "spin reversed": by_blocks(),
+    "spin": by_blocks(spin=1.3),
+    "three moments": by_blocks(spin=2.0, moments=(110.0, 98.0, 150.0)),
+    "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
+}
+
+
+@spread("name", BLOCKS, quick=1)
+def test_each_case_fires_its_blocks_as_its_own_body_alone(name: str) -> None:
+    model = BLOCKS[name]
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 15)
+    own, flown = timed(model, model.cases(draws)), outputs(RealWidths, model, draws)
+    planned = np.array([pulse.start for pulse in model.schedule])
+    for case in (0, 7, 14):
+        one = dispersed.one_of(draws, case)
+        true, _ = realised(model, one)
+        starts = np.array([pulse.start for pulse in fired(true, model.schedule.blocks)])
+        assert np.array([start[case] for start in own.starts]) == pytest.approx(starts, abs=1e-9)
+        assert np.abs(starts - planned).max() > 0.05  # at planned times they would be elsewhere
+        assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.parametrize("number", [2, deep(11)])
+def test_blocks_fire_what_their_valves_give(number: int) -> None:
+    """Ramps, cold nozzles and falling pressure; a Sun pulse comes while the thrust is on."""
+    valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
+    channels = tuple(one.of(valve=valve) for one in BLOCKS["spin reversed"].spacecraft.channels)
+    whole = by_blocks(cold=Cold(0.7, 3.0), tank=Tank(1.0, 2e6, 1e6, 1.0), channels=channels)
+    model = Model(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:2]))
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
+    own, flown = timed(model, model.cases(draws)), outputs(RealWidths, model, draws)
+    one = dispersed.one_of(draws, number)
+    true, _ = realised(model, one)
+    made = fired(true, model.schedule.blocks)
+    middles = [start[number] + 0.5 * width for start, width in zip(own.starts, model.on_times, strict=True)]
+    assert middles == pytest.approx([pulse.t for pulse in made], abs=1e-9)
+    assert np.abs(np.array(middles) - [pulse.t for pulse in model.schedule]).max() > 0.05
+    assert flown[:, number] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
+    spun = flight.flown(true, made).settled.spin - true.spin
+    assert flown[OUTPUTS.index("spin_change"), number] == pytest.approx(spun, abs=1e-9)
+
+
+@pytest.mark.parametrize("number", [deep(0), deep(3)])
+def test_blocks_begin_as_the_reference_has_it(number: int) -> None:
+    """Euler's equations by DOP853, Sun pulses as their roots."""
+    model = BLOCKS["spin reversed"]
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 4)
+    true, _ = realised(model, dispersed.one_of(draws, number))
+    _, starts = flown_by_reference(true, model.schedule.blocks)
+    own = timed(model, model.cases(draws)).starts
+    assert [start[number] for start in own] == pytest.approx(starts, abs=1e-7)
+
+
+def test_errors_of_timing_and_of_the_attitude_are_those_of_the_case() -> None:
+    """A tilt of the truth moves its Sun pulses; an offset, a timing error and jitter come on top."""
+    given = Dispersions(attitude=dispersed.normal(0.03), timing=Tolerance("uniform", 0.01))
+    model = by_blocks(replace(given, timing_offset=dispersed.normal(0.02)), sun_sensor=SunSensor(0.4, jitter=2e-3))
+    jitters = [entry.name for entry in model.inputs.drawn if entry.name.startswith("Sun pulse")]
+    assert len(jitters) == len(set(jitters)) == len(model.schedule)
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 6)
+    own, one = timed(model, model.cases(draws)), dispersed.one_of(draws, 5)
+    true, _ = realised(model, {name: draw for name, draw in one.items() if name.startswith("attitude")})
+    late = one["timing offset"] + one["timing pulse 1"] + one["Sun pulse 1"]
+    first = fired(replace(true, sun_sensor=SunSensor(0.4)), model.schedule.blocks[:1]).pulses[0]
+    assert own.starts[0][5] == pytest.approx(first.start + late, abs=1e-9)
+
+
+def test_an_error_of_the_spin_turns_no_heading() -> None:
+    """From its own Sun pulses a train keeps its phase against the Sun; at planned times it would be smeared."""
+    body = commanded(spinner(120.0, 170.0, 1.2, 0.0, channels=cross(3.0)), np.array([1.0, 0.2, 0.1]))
+    body = replace(body, dispersions=Dispersions(omega0=(None, None, dispersed.normal(0.01, relative=True))))
+    made = fired(body, (Block("+1", 1, 1.0, 0.2, 40),))
+    own, fixed = (run(Results(study_of(body, one), 128)).values for one in (made, replace(made, blocks=())))
+    assert own is not None
+    assert fixed is not None
+    assert 5.0 * np.std(own[1]) < np.std(fixed[1])
+
+
+def test_a_sensor_that_loses_the_sun_fires_nothing() -> None:
+    model = BLOCKS["spin reversed"]
+    blind = replace(model.spacecraft, sun_sensor=SunSensor(0.4, elevation=1.4, half_width=0.1))
+    blinded = Model(blind, model.schedule)
+    assert not np.array(timed(blinded, model.cases({})).impulses).any()
+    seeing, gone = (RealWidths(one)(model.cases({})) for one in (model, blinded))
+    assert gone.propellant is None or float(np.max(gone.propellant)) == 0.0
+    assert float(np.squeeze(gone.spin_change)) == pytest.approx(0.0, abs=1e-12)
+    assert abs(float(np.squeeze(seeing.spin_change))) > 1e-3
+
+
+def test_sensitivities_are_those_of_pulses_fired_by_the_sun() -> None:
+    model, at = BLOCKS["spin reversed"], OUTPUTS.index("spin_change")
+    first = study_of(model.spacecraft, model.schedule).first_order
+    for index, entry in enumerate(first.inputs):
+        if entry.name in ("A", "C", "omega0_3"):
+            step = 1e-3 * entry.size
+            plus, minus = (flown_outputs(model, {entry.name: sign * step})[at] for sign in (1.0, -1.0))
+            assert first.jacobian[8, index] == pytest.approx((plus - minus) / (2.0 * step), rel=1e-4, abs=1e-9)
