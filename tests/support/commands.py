@@ -63,10 +63,14 @@ def words(text: str) -> str:
     return " ".join(text.split())
 
 
+def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run one command line, given as one text."""
+    return run(*shlex.split(command), **options)
+
+
 def result(run: Run, command: str, *, status: int = 0, stdin: str | None = None) -> Any:
     """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
-    more = () if command.startswith("export") else ("--json", "-")
-    ended = run(*shlex.split(command), *more, stdin=stdin)
+    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin)
     assert ended.returncode == status, ended.stderr
     return json.loads(ended.stdout)
 
