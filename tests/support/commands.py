@@ -58,6 +58,21 @@ def refusals(run: Run, folder: Path, commands: Iterable[str], status: int = 2, s
     return "\n".join(said)
 
 
+def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
+    """What commands print, behind each of them; behind a semicolon the exit status that is right, where it is not 0.
+
+    Of their results only paragraphs that have what ``only`` is a pattern of.
+    """
+    shown = ""
+    for line in commands:
+        command, _, status = line.partition("; ")
+        ended = call(run, command)
+        assert ended.returncode == int(status or 0), f"{command}\n{ended.stderr}"
+        paragraphs = [part for part in ended.stdout.split("\n\n") if re.search(only, part)]
+        shown += f"$ {command}\n{'\n\n'.join(paragraphs).rstrip()}\n{ended.stderr}\n"
+    return shown
+
+
 def words(text: str) -> str:
     """A text without its line breaks."""
     return " ".join(text.split())

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.cases import weekly
-from support.commands import names, result, rows, words
+from support.commands import call, names, result, rows, transcript, words
 from support.dispersed import FILE
 from support.golden import check_text
 from support.markup import parsed
@@ -35,12 +35,6 @@ def body(tmp_path: Path) -> Path:
     path = tmp_path / "body.yaml"
     path.write_text(FILE)
     return path
-
-
-def changed(body: Path, old: str, new: str) -> None:
-    text = body.read_text()
-    assert old in text
-    body.write_text(text.replace(old, new))
 
 
 @pytest.mark.usefixtures("body")
@@ -86,52 +80,44 @@ def test_runs_agree_on_any_threads_and_a_worst_case_can_be_run_again(run: Run) -
     check_text("cli.disperse.case", run(*command.split()).stdout)
 
 
+FEW = f"{TWO} --samples 50 --set"
+SCREENS = {
+    "all cases": [f"{TWO} --samples 2000"],
+    "requirements": [f"{FEW} 'requirement={{nutation: 9 deg}}'", f"{FEW} 'requirement={{nutation: 0.1 deg}}'; 4",
+                     f"{FEW} 'requirement={{}}'"],
+    "refused": [f"{FEW} 'dispersions.C={{bias: 250 %}}'; 2"],
+    "weak": ["disperse body.yaml --samples 9 --set 'limits={horizon: 4 s}' --set 'requirement={}' "
+             "--set 'steerable.torque=1 N m'"],
+}  # fmt: skip
+
+
 @pytest.mark.usefixtures("body")
-def test_the_screen_says_what_dominates_and_what_is_unused(run: Run) -> None:
-    command = (*TWO.split(), "--samples", "2000")
-    narrow, wide = (run(*command, columns=columns).stdout for columns in (80, 140))
-    check_text("cli.disperse.screen", narrow)
-    for shown, columns in ((narrow, 80), (wide, 140)):
-        assert max(map(len, shown.splitlines())) <= columns
-        assert "…" not in shown
-
-
-def test_statuses_of_requirements_met_missed_and_lacking(run: Run, body: Path) -> None:
-    """50 good cases show little; beyond what dispersions can be, or without any, it is exit 2."""
-    command = (*TWO.split(), "--samples", "50")
-    changed(body, "nutation: 0.6 deg, momentum_shift: 0.4 deg, probability: 60 %", "nutation: 9 deg")
-    few = run(*command)
-    assert (few.returncode, "It takes at least 1,228" in words(few.stdout)) == (0, True)
-    assert "met: 100.0 % of cases comply (99.7 % required)" in words(few.stdout)
-    changed(body, "nutation: 9 deg", "nutation: 0.1 deg")
-    missed = run(*command)
-    assert (missed.returncode, "NOT met" in missed.stdout) == (4, True)
-    changed(body, "requirement:", "# requirement:")
-    free = run(*command, "--json", "r.json")
-    assert (free.returncode, "no requirement" in free.stdout) == (0, True)
-    assert json.loads((body.parent / "r.json").read_text())["requirement"] is None
-    changed(body, "C: {normal: 1 %}", "C: {bias: 250 %}")
-    wild = run(*command)
-    assert wild.returncode == 2
-    body.write_text(FILE[: FILE.index("dispersions:")])
-    exact = run(*command)
-    assert exact.returncode == 2
-    check_text("cli.disperse.refused", f"{wild.stderr}\n{exact.stderr}")
-    body.write_text(body.read_text() + exact.stderr[exact.stderr.index("dispersions:\n") :])
-    assert run(*command).returncode in (0, 4)  # what is shown can be pasted
+@pytest.mark.parametrize("kind", SCREENS)
+def test_the_screen(run: Run, kind: str) -> None:
+    """What dominates and what is unused; 50 good cases show little; a recommended plan that does not damp is flown."""
+    shown = transcript(run, SCREENS[kind], "" if kind == "all cases" else "equirement")
+    check_text(f"cli.disperse.{kind}", shown)
+    assert "…" not in shown
+    assert all(len(line) <= 80 for line in shown.splitlines() if kind == "all cases" and not line.startswith("$"))
 
 
 def test_what_is_dispersed_is_the_scheme_the_schedule_or_the_recommended_plan(run: Run, body: Path) -> None:
-    """The last with a warning where it does not damp."""
-    assert run("plan", "body.yaml", "--scheme", "one-pulse", "--csv", "p.csv").returncode in (0, 4)
+    """By so many cases as other commands do; and the example of dispersions, where there are none, can be pasted."""
+    assert disperse.SAMPLES == dispersion.SAMPLES
+    data = result(run, TWO)
+    assert (data["scheme"], data["samples"], data["seed"]) == ("two-pulse", 20_000, 1)
+    assert call(run, "plan body.yaml --scheme one-pulse --csv p.csv").returncode in (0, 4)
     assert result(run, "disperse body.yaml --schedule p.csv --samples 9", status=4)["scheme"] == "p.csv"
-    recommended = result(run, "plan body.yaml")["recommended"]
-    assert result(run, "disperse body.yaml --samples 9")["scheme"] == recommended
-    changed(body, "requirement:", "# requirement:")
-    changed(body, "steerable: {torque: 60 N m,", "limits: {horizon: 4 s}\nsteerable: {torque: 1 N m,")
-    changed(body, "limits: {earliest: 1 s}\n", "")
-    check_text("cli.disperse.weak", run("disperse", "body.yaml", "--samples", "9").stderr)
-    assert "warning" not in run("disperse", "body.yaml", "--samples", "9", "--quiet").stderr
+    free = "--samples 9 --set requirement={}"
+    recommended = result(run, "plan body.yaml --set requirement={}")["recommended"]
+    data = result(run, f"disperse body.yaml {free}")
+    assert (data["scheme"], data["requirement"]) == (recommended, None)
+    exact = FILE[: FILE.index("dispersions:")]
+    body.write_text(exact)
+    shown = transcript(run, [f"{TWO}; 2"])
+    check_text("cli.disperse.exact", shown)
+    body.write_text(exact + shown[shown.index("dispersions:\n") :])
+    assert call(run, f"{TWO} {free}").returncode == 0
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
@@ -145,12 +131,6 @@ def test_tables_that_the_disk_does_not_hold_are_exit_1(run: Run, body: Path) -> 
     assert "cannot write big.csv" in big.stderr
     assert "GB are free" in big.stderr
     assert names(body.parent) == ["body.yaml"]
-
-
-def test_the_default_number_of_cases_is_that_of_the_other_commands(run: Run, body: Path) -> None:
-    assert disperse.SAMPLES == dispersion.SAMPLES
-    data = result(run, TWO)
-    assert (data["samples"], data["seed"]) == (20_000, 1)
 
 
 @pytest.mark.weekly
