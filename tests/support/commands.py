@@ -68,8 +68,8 @@ def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
         command, _, status = line.partition("; ")
         ended = call(run, command)
         assert ended.returncode == int(status or 0), f"{command}\n{ended.stderr}"
-        paragraphs = [part for part in ended.stdout.split("\n\n") if re.search(only, part)]
-        shown += f"$ {command}\n{'\n\n'.join(paragraphs).rstrip()}\n{ended.stderr}\n"
+        kept = "\n\n".join(part for part in ended.stdout.split("\n\n") if re.search(only, part)).rstrip()
+        shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
     return shown
 
 
