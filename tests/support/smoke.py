@@ -1,6 +1,6 @@
 """Runs every command of an installed nutdamp once, in a temporary folder, with nothing but the standard library.
 
-    python tests/smoke.py [NUTDAMP]
+    python tests/support/smoke.py [NUTDAMP]
 
 NUTDAMP is the program to run, by default the one beside this Python. Prints what went wrong and leaves with 1 where an
 exit status is not the one expected, a traceback or a warning is printed, or a file is missing or not of its kind.
@@ -51,72 +51,62 @@ init
 init; 1
 init --list
 init --from ace ace.yaml
-plan ace.yaml --scheme two-pulse
+plan ace.yaml --scheme one-pulse
 check
 check smoke.yaml --json check.json
 check broken.yaml; 2
 schema -o schema.json
 explain
-explain two-pulse
 explain 17
 explain file.thrusters
 explain weather; 2
 plan
-plan smoke.yaml --json plan.json --csv pulses.csv --plot plan.png
-plan smoke.yaml --scheme optimal --csv optimal.csv
-plan smoke.yaml --scheme optimal --free-axis --least time
-plan smoke.yaml --target 30deg,80deg --json target.json
-plan --robust --json robust.json; 0 4
-plan --target 10deg,45deg --scheme half-cone
+plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png --figure timeline
+plan smoke.yaml --scheme optimal --set limits.horizon=20s --csv optimal.csv
+plan smoke.yaml --scheme optimal --set limits.horizon=20s --free-axis --least time
+plan --scheme half-cone --target 10deg,45deg --json target.json
+plan --robust --scheme one-pulse --json robust.json; 4
 plan missing.yaml; 1
 plan broken.yaml; 2
 plan --colour red; 2
 plan smoke.yaml --scheme half-cone; 2
 plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
-simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.png --show
-simulate smoke.yaml --schedule pulses.csv --flown --plot motion.svg --figure motion
-simulate smoke.yaml --scheme none --until 60s --plot history.pdf --figure history
-trade --points 2 --csv trade.csv --json trade.json --plot trade.png --schedules folder
-disperse smoke.yaml --samples 2000 --csv cases.csv --json disperse.json --plot disperse.png
-disperse smoke.yaml --schedule pulses.csv --samples 2000
-disperse smoke.yaml --case 7 --json case.json
+simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion --show
+simulate smoke.yaml --schedule pulses.csv --flown
+simulate smoke.yaml --scheme none --until 10s --plot history.pdf --figure history
+trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder
+disperse smoke.yaml --schedule pulses.csv --samples 200 --csv c.csv --json d.json --plot d.png --figure cases
+disperse smoke.yaml --scheme two-pulse --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
-loop smoke.yaml --csv fired.csv --track flown.csv --json loop.json --plot loop.png
+verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
+loop smoke.yaml --set limits.horizon=30s --csv fired.csv --track flown.csv --json loop.json --plot loop.png
 loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
-disperse smoke.yaml --loop --set disturbances=[] --until 30s --samples 40 --csv loops.csv --json l.json --plot l.png
-disperse smoke.yaml --loop --until 20s --samples 2
-loop smoke.yaml --case 2 --json dispersed.json
+loop smoke.yaml --set limits.horizon=15s --case 2 --json dispersed.json
+disperse smoke.yaml --loop --set disturbances=[] --until 20s --samples 10 --csv loops.csv --json l.json --plot l.png
+disperse smoke.yaml --loop --until 5s --samples 2
 budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json --plot budget.png
 budget smoke.yaml; 2
 simulate smoke.yaml --scheme none --until 60s --samples 301 --csv telemetry.csv
 fit telemetry.csv smoke.yaml -o fitted.yaml --at 90s --json fit.json --plot fit.png
-plan fitted.yaml --scheme optimal
+plan fitted.yaml --scheme two-pulse
 fit telemetry.csv smoke.yaml --schedule missing.csv; 1
-verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
-report smoke.yaml -o report.html
-report -o dispersed.html --disperse 2000; 0 4
+report smoke.yaml --scheme two-pulse --disperse 200 -o report.html; 0 4
 report -o report.pdf; 2
-animate smoke.yaml --seconds 0.5 --fps 8 --width 320 -o film.gif
-export smoke.yaml --format apm -o out.apm
-export smoke.yaml --format apm -o out.xml
-export smoke.yaml --format aem --until 5s -o out.aem
-export smoke.yaml --format stk --until 5s -o out.a
-export smoke.yaml --format basilisk -o out.py
-export smoke.yaml --format json -o out.json
+animate smoke.yaml --schedule pulses.csv --seconds 0.2 --fps 5 --width 320 -o film.gif
+export smoke.yaml --schedule pulses.csv --format apm -o out.apm
+export smoke.yaml --schedule pulses.csv --format apm -o out.xml
+export smoke.yaml --schedule pulses.csv --format aem --until 5s -o out.aem
+export smoke.yaml --schedule pulses.csv --format stk --until 5s -o out.a
+export smoke.yaml --schedule pulses.csv --format basilisk -o out.py
+export smoke.yaml --schedule pulses.csv --format json -o out.json
 import apm out.apm -o again.yaml --schedule again.csv
 import apm out.xml; 2
 check again.yaml
 """.strip().splitlines()
 """One call a line; behind a semicolon the exit statuses that are right, where that is not 0."""
 
-BEGINNINGS = {
-    ".png": b"\x89PNG",
-    ".pdf": b"%PDF",
-    ".gif": b"GIF8",
-    ".svg": b"<?xml",
-    ".html": b"<!doctype",
-}
+BEGINNINGS = {".png": b"\x89PNG", ".pdf": b"%PDF", ".gif": b"GIF8", ".svg": b"<?xml", ".html": b"<!doctype"}
 """How a file of a kind begins."""
 
 
@@ -138,14 +128,8 @@ def _faults(program: str, folder: Path) -> Iterator[str]:
 
     def run(arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONUTF8": "1"}
-        return subprocess.run(
-            [program, *shlex.split(arguments)],
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [program, *shlex.split(arguments)]
+        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
     for line in CALLS:
         arguments, _, statuses = line.partition("; ")

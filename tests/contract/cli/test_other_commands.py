@@ -1,24 +1,32 @@
-"""``check``, ``init``, ``schema``, help and version as processes."""
+"""``check``, ``init``, ``schema``, help, version and completion; what each command loads, and files of other kinds."""
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
+from click.shell_completion import ShellComplete
 from support import places
-from support.cases import spread
+from support.broken import BROKEN
+from support.cases import spread, weekly
+from support.commands import EXACT, call, names, python, refusals, result, written
+from support.golden import check_text
 from support.process import Run
 
-from nutdamp import __version__
-from nutdamp.cli.root import COMMANDS
+from nutdamp import __version__, errors, survey
+from nutdamp.cli.parameters import FileName
+from nutdamp.cli.root import COMMANDS, group
+from nutdamp.spacecraft import Spacecraft
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
-GOOD = "name: Good\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
-TYPO = "name: Typo\ninertia: {A: 120, c: 80}\nomega0: [0.1, 0, 3]\n"
+GOOD = EXACT.replace("X", "Good")
+TYPO = GOOD.replace("Good", "Typo").replace("C:", "c:")
 TENSOR = """
 name: Tilted
 inertia: {tensor: [[120, 0, 2], [0, 118, 0], [2, 0, 80]]}
@@ -27,58 +35,52 @@ thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torq
 """
 
 
-def test_init_writes_a_file_that_plans(run: Run, tmp_path: Path) -> None:
+# --- init, schema, version --------------------------------------------------------------------------------------------
+
+
+def test_init_writes_a_file_that_plans_and_takes_the_place_of_none_unless_forced(run: Run, tmp_path: Path) -> None:
     assert run("init").returncode == 0
-    assert run("plan").returncode == 0
-    again = run("init")
-    assert again.returncode == 1
-    assert "--force" in again.stderr
-    (tmp_path / "spacecraft.yaml").write_text("mine")
-    assert run("init", "--force").returncode == 0
-    assert run("plan").returncode == 0
-    assert run("init", "other.yaml").returncode == 0
-    assert run("init", "-").stdout == (tmp_path / "other.yaml").read_text()
+    assert run("plan", "--scheme", "two-pulse").returncode == 0
+    assert "--force" in refusals(run, tmp_path, ["init"], 1)
+    written(tmp_path, spacecraft_yaml="mine")
+    assert run("init", "--force").returncode == run("init", "other.yaml").returncode == 0
+    example = (tmp_path / "spacecraft.yaml").read_text()
+    assert run("init", "-").stdout == (tmp_path / "other.yaml").read_text() == example
+    assert run("plan", "other.yaml", "--scheme", "two-pulse").returncode == 0
 
 
-def test_init_lists_the_spacecraft_that_ship_with_nutdamp(run: Run, tmp_path: Path) -> None:
-    shown = run("init", "--list").stdout
-    configs = [path.stem for path in (places.CONFIGS).glob("*.yaml")]
+def test_init_lists_and_writes_the_spacecraft_that_ship_with_nutdamp(run: Run, tmp_path: Path) -> None:
+    listed = run("init", "--list").stdout
+    configs = [path.stem for path in places.CONFIGS.glob("*.yaml")]
     assert configs
-    assert [name for name in configs if name not in shown] == []
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_init_writes_the_one_that_is_named(run: Run, tmp_path: Path) -> None:
+    assert [name for name in configs if name not in listed] == names(tmp_path) == []
     assert run("init", "--from", "ace", "mine.yaml").returncode == 0
     assert (tmp_path / "mine.yaml").read_bytes() == (places.CONFIGS / "ace.yaml").read_bytes()
     assert "ACE" in run("check", "mine.yaml").stdout
 
 
-def test_init_names_the_nearest_of_the_examples(run: Run, tmp_path: Path) -> None:
-    done = run("init", "--from", "lunar-prospecter")
-    assert done.returncode == 2
-    assert "there is no example 'lunar-prospecter'; did you mean 'lunar-prospector'?" in done.stderr
-    assert "--list" in run("init", "--from", "zzz").stderr
-    assert list(tmp_path.iterdir()) == []
+def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_path: Path) -> None:
+    schema = json.loads(run("schema").stdout)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert run("schema", "-o", "s.json").stdout == ""
+    assert json.loads((tmp_path / "s.json").read_text()) == schema
+    assert __version__ in run("--version").stdout
+
+
+# --- check ------------------------------------------------------------------------------------------------------------
 
 
 def test_check_prints_derived_quantities(run: Run) -> None:
-    done = run("check")
-    assert done.returncode == 0
-    for text in ("a = 0.3333", "nutation period", "smallest step", "deg apart about axis 3", "come nearest to that"):
-        assert text in done.stdout
+    ended = run("check")
+    assert ended.returncode == 0
+    check_text("cli.check.example", ended.stdout)
 
 
 def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
-    for name, text in (("good.yaml", GOOD), ("typo.yaml", TYPO), ("tensor.yaml", TENSOR)):
-        (tmp_path / name).write_text(text)
-    done = run("check", "typo.yaml", "good.yaml", "missing.yaml", "tensor.yaml", "--json", "check.json")
-    assert done.returncode == 2  # a bad file counts before one that cannot be read
-    assert "typo.yaml:2:" in done.stderr
-    assert "missing.yaml" in done.stderr
-    assert "Good" in done.stdout
-    assert "principal axis 1" in done.stdout
-    assert "SPIN" in done.stdout
+    written(tmp_path, good_yaml=GOOD, typo_yaml=TYPO, tensor_yaml=TENSOR)
+    ended = call(run, "check typo.yaml good.yaml missing.yaml tensor.yaml --json check.json")
+    assert ended.returncode == 2  # a bad file counts before one that cannot be read
+    check_text("cli.check.files", ended.stderr + ended.stdout)
     files = json.loads((tmp_path / "check.json").read_text())["files"]
     assert [entry["valid"] for entry in files] == [False, True, False, True]
     assert files[0]["faults"][0]["line"] == 2
@@ -87,207 +89,225 @@ def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
     assert axes[0][2] == pytest.approx(-axes[2][0], abs=1e-12)  # the tilt about axis 2
 
 
-LATE = """
-import sys
-from nutdamp import errors, survey
-from nutdamp.cli import main
+def test_check_goes_on_after_what_turns_out_late(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spin_axis, problem = survey.spin_axis, "the motion changes too fast to be integrated"
 
-found = survey.spin_axis
+    def late(spacecraft: Spacecraft) -> survey.SpinAxis:
+        if spacecraft.name == "Late":
+            raise errors.Infeasible(problem)
+        return spin_axis(spacecraft)
 
-def late(spacecraft):
-    if spacecraft.name == "Typo":
-        raise errors.Infeasible("the motion changes too fast to be integrated")
-    return found(spacecraft)
-
-survey.spin_axis = late
-sys.argv = ["nutdamp", "check", "typo.yaml", "good.yaml", "--json", "check.json"]
-main()
-"""
-
-
-def test_check_goes_on_after_what_turns_out_late(tmp_path: Path) -> None:
-    for name, text in (("good.yaml", GOOD), ("typo.yaml", TYPO.replace("c:", "C:"))):
-        (tmp_path / name).write_text(text)
-    done = subprocess.run([sys.executable, "-c", LATE], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr == "typo.yaml:1:1: the motion changes too fast to be integrated\n"
-    assert "Good" in done.stdout
-    files = json.loads((tmp_path / "check.json").read_text())["files"]
-    assert [entry["valid"] for entry in files] == [False, True]
-    assert files[0]["faults"][0]["problem"] == "the motion changes too fast to be integrated"
+    monkeypatch.setattr(survey, "spin_axis", late)
+    written(tmp_path, good_yaml=GOOD, late_yaml=GOOD.replace("Good", "Late"))
+    ended = call(run, "check late.yaml good.yaml --json check.json")
+    assert (ended.returncode, ended.stderr) == (2, f"late.yaml:1:1: {problem}\n")
+    assert "Good" in ended.stdout
+    late_, good = json.loads((tmp_path / "check.json").read_text())["files"]
+    assert (late_["valid"], good["valid"], late_["faults"][0]["problem"]) == (False, True, problem)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_a_bad_file_counts_before_a_report_that_cannot_be_written(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "typo.yaml").write_text(TYPO)
-    (tmp_path / "good.yaml").write_text(GOOD)
-    assert run("check", "good.yaml", "typo.yaml", "--json", "/dev/full").returncode == 2
-    assert run("check", "good.yaml", "--json", "/dev/full").returncode == 1
+    written(tmp_path, good_yaml=GOOD, typo_yaml=TYPO)
+    assert call(run, "check good.yaml typo.yaml --json /dev/full").returncode == 2
+    assert call(run, "check good.yaml --json /dev/full").returncode == 1
 
 
-@pytest.mark.usefixtures("plain_pages")
-def test_check_reports_warnings_on_screen_and_in_json(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "fast.yaml").write_text(GOOD.replace("3]", "300]"))
-    done = run("check", "fast.yaml", "--json", "check.json")
-    place = "fast.yaml:3:18: omega0[2]: warning: "
-    problem = "300 is read as 300 rad/s; write 300 deg/s if that is meant, else 300 rad/s"
-    assert (done.returncode, done.stderr) == (0, f"{place}{problem}\n")
-    (found,) = json.loads((tmp_path / "check.json").read_text())["files"]
-    assert found["valid"]
-    (warned,) = found["warnings"]
-    assert warned.pop("place").endswith(".yaml:3:18")
-    assert warned == {"line": 3, "column": 18, "where": "omega0[2]", "problem": problem}
-    for command in (("plan",), ("simulate", "--scheme", "none"), ("report",), ("verify",)):
-        assert run(command[0], "fast.yaml", *command[1:]).stderr.startswith(place)
-    assert run("check", "fast.yaml", "--quiet").stderr == f"{place}{problem}\n"
+def test_warnings_are_shown_by_every_command_and_in_json(run: Run, tmp_path: Path) -> None:
+    """Also by those that are told to be quiet."""
+    written(tmp_path, fast_yaml=GOOD.replace("3]", "300]"))
+    ended = call(run, "check fast.yaml --json check.json")
+    assert ended.returncode == 0
+    check_text("cli.check.warning", ended.stderr)
+    (entry,) = json.loads((tmp_path / "check.json").read_text())["files"]
+    (warning,) = entry["warnings"]
+    assert entry["valid"]
+    assert warning.pop("place").endswith(".yaml:3:18")
+    place = {"line": 3, "column": 18, "where": "omega0[2]"}
+    assert warning == place | {"problem": ended.stderr.partition("warning: ")[2].rstrip("\n")}
+    for command in ("check -q", "plan --scheme one-pulse -q", "simulate --scheme none -q"):
+        assert call(run, f"{command} fast.yaml").stderr.startswith(ended.stderr)
+    allowed = [
+        call(run, f"trade --points 1 --set limits.horizon=10ms --allow {angle}") for angle in ("0.1", "0.1deg", "0")
+    ]
+    check_text("cli.check.allow", "\n".join(trade.stderr for trade in allowed))
 
 
-def test_a_missing_file_alone_is_exit_1(run: Run) -> None:
-    assert run("check", "missing.yaml").returncode == 1
+def test_a_misspelt_inertia_stops_every_command(run: Run, tmp_path: Path) -> None:
+    written(tmp_path, typo_yaml=TYPO)
+    commands = [f"{command} typo.yaml" for command in ("plan", "simulate --scheme none", "check", "verify", "report")]
+    check_text("cli.check.misspelt", refusals(run, tmp_path, commands))
 
 
-def test_a_misspelt_inertia_stops_the_run(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "typo.yaml").write_text(TYPO)
-    for command in (("plan",), ("simulate", "--scheme", "none"), ("check",)):
-        done = run(command[0], "typo.yaml", *command[1:])
-        assert done.returncode == 2
-        assert "did you mean" in done.stderr
-        assert done.stdout == ""
+def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Path) -> None:
+    planned = result(run, "plan -q --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s")
+    assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
+    for name in ("a.yaml", "b.yaml"):
+        run("init", name)
+    assert call(run, "check a.yaml b.yaml --set 'state.spin=31 rpm'").stdout.count("31 rpm") == 2
+    (fault,) = result(run, "check a.yaml --set mass=0", status=2)["files"][0]["faults"]
+    assert (fault["line"], fault["column"], fault["where"]) == (None, None, "mass")
+    assert fault["place"].startswith("--set mass=")
 
 
-def test_schema_is_json(run: Run, tmp_path: Path) -> None:
-    schema = json.loads(run("schema").stdout)
-    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert run("schema", "-o", "s.json").stdout == ""
-    assert json.loads((tmp_path / "s.json").read_text()) == schema
+DISPERSED = """\
+name: Sat
+inertia: {A: 120, C: 80}
+omega0: [0.1, 0.2, 3]
+thrusters:
+  - {name: left 1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N}
+  - {name: T2, torque: [0, 8, 0]}
+  - {name: T3, torque: [0, -8, 0]}
+channels: {+: [left 1], -: [T2]}
+dispersions:
+  A: {normal: 0}
+  thrust: {normal: 3 %}
+  thrust_direction: {normal: 0.5 deg}
+  timing: {uniform: 5 ms}
+"""
 
 
-def test_version(run: Run) -> None:
-    assert __version__ in run("--version").stdout
+def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(run: Run, tmp_path: Path) -> None:
+    written(tmp_path, sat_yaml=DISPERSED, exact_yaml=DISPERSED.partition("dispersions:")[0])
+    check_text("cli.check.dispersions", run("check", "sat.yaml").stdout)
+    inputs = ["thrust left 1", "thrust T2", "direction left 1 a", "direction left 1 b", "timing of each pulse"]
+    dispersions = result(run, "check sat.yaml")["files"][0]["dispersions"]
+    assert [entry["name"] for entry in dispersions["inputs"]] == inputs
+    assert set(dispersions["unused"]) == {"A", "thrust T3", "direction T2", "direction T3"}
+    assert "dispersion" not in run("check", "exact.yaml").stdout
+    assert result(run, "check exact.yaml")["files"][0]["dispersions"] is None
 
 
-@pytest.mark.parametrize("arguments", [(), *((command,) for command in COMMANDS)])
-@pytest.mark.parametrize("flag", ["-h", "--help"])
-def test_every_help_page_fits_80_columns(run: Run, arguments: tuple[str, ...], flag: str) -> None:
-    done = run(*arguments, flag)
-    assert done.returncode == 0
-    assert done.stdout.startswith("Usage: ")
-    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+def test_of_very_many_faults_the_first_hundred_are_shown(run: Run, tmp_path: Path) -> None:
+    thrusters = "".join(f"  - {{name: T{number}, paint: red, torque: [8, 0, 0]}}\n" for number in range(300))
+    written(tmp_path, f_yaml=f"{EXACT}thrusters:\n{thrusters}")
+    shown = run("check", "f.yaml").stderr.splitlines()
+    assert (len(shown), shown[-1]) == (101, "and 200 more faults")
 
 
-def test_help_loads_click_only(run: Run) -> None:
-    code = (
-        "import sys\nfrom nutdamp.cli.root import group\ngroup.main(['--help'], standalone_mode=False)\n"
-        "print(sorted({'numpy', 'scipy', 'yaml', 'pydantic', 'rich', 'matplotlib'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
+@spread("name", BROKEN, quick=10)
+def test_a_broken_file_stops_the_plan(run: Run, tmp_path: Path, name: str) -> None:
+    text, expected = BROKEN[name]
+    written(tmp_path, broken_yaml=text)
+    said = refusals(run, tmp_path, ["plan broken.yaml --csv pulses.csv --json plan.json"]).splitlines()[1:]
+    assert len(said) == len(expected)
+    for line, fault in zip(said, expected, strict=True):
+        assert line.startswith(f"broken.yaml:{':'.join(fault.split(':')[:2])}: ")
 
 
-LEAN = (
-    "plan",
-    "plan --scheme optimal --free-axis",
-    "disperse --samples 100",
-    "simulate --scheme optimal",
-)
-"""Commands that run without heavy packages; the first two also without masked arrays."""
+def test_what_is_no_text_is_refused(run: Run, tmp_path: Path) -> None:
+    for content in (bytes(range(256)), "name: Düse\n".encode("latin-1"), "name: X\n".encode("utf-16"), b"name: X\0\n"):
+        (tmp_path / "broken.yaml").write_bytes(content)
+        assert refusals(run, tmp_path, ["plan broken.yaml"]).splitlines()[1].startswith("broken.yaml:1:")
 
-LEAN_TOO = (
-    "plan --scheme optimal --least time",
-    "plan --target 10deg,20deg",
-    "plan --robust --scheme one-pulse",
-    "trade --points 2",
-    "disperse --samples 100 --scheme optimal",
-)
+
+def test_a_file_of_another_kind_is_called_what_it_is(run: Run, tmp_path: Path) -> None:
+    """Their faults, such as a text where a mapping is expected, named no cure."""
+    for command in ("plan --csv pulses", "simulate --csv track", "plan --json plan"):
+        assert call(run, f"{command} --scheme four-pulse").returncode == 0
+    (tmp_path / "apm").write_text("COMMENT a\nCCSDS_APM_VERS = 2.0\n")
+    (tmp_path / "xml").write_text('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n')
+    (tmp_path / "oem").write_text("CCSDS_OEM_VERS = 2.0\n")
+    kinds = ("pulses", "track", "plan", "apm", "xml", "oem")
+    check_text("cli.check.kinds", refusals(run, tmp_path, [f"plan {kind}" for kind in kinds]))
+
+
+# --- help and completion ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_every_help_page_fits_the_screen_of_a_terminal(run: Run, command: str) -> None:
+    pages = [call(run, f"{command} {flag}") for flag in ("-h", "--help")]
+    assert pages[0].stdout == pages[1].stdout
+    assert pages[0].returncode == 0
+    lines = pages[0].stdout.splitlines()
+    assert lines[0].startswith("Usage: ")
+    assert len(lines) <= 60
+    assert max(map(len, lines)) <= 80
+
+
+def test_trade_shows_no_option_that_it_does_not_read(run: Run) -> None:
+    """No scheme of a front reads the Sun, and none is left out of it for a bug."""
+    shown = run("trade", "--help").stdout
+    assert [option in shown for option in ("--target", "--sun", "--debug")] == [True, False, False]
+
+
+COMPLETED = {
+    **{f"{words} {name}": f"file {name}" for words, name in (
+        ("plan", "sp"), ("check a.yaml", "sp"), ("init", "sp"), ("import apm", "sp"), ("simulate --schedule", "pul"),
+        ("plan --csv", "out"), ("plan --json", "out"), ("plan --plot", "out"), ("report -o", "out"),
+        ("schema --output", "out"))},
+    "trade --schedules out": "dir out", "ver": "plain verify", "plan --targ": "plain --target",
+    "plan --scheme two": "plain two-pulse", "init --from lun": "plain lunar-prospector",
+    "explain nu": "plain nutation",
+}  # fmt: skip
+
+
+def test_shells_complete_commands_options_choices_topics_and_leave_files_to_the_shell() -> None:
+    shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
+    for words, expected in COMPLETED.items():
+        *before, last = words.split()
+        assert [f"{item.type} {item.value}" for item in shell.get_completions(before, last)] == [expected], words
 
 
 @pytest.mark.deep
-@spread("lean", [LEAN, LEAN_TOO], quick=1, deep=0)
-def test_planning_a_symmetric_body_loads_no_scipy_and_no_matplotlib(lean: tuple[str, ...]) -> None:
-    """One process runs them all. numpy.ma, as `numpy.unique` loads it, is a tenth of the start-up of a command."""
-    unmasked = 2 * (lean is LEAN)
-    code = (
-        "import contextlib, sys\nfrom nutdamp.cli.root import group\n"
-        f"for number, words in enumerate({lean!r}):\n"
-        "    with contextlib.suppress(SystemExit): group.main([*words.split(), '-q'], standalone_mode=False)\n"
-        f"    masked = ['numpy.ma'] if number < {unmasked} else []\n"
-        "    heavy = {'scipy', 'matplotlib', 'pydantic', 'jinja2', *masked}\n"
-        "    print('LOADED by', words, *sorted(heavy & set(sys.modules)))"
+def test_completion_is_that_of_a_process_called_nutdamp() -> None:
+    code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli import main; main()"
+    asked = {"_NUTDAMP_COMPLETE": "bash_complete", "COMP_WORDS": "nutdamp plan sp", "COMP_CWORD": "2"}
+    process = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True, check=False
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = [line for line in done.stdout.splitlines() if line.startswith("LOADED by")]
-    assert loaded == [f"LOADED by {words}" for words in lean]
+    assert (process.stdout, process.stderr) == ("file,sp\n", "")
 
 
-@pytest.mark.parametrize(
-    ("written", "said"),
-    [
-        (("plan", "--csv", "x"), "got a schedule, as `plan --csv` writes it; name it with --schedule"),
-        (("simulate", "--scheme", "four-pulse", "--csv", "x"), "got a track, as `simulate --csv` writes it"),
-        (("plan", "--json", "x"), "got a result in JSON, as nutdamp writes it"),
-    ],
-)
-def test_a_file_of_another_kind_is_called_what_it_is(run: Run, written: tuple[str, ...], said: str) -> None:
-    """Their faults, such as a text where a mapping is expected, named no cure."""
-    assert run(*written).returncode == 0
-    done = run("plan", "x")
-    assert done.returncode == 2
-    assert done.stderr.startswith("x:1:1: expected a spacecraft file, ")
-    assert said in done.stderr
+def test_every_file_of_every_command_is_completed() -> None:
+    files = ("spacecraft", "files", "file", "csv", "json", "plot", "output", "schedule")
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        assert command is not None
+        for parameter in command.params:
+            assert parameter.name not in files or isinstance(parameter.type, FileName), f"{name}: {parameter.name}"
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("COMMENT a\nCCSDS_APM_VERS = 2.0\n", "`nutdamp import FILE`"),
-        ('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n', "another XML or HTML text"),
-        ("CCSDS_OEM_VERS = 2.0\n", "another XML or HTML text"),
-    ],
-)
-def test_a_ccsds_message_is_called_that(run: Run, tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "x").write_text(text)
-    done = run("check", "x")
-    assert done.returncode == 2
-    assert said in done.stderr
+# --- what a command loads ---------------------------------------------------------------------------------------------
+
+LOADED = """
+import contextlib, sys
+from nutdamp.cli.root import group
+for words, heavy in {commands!r}:
+    with contextlib.suppress(SystemExit):
+        group.main(words.split(), standalone_mode=False)
+    print("LOADED by", words, *sorted(set(heavy) & set(sys.modules)))
+"""
+HEAVY = ("scipy", "matplotlib", "pydantic", "jinja2")
+LEAN = [
+    [("--help", ("numpy", "yaml", "rich", *HEAVY))],
+    [("plan -q", ("numpy.ma", *HEAVY)), ("plan -q --scheme optimal --free-axis", ("numpy.ma", *HEAVY)),
+     ("disperse -q --samples 100", HEAVY), ("simulate -q --scheme optimal", HEAVY)],
+    [(words, HEAVY) for words in ("plan -q --scheme optimal --least time", "plan -q --target 10deg,20deg",
+                                  "plan -q --robust --scheme one-pulse", "trade -q --points 2",
+                                  "disperse -q --samples 100 --scheme optimal")],
+]  # fmt: skip
 
 
-def test_every_message_about_a_missing_file_has_the_name_of_the_program(run: Run) -> None:
-    for command in ("check", "plan"):
-        assert run(command, "nope.yaml").stderr == "nutdamp: cannot read nope.yaml: no such file or directory\n"
+@pytest.mark.parametrize("commands", [LEAN[0], pytest.param(LEAN[1], marks=pytest.mark.deep), weekly(LEAN[2])])
+def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str, tuple[str, ...]]]) -> None:
+    """A symmetric body needs no scipy; numpy.ma, as `numpy.unique` loads it, is a tenth of the start-up."""
+    shown = python(tmp_path, LOADED.format(commands=commands)).stdout
+    loaded = [line for line in shown.splitlines() if line.startswith("LOADED by")]
+    assert loaded == [f"LOADED by {words}" for words, _ in commands]
 
 
-@pytest.mark.parametrize(
-    ("words", "warning"),
-    [
-        (("plan", "--spin", "31"), "--spin: warning: 31 is read as 31 rad/s; write 31 rpm if that is meant"),
-        (("plan", "--spin", "3.25"), None),
-        (("plan", "--spin", "31 rad/s"), None),
-        (
-            ("trade", "--points", "1", "--allow", "0.1"),
-            "--allow: warning: 0.1 is read as 0.1 rad (5.73 deg); write 0.1",
-        ),
-        (("trade", "--points", "1", "--allow", "0.1deg"), None),
-        (("trade", "--points", "1", "--allow", "0"), None),
-    ],
-)
-def test_numbers_without_unit_that_are_hardly_meant_are_named(
-    run: Run, words: tuple[str, ...], warning: str | None
-) -> None:
-    said = run(*words, "--set", "limits.horizon=10ms").stderr  # too short for any plan: it is read first
-    assert "is read as" not in said if warning is None else warning in said
-
-
-def test_products_of_small_matrices_have_one_thread() -> None:
+@pytest.mark.deep
+def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
-    import os
-    import subprocess
-    import sys
-
-    code = "import os, sys\nfrom nutdamp.cli import main\nsys.argv = ['nutdamp', '--version']\ntry: main()\nfinally: "
+    code = (
+        "import os, sys\n{}\nfrom nutdamp.cli import main\nsys.argv = ['nutdamp', '--version']\ntry: main()\nfinally: "
+    )
     code += "print(os.environ['OPENBLAS_NUM_THREADS'])"
-    for given, used in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
-        kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**kept, **given}
-        )
-        assert done.stdout.splitlines()[-1] == used
+    for given, used in (
+        ("os.environ.pop('OPENBLAS_NUM_THREADS', 0)", "1"),
+        ("os.environ['OPENBLAS_NUM_THREADS'] = '3'", "3"),
+    ):
+        assert python(tmp_path, code.format(given)).stdout.splitlines()[-1] == used

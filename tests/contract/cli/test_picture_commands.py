@@ -1,195 +1,89 @@
-"""Pictures by command: plan --plot, simulate --plot and --show, animate; as processes."""
+"""Pictures by command: --plot, --figure and --show, films by animate, and pages by report."""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from support.cases import spread
+from support import places
+from support.cases import deep, spread, weekly
+from support.commands import EXACT, call, contents, names, python, refusals, words, written
+from support.golden import check_text
+from support.markup import parsed
 from support.process import Run
+
+from nutdamp import __version__
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
-IDEAL = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
-
-
-def left(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
+FILM = ("--seconds", "0.5", "--fps", "10", "--width", "320")
 
 
 @pytest.mark.deep
-@spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")], quick=1, deep=0)
-def test_plan_draws_the_motion(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
-    done = run("plan", "--plot", f"motion.{ending}")
-    assert done.returncode == 0
-    assert "Traceback" not in done.stderr
-    assert (tmp_path / f"motion.{ending}").read_bytes().startswith(magic)
-    assert left(tmp_path) == [f"motion.{ending}"]
+@spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")], quick=1, deep=0)
+def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
+    pytest.importorskip("matplotlib")
+    assert call(run, f"simulate --scheme four-pulse --figure motion --plot a.{ending}").returncode == 0
+    assert call(run, f"plan --figure timeline --plot b.{ending}").returncode == 0
+    disperse = "disperse --scheme two-pulse --samples 200 --figure cases"
+    assert call(run, f"{disperse} --plot c.{ending}").returncode == 4
+    assert names(tmp_path) == [f"{name}.{ending}" for name in "abc"]
+    assert all(content.startswith(magic) for content in contents(tmp_path).values())
 
 
-def test_another_figure_can_be_chosen(run: Run, tmp_path: Path) -> None:
+@pytest.mark.deep
+def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(run: Run, tmp_path: Path) -> None:
+    """optimal for the built-in example: the same picture as that scheme alone, and not that of another."""
+    draw = ("--figure", "timeline", "--plot")
+    for name, scheme in (("recommended", ()), ("optimal", ("--scheme", "optimal")), ("two", ("--scheme", "two-pulse"))):
+        run("plan", *scheme, *draw, f"{name}.png")
     for figure in ("sphere", "timeline"):
         assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 4
-    assert len({path.read_bytes() for path in tmp_path.iterdir()}) == 2
-    assert run("plan", "--plot", "a.png", "--figure", "globe").returncode == 2
-
-
-def test_plan_draws_the_plan_that_it_recommends(run: Run, tmp_path: Path) -> None:
-    """optimal for the built-in example: the same picture as that scheme alone, and not that of another."""
-    run("plan", "--plot", "recommended.png", "--figure", "timeline")
-    run("plan", "--scheme", "optimal", "--plot", "optimal.png", "--figure", "timeline")
-    run("plan", "--scheme", "two-pulse", "--plot", "two.png", "--figure", "timeline")
-    recommended, optimal, two = ((tmp_path / f"{name}.png").read_bytes() for name in ("recommended", "optimal", "two"))
-    assert recommended == optimal
-    assert recommended != two
+    drawn = contents(tmp_path)
+    assert drawn["recommended.png"] == drawn["optimal.png"]
+    assert len(set(drawn.values())) == 4
 
 
 @pytest.mark.deep
 def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> None:
     """Also where several are named, of which no other picture could be drawn, and where none is feasible."""
-    named = ("--scheme", "one-pulse", "--scheme", "two-pulse")
-    assert run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes").returncode == 0
-    words = re.findall(r"<text[^>]*>([^<]*)</text>", (tmp_path / "schemes.svg").read_text(encoding="utf-8"))
-    assert {"one-pulse", "two-pulse", "propellant, g", "required"} <= set(words)
-    (tmp_path / "ideal.yaml").write_text(IDEAL)
-    none = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "none.svg", "--figure", "schemes")
-    assert none.returncode == 3
+    pair, draw = ("--scheme", "one-pulse", "--scheme", "two-pulse"), ("--figure", "schemes", "--plot")
+    assert run("plan", *pair, *draw, "schemes.svg").returncode == 0
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", (tmp_path / "schemes.svg").read_text(encoding="utf-8"))
+    assert {"one-pulse", "two-pulse", "propellant, g", "required"} <= set(texts)
+    assert run("plan", "-", "--scheme", "four-pulse", *draw, "none.svg", stdin=EXACT).returncode == 3
     assert "no plan" in (tmp_path / "none.svg").read_text(encoding="utf-8")
-
-
-@pytest.mark.deep
-def test_robust_plans_are_drawn_with_the_cases_that_comply(run: Run, tmp_path: Path) -> None:
-    named = ("--scheme", "two-pulse", "--robust", "-q")
-    run("plan", *named, "--plot", "schemes.svg", "--figure", "schemes")
-    assert "complying cases, %" in (tmp_path / "schemes.svg").read_text(encoding="utf-8")
+    run("plan", "--scheme", "two-pulse", "--robust", "-q", *draw, "robust.svg")
+    assert "complying cases, %" in (tmp_path / "robust.svg").read_text(encoding="utf-8")
 
 
 @pytest.mark.weekly
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
-    common = ("disperse", "--scheme", "two-pulse", "--samples", "200", "-q")
-    said = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.6 kg m²"}
-    for figure, words in said.items():
-        run(*common, "--plot", f"{figure}.svg", "--figure", figure)
-        assert words in (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")
-    run(*common, "--plot", "all.svg")
-    assert all(words in (tmp_path / "all.svg").read_text(encoding="utf-8") for words in said.values())
-    assert run("disperse", "--figure", "cases").returncode == 2
-
-
-def test_a_film_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None:
-    """7.434 s, a quarter of that, in half a second of film."""
-    done = run("animate", "--scheme", "two-pulse", "-o", "a.gif", "--seconds", "0.5", "--fps", "10", "--width", "320")
-    assert "5 frames, 18.6 s of motion in a second" in done.stderr
-    assert left(tmp_path) == ["a.gif"]
+    texts = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.6 kg m²"}
+    for figure in (*texts, "all"):
+        named = () if figure == "all" else ("--figure", figure)
+        run("disperse", "--scheme", "two-pulse", "--samples", "200", "-q", "--plot", f"{figure}.svg", *named)
+        drawn = (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")
+        assert all(text in drawn for text in (texts.values() if figure == "all" else [texts[figure]]))
 
 
 @pytest.mark.deep
-def test_standard_output_takes_the_picture_alone(run: Run) -> None:
-    environment = {**os.environ, "COLUMNS": "80"}
+def test_standard_output_takes_the_picture_alone() -> None:
     command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--plot", "-", "--figure", "timeline"]
-    done = subprocess.run(command, env=environment, capture_output=True, check=False)
-    assert done.returncode == 0
-    assert done.stdout.startswith(b"\x89PNG")
-    assert done.stdout.endswith(b"IEND\xaeB`\x82")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("plan", "--plot", "a.jpg"), ".png, .svg, .pdf"),
-        (("plan", "--plot", "a"), ".png, .svg, .pdf"),
-        (("plan", "--scheme", "one-pulse", "--scheme", "two-pulse", "--plot", "a.png"), "name one --scheme"),
-        (("plan", "--plot", "-", "--csv", "-"), "cannot both go to standard output"),
-        (("simulate", "--scheme", "none", "--show", "--csv", "-"), "--show draws on standard output"),
-        (("animate",), "--output"),
-        (("animate", "-o", "a.webm"), ".gif, .mp4"),
-        (("animate", "-o", "a.gif", "--until", "-1 s"), "after t = 0"),
-        (("animate", "-o", "a.gif", "--seconds", "0"), "--seconds"),
-        (("animate", "-o", "a.gif", "--fps", "0"), "--fps"),
-        (("animate", "-o", "a.gif", "--width", "10"), "--width"),
-        (("animate", "-o", "a.gif", "--scheme", "none", "--schedule", "a.csv"), "--schedule and --blocks"),
-    ],
-)
-def test_bad_command_lines_are_exit_2_and_write_nothing(
-    run: Run, tmp_path: Path, arguments: tuple[str, ...], said: str
-) -> None:
-    done = run(*arguments)
-    assert done.returncode == 2
-    assert said in " ".join(done.stderr.split())
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
-    assert left(tmp_path) == []
-
-
-@pytest.mark.parametrize("arguments", [("plan", "--plot"), ("animate", "--seconds", "0.2", "--fps", "5", "-o")])
-def test_an_unwritable_place_is_exit_1(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    done = run(*arguments, "missing/film.gif" if arguments[0] == "animate" else "missing/a.png")
-    assert done.returncode == 1
-    assert "cannot write missing/" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert left(tmp_path) == []
-
-
-def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "ideal.yaml").write_text(IDEAL)
-    done = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "a.png")
-    assert done.returncode == 3
-    assert "a.png was not written" in done.stderr
-    film = run("animate", "ideal.yaml", "--scheme", "four-pulse", "-o", "a.gif")
-    assert film.returncode == 3
-    assert left(tmp_path) == ["ideal.yaml"]
-
-
-def without(package: str, tmp_path: Path, *arguments: str, more: str = "") -> subprocess.CompletedProcess[str]:
-    """Run with an installation that lacks ``package``; ``more`` is run before."""
-    blocked = (
-        f"import sys; sys.modules[{package!r}] = None; from nutdamp.cli import main; sys.argv[0] = 'nutdamp'; {more}"
-        "\nmain()"
-    )
-    command = [sys.executable, "-c", blocked, *arguments]
-    return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize(
-    "arguments",
-    [("plan", "--plot", "a.png"), ("simulate", "--scheme", "none", "--plot", "a.svg"), ("animate", "-o", "a.gif")],
-)
-def test_without_matplotlib_it_is_exit_1_at_once_with_the_cure(tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    done = without("matplotlib", tmp_path, *arguments)
-    assert done.returncode == 1
-    assert "pip install 'nutdamp[plot]'" in done.stderr
-    assert done.stdout == ""
-    assert left(tmp_path) == []
-
-
-@pytest.mark.deep
-@spread("output", ["report.html", "-"], quick=1)
-@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
-def test_what_a_report_lacks_is_said_before_the_work(tmp_path: Path, output: str, package: str) -> None:
-    """No file is read, and no plan is made: what would make it is not there."""
-    no_plans = "import nutdamp.comparison; nutdamp.comparison.compare = None"
-    done = without(package, tmp_path, "report", "missing.yaml", "-o", output, more=no_plans)
-    assert done.returncode == 1
-    assert "pip install 'nutdamp[plot]'" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert left(tmp_path) == []
-
-
-def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:
-    done = without("matplotlib", tmp_path, "simulate", "--scheme", "two-pulse", "--show")
-    assert done.returncode == 0
-    assert "Axis track" in done.stdout
+    ended = subprocess.run(command, env={**os.environ, "COLUMNS": "80"}, capture_output=True, check=True)
+    assert ended.stdout.startswith(b"\x89PNG")
+    assert ended.stdout.endswith(b"IEND\xaeB`\x82")
 
 
 @pytest.mark.parametrize("columns", [80, 140])
 def test_show_draws_below_the_tables(run: Run, columns: int) -> None:
-    plain = run("simulate", "--scheme", "two-pulse", columns=columns).stdout
-    shown = run("simulate", "--scheme", "two-pulse", "--show", columns=columns).stdout
+    command = ("simulate", "--scheme", "two-pulse")
+    plain, shown = (run(*command, *more, columns=columns).stdout for more in ((), ("--show",)))
     assert shown.startswith(plain)
     drawn = shown.removeprefix(plain).splitlines()
     assert all(len(line) <= columns for line in drawn)
@@ -198,21 +92,197 @@ def test_show_draws_below_the_tables(run: Run, columns: int) -> None:
     assert "\x1b" not in shown
 
 
-def test_a_film_is_written_whole(run: Run, tmp_path: Path) -> None:
-    done = run(
-        "animate", "--scheme", "two-pulse", "-o", "film.gif", "--seconds", "0.5", "--fps", "10", "--width", "320"
-    )
-    assert done.returncode == 0
+def test_a_film_is_written_whole_and_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None:
+    """7.434 s, a quarter of that, in half a second of film: 5 frames for 3.5 turns of the nutation."""
+    ended = run("animate", "--scheme", "two-pulse", "-o", "film.gif", *FILM)
+    assert (ended.returncode, ended.stdout) == (0, "")
+    said = re.sub(".* done after .*\n", "", ended.stderr)  # how far it is, where it takes long
+    check_text("cli.pictures.film", said)
     assert (tmp_path / "film.gif").read_bytes().startswith(b"GIF89a")
-    assert left(tmp_path) == ["film.gif"]
-    assert "wrote film.gif: 5 frames" in done.stderr
-    assert "frames show a nutation turn" in done.stderr  # 5 of them for 3.5 turns
-    assert done.stdout == ""
+    assert names(tmp_path) == ["film.gif"]
 
 
+@pytest.mark.deep
 def test_a_film_of_a_schedule_file(run: Run, tmp_path: Path) -> None:
     run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv")
-    done = run("animate", "--schedule", "pulses.csv", "-q", "-o", "a.gif", "--seconds", "0.2", "--fps", "10")
-    assert done.returncode == 0
-    assert done.stderr == ""
+    ended = run("animate", "--schedule", "pulses.csv", "-q", "-o", "a.gif", *FILM)
+    assert (ended.returncode, ended.stderr) == (0, "")
     assert (tmp_path / "a.gif").exists()
+
+
+def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
+    written(tmp_path, ideal_yaml=EXACT)
+    picture = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "a.png")
+    assert (picture.returncode, "a.png was not written" in picture.stderr) == (3, True)
+    assert run("animate", "ideal.yaml", "--scheme", "four-pulse", "-o", "a.gif").returncode == 3
+    assert names(tmp_path) == ["ideal.yaml"]
+
+
+LACKING = """
+import sys
+sys.modules[{package!r}] = None
+from nutdamp.cli import main
+import nutdamp.comparison
+sys.argv = ["nutdamp", *{words!r}]
+nutdamp.comparison.compare = None
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("package", "command"),
+    [
+        ("matplotlib", "plan --plot a.png"),
+        deep("matplotlib", "simulate --scheme none --plot a.svg"),
+        deep("matplotlib", "animate -o a.gif"),
+        deep("matplotlib", "report missing.yaml -o report.html"),
+        deep("jinja2", "report missing.yaml -o report.html"),
+        weekly("jinja2", "report missing.yaml -o -"),
+    ],
+)
+def test_what_is_not_installed_is_exit_1_with_the_cure_before_the_work(
+    tmp_path: Path, package: str, command: str
+) -> None:
+    """No file is read, and no plan is made: what would make it is not there."""
+    ended = python(tmp_path, LACKING.format(package=package, words=command.split()), status=1)
+    assert "pip install 'nutdamp[plot]'" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert (ended.stdout, names(tmp_path)) == ("", [])
+
+
+@pytest.mark.deep
+def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:
+    code = LACKING.format(package="matplotlib", words=["simulate", "--scheme", "two-pulse", "--show"])
+    assert "Axis track" in python(tmp_path, code).stdout
+
+
+# --- report -----------------------------------------------------------------------------------------------------------
+
+
+def page_of(folder: Path) -> str:
+    return parsed((folder / "report.html").read_text(encoding="utf-8")).text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def verdict_of(folder: Path, kind: str) -> str:
+    """The verdict on the page, which is of that kind: good or bad."""
+    tree = parsed((folder / "report.html").read_text(encoding="utf-8"))
+    (verdict,) = (node.text for node in tree.all("p") if node.attributes.get("class") == f"verdict {kind}")
+    return verdict
+
+
+@pytest.mark.weekly
+def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) -> None:
+    ended = run("report", "--scheme", "two-pulse")
+    assert (ended.returncode, ended.stdout) == (0, "")
+    assert "built-in example" in ended.stderr
+    assert ended.stderr.endswith("wrote report.html\n")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert '<pre>nutdamp report <span class="whole-word">--scheme</span> two-pulse</pre>' in page
+    assert f'<th scope="row">nutdamp</th><td>{__version__}</td>' in page
+    assert names(tmp_path) == ["report.html"]
+
+
+@pytest.mark.weekly
+@pytest.mark.usefixtures("plain_pages")
+def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "my craft.yaml").write_text(run("init", "-").stdout)
+    assert run("report", "my craft.yaml", "-q", "--with-disturbances").returncode == 0
+    first = (tmp_path / "report.html").read_text(encoding="utf-8")
+    *_, command, file = (node.text for node in parsed(first).all("pre"))
+    assert command == "nutdamp report 'my craft.yaml' -q --with-disturbances"
+    (tmp_path / "my craft.yaml").write_text(file + "\n")
+    assert run(*shlex.split(command)[1:]).returncode == 0
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == first
+
+
+@pytest.mark.usefixtures("plain_pages")
+def test_standard_output_holds_the_page_alone(run: Run, tmp_path: Path) -> None:
+    ended = run("report", "-", "--scheme", "four-pulse", "-o", "-", stdin=EXACT)
+    assert ended.stdout.startswith("<!DOCTYPE html>")
+    assert ended.stdout.endswith("</html>\n")
+    assert "wrote" not in ended.stderr
+    assert names(tmp_path) == []
+
+
+@pytest.mark.usefixtures("plain_pages")
+@pytest.mark.parametrize(
+    ("more", "options", "status", "said"),
+    [
+        deep("", "--scheme four-pulse", 3, "No recommendation: no scheme is feasible."),
+        ("requirement: {momentum_shift: 0.01 deg}\n", "--scheme one-pulse", 4, "does not meet the requirement."),
+    ],
+    ids=["infeasible", "missed"],
+)
+def test_the_page_is_written_whatever_the_verdict(
+    run: Run, tmp_path: Path, more: str, options: str, status: int, said: str
+) -> None:
+    written(tmp_path, craft_yaml=EXACT + more)
+    ended = run("report", "craft.yaml", *options.split())
+    assert ended.returncode == status
+    assert said.rstrip(".").lower() in ended.stderr.lower()
+    assert said in verdict_of(tmp_path, "bad")
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
+    text = EXACT + "requirement: {nutation: 0.2 deg}\ndispersions: {omega0: {normal: 1 deg/s}}\n"
+    written(tmp_path, craft_yaml=text)
+    assert run("report", "craft.yaml", "--scheme", "two-pulse", "--disperse", "1e3").returncode == 4
+    verdict = re.search(
+        r"Requirement (NOT met: [\d.]+ % of cases comply \(99.7 % required\))\.", verdict_of(tmp_path, "bad")
+    )
+    assert verdict is not None
+    assert page_of(tmp_path).count(verdict[1]) == 3  # the verdict, the tile, the section below
+
+
+def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
+    written(tmp_path, report_html="old", nameless_yaml="name: X\n", craft_yaml=EXACT)
+    assert "has no dispersions" in refusals(run, tmp_path, ["report nameless.yaml", "report craft.yaml --disperse 100"])
+
+
+@pytest.mark.usefixtures("plain_pages")
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ("--disperse 300 spacecraft.yaml", "and in 300 dispersed cases"),
+        weekly("spacecraft.yaml --disperse 300", "and in 300 dispersed cases"),
+        weekly("--disperse=3e2 spacecraft.yaml", "and in 300 dispersed cases"),
+        deep("--disperse", "and in 20,000 dispersed cases"),
+        weekly("--disperse -o report.html", "and in 20,000 dispersed cases"),
+        weekly("--disperse spacecraft.yaml", "and in 20,000 dispersed cases"),
+        weekly("--trade 2", "first-order least"),
+        weekly("--trade spacecraft.yaml", "first-order least"),
+        weekly("spacecraft.yaml --trade", "first-order least"),
+    ],
+)
+def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path, options: str, text: str) -> None:
+    run("init")
+    assert run("report", "--scheme", "two-pulse", *options.split()).returncode in (0, 4)
+    assert text in page_of(tmp_path)
+    assert ("Time against cost" in page_of(tmp_path)) == ("--trade" in options)
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
+    assert run("report", "--scheme", "half-cone", "--target", "10deg,45deg").returncode == 0
+    for text in ("H ends attilt 10.0000 deg, azimuth 45.0000 deg", "error of H≤ 0.2 deg", "off the target"):
+        assert text in page_of(tmp_path)
+
+
+@pytest.mark.weekly
+def test_a_page_shows_what_was_set(run: Run) -> None:
+    page = run("report", "-o", "-", "-q", "--scheme", "two-pulse", "--set", "state.nutation=8 deg").stdout
+    said = words(parsed(page).text)
+    assert "damping 8 deg" in said
+    assert "Set in place of what the file says" in said
+    assert "--set 'state.nutation=8 deg'" in said
+    assert page.count("state.nutation") >= 2
+
+
+@pytest.mark.weekly
+def test_a_long_name_leaves_no_warning_of_the_picture(run_apart: Run) -> None:
+    ended = run_apart("report", str(places.case("long-name.yaml")), "--scheme", "two-pulse", "-o", "r.html")
+    assert ended.returncode == 0
+    assert "Warning" not in ended.stderr

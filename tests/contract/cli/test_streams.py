@@ -1,100 +1,36 @@
-"""Where output goes when standard output is full, closed or of a narrow encoding, and names that look like markup."""
+"""Where output goes when a stream, a disk or a signal is in its way, and names that are no plain text."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import IO
 
 import pytest
-from support.cases import spread
+from support import places
+from support.cases import deep, spread, weekly
+from support.commands import EXACT, SCHEDULE, call, contents, names, python, result, written
+from support.golden import check_text
 from support.process import Run
+
+from nutdamp.cli.screen import visible
+from nutdamp.files.examples import example_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 FULL = Path("/dev/full")
-
-ODD_NAMES = """
-name: "[red]Evil[/] [/] :rocket:"
-inertia: {A: 120, C: 80}
-state: {spin: 30 rpm, nutation: 5 deg}
-thrusters:
-  - {name: "[red]", torque: [8, 0, 0]}
-  - {name: "[/]", torque: [0, 8, 0]}
-  - {name: ":rocket:", torque: [-8, 0, 0]}
-dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
-"""
+POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits, signals and descriptors of POSIX")
+NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
 
 
-@pytest.fixture
-def odd(tmp_path: Path) -> str:
-    """A spacecraft whose names rich would take for markup."""
-    (tmp_path / "odd.yaml").write_text(ODD_NAMES)
-    return "odd.yaml"
-
-
-@spread(
-    "command",
-    [
-        ("plan",),
-        ("plan", "--robust", "--scheme", "one-pulse"),
-        ("check",),
-        ("verify",),
-        ("simulate", "--scheme", "two-pulse", "--show"),
-        ("trade", "--points", "1"),
-        ("disperse", "--samples", "100"),
-        ("disperse", "--case", "1"),
-    ],
-    quick=4,
-    ids=" ".join,
-)
-def test_names_that_look_like_markup_are_shown_as_they_are(run: Run, odd: str, command: tuple[str, ...]) -> None:
-    done = run(*command, odd)
-    assert "Traceback" not in done.stderr
-    assert "[red]Evil[/] [/] :rocket:" in done.stdout
-
-
-def test_thrusters_named_like_markup_keep_their_names_in_tables(run: Run, odd: str) -> None:
-    rows = run("check", odd).stdout.splitlines()
-    for name in ("[red]", "[/]", ":rocket:"):
-        assert any(row.startswith(f"{name}  ") for row in rows)
-
-
-def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
-    for command in (("plan",), ("check",), ("simulate", "--scheme", "two-pulse")):
-        assert not [line for line in run(*command).stdout.splitlines() if line != line.rstrip()]
-
-
-@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
-@spread("command", ["plan --quiet", "check --quiet", "plan --quiet --json -", "--help", "explain"], quick=2)
-def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
-    with FULL.open("w") as full:
-        done = _process(tmp_path, command, stdout=full)
-    assert done.returncode == 1
-    assert len(done.stderr.splitlines()) == 1
-    assert "cannot write" in done.stderr
-    assert "No space left" in done.stderr
-
-
-@pytest.mark.skipif(os.name != "posix", reason="closes a descriptor as a shell does")
-@spread("command", ["plan --quiet", "plan --quiet --csv -"], quick=1)
-def test_a_process_without_standard_output_does_its_work(tmp_path: Path, command: str) -> None:
-    call = f'exec "{sys.executable}" -m nutdamp {command} --json pulses.json >&-'
-    done = subprocess.run(["sh", "-c", call], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "pulses.json").exists()
-
-
-def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> None:
-    done = _process(tmp_path, "plan --quiet", stdout=subprocess.PIPE, PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "A|?0|" in done.stdout
-
-
-def _process(folder: Path, command: str, *, stdout: int | IO[str], **more: str) -> subprocess.CompletedProcess[str]:
+def process(folder: Path, command: str, *, stdout: int | IO[str] = -1, **more: str) -> subprocess.CompletedProcess[str]:
+    """A command as a process, with that standard output and more in its environment."""
     return subprocess.run(
         [sys.executable, "-m", "nutdamp", *command.split()],
         cwd=folder,
@@ -107,68 +43,293 @@ def _process(folder: Path, command: str, *, stdout: int | IO[str], **more: str) 
     )
 
 
-# --- standard input ---------------------------------------------------------------------------------------------------
+def shell(folder: Path, call: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """``$0 -m nutdamp`` in a shell."""
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
+    line = ["sh", "-c", call, sys.executable, *arguments]
+    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_a_spacecraft_comes_from_standard_input(run: Run) -> None:
-    done = run("plan", "-", stdin=ODD_NAMES)
-    assert done.returncode == 0
-    assert "Evil" in done.stdout
-    assert run("check", "-", stdin="name: 5").stderr.startswith("-:1:")
+# --- streams ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_schedule_comes_from_standard_input(run: Run) -> None:
-    pulses = run("plan", "--csv", "-", "--quiet").stdout
-    done = run("simulate", "--schedule", "-", "--quiet", stdin=pulses)
-    assert done.returncode == 0
-    assert "pulses begun" not in done.stdout  # all of them are
-    assert re.search("^nutation  +< 1e-9 deg +< 1e-9 deg$", done.stdout, re.MULTILINE)
+@NEEDS_FULL
+@spread("command", ["check -q", "plan -q", "plan -q --json -", "--help", "explain"], quick=1, deep=2)
+def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
+    with FULL.open("w") as full:
+        ended = process(tmp_path, command, stdout=full)
+    assert ended.returncode == 1
+    assert re.fullmatch(r".*cannot write.*No space left.*\n", ended.stderr)
 
 
-def test_an_empty_standard_input_is_a_faulty_file(run: Run) -> None:
-    for command in (("plan", "-"), ("simulate", "--schedule", "-"), ("import", "apm", "-")):
-        done = run(*command, stdin="")
-        assert (done.returncode, done.stdout) == (2, "")
-        assert "-:1:1: " in done.stderr
+@pytest.mark.deep
+@POSIX
+def test_a_process_without_standard_output_or_without_a_reader_does_its_work(tmp_path: Path) -> None:
+    for command in ("plan --quiet", "plan --quiet --csv -"):
+        closed = shell(tmp_path, f'exec "$0" -m nutdamp {command} --json pulses.json >&-')
+        assert (closed.returncode, closed.stderr, names(tmp_path)) == (0, "", ["pulses.json"])
+    left = shell(tmp_path, '"$0" -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1')
+    assert left.stdout.startswith("t_s,")
+    assert "Traceback" not in left.stderr
 
 
-# --- places that cannot be written to are reported before the work ---------------------------------------------------
+@pytest.mark.deep
+def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> None:
+    ended = process(tmp_path, "plan --quiet", PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "A|?0|" in ended.stdout
 
 
+def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
+    for command in ("plan", "check", "simulate --scheme two-pulse"):
+        assert not [line for line in call(run, command).stdout.splitlines() if line != line.rstrip()]
+
+
+# --- disks and signals ------------------------------------------------------------------------------------------------
+
+
+@POSIX
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        deep("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
+        deep("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "tolerance budget"),
+        weekly("plan --plot big.svg --json small.json", "recommended"),
+        weekly("trade --points 1 --plot big.png --json small.json", "h may end anywhere"),
+    ],
+)
+def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, command: str, shown: str) -> None:
+    """A run that may write no file beyond 32 KiB, as on a disk that is nearly full."""
+    ended = shell(tmp_path, 'ulimit -f 64; exec "$0" -m nutdamp "$@"', *command.split(), "-q")
+    assert ended.returncode == 1, ended.stderr
+    assert shown in ended.stdout.lower()
+    assert re.fullmatch("nutdamp: cannot write big.*\n", ended.stderr)
+    assert names(tmp_path) == ["small.json"]
+
+
+@NEEDS_FULL
 @pytest.mark.parametrize(
     "command",
     [
-        "plan --csv no/x.csv",
-        "simulate --scheme none --json no/x.json",
-        "trade --points 1000 --csv no/x.csv",
-        "disperse --samples 1e10 --json no/x.json",
-        "animate -o no/x.gif --seconds 600",
-        "report -o no/x.html",
-        "export --format json -o no/x.json",
-        "verify --json no/x.json",
+        "plan --csv /dev/full --json /dev/full",
+        "disperse --case 1 --scheme two-pulse --json /dev/full",
+        deep("disperse --samples 100 --json /dev/full"),
+        deep("verify --json /dev/full"),
+        deep("trade --points 1 --schedules file"),
     ],
 )
-def test_a_missing_folder_is_reported_before_the_work(run: Run, tmp_path: Path, command: str) -> None:
-    done = run(*command.split(), "--quiet")
-    assert (done.returncode, done.stdout) == (1, "")
-    assert "cannot write no/x." in done.stderr
-    assert "is no directory" in done.stderr
-    assert list(tmp_path.iterdir()) == []
+def test_each_file_that_cannot_be_saved_is_named_below_the_result(run: Run, tmp_path: Path, command: str) -> None:
+    written(tmp_path, file="")
+    ended = call(run, f"{command} -q")
+    assert ended.returncode == 1
+    assert "Sounder-1" in ended.stdout
+    full = "nutdamp: cannot write /dev/full: No space left on device\n"
+    folder = "nutdamp: cannot write file: it is there, and no directory\n"
+    assert ended.stderr == (folder if command.startswith("trade") else full * command.count(str(FULL)))
 
 
-def test_a_bad_file_is_reported_before_a_missing_folder(run: Run, odd: str, tmp_path: Path) -> None:
-    (tmp_path / "bad.yaml").write_text("name: 5")
-    assert run("plan", "bad.yaml", "--csv", "no/x.csv").returncode == 2
+TERMINATED = """
+import os, signal, sys
+from nutdamp.cli import root
+from nutdamp.files import {module}
+
+made = {module}.{function}
+
+def slow(*given, **named):
+    os.kill(os.getpid(), signal.SIGTERM)
+    return made(*given, **named)
+
+{module}.{function} = slow
+sys.argv = ["nutdamp", *{arguments!r}.split()]
+root.main()
+"""
+WRITING = """
+import os, signal, sys
+import click
+from nutdamp.cli.boundary import run
+from nutdamp.files.output import whole_file
+
+@click.group()
+def group(): ...
+
+@group.command()
+def write():
+    with whole_file("x.csv") as stream:
+        stream.write(b"half")
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)  # the second one does not disturb
+
+sys.argv = ["nutdamp", "write"]
+run(group)
+"""
 
 
-def test_a_file_is_no_folder_for_schedules(run: Run, odd: str) -> None:
-    done = run("trade", "--points", "1", "--schedules", odd)
-    assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == "nutdamp: cannot write odd.yaml: it is there, and no directory"
+@POSIX
+@spread(
+    ("arguments", "module", "function"),
+    [
+        ("check --json x.json", "check_json", "check_json"),
+        ("plan spacecraft.yaml --json x.json", "spacecraft_file", "read_spacecraft"),
+        ("plan --json x.json --csv x.csv", "output", "json_text"),
+        ("simulate --scheme two-pulse --csv x.csv --json x.json", "output", "json_text"),
+        ("verify --json x.json", "verification_json", "verification_json"),
+        ("report -o x.html", "spacecraft_file", "read_spacecraft"),
+        ("export --format json -o x.json", "output", "json_text"),
+    ],
+    quick=1,
+    deep=4,
+)
+def test_sigterm_ends_a_command_in_order(tmp_path: Path, arguments: str, module: str, function: str) -> None:
+    written(tmp_path, spacecraft_yaml=EXACT)
+    code = TERMINATED.format(arguments=arguments, module=module, function=function)
+    ended = python(tmp_path, code, status=128 + signal.SIGTERM)
+    assert ended.stderr.splitlines()[-1] == "terminated"
+    assert "Traceback" not in ended.stderr
+    assert names(tmp_path) == ["spacecraft.yaml"]
 
 
-def test_a_schedule_with_semicolons_is_sent_to_commas(run: Run, tmp_path: Path) -> None:
-    pulses = run("plan", "--csv", "-", "--quiet").stdout
-    done = run("simulate", "--schedule", "-", "--quiet", stdin=pulses.replace(",", ";"))
-    assert done.returncode == 2
-    assert done.stderr == "-:1:1: columns are separated by commas, not by semicolons or tabs\n"
+@POSIX
+def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -> None:
+    written(tmp_path, x_csv="before")
+    assert python(tmp_path, WRITING, status=143).stderr == "terminated\n"
+    assert contents(tmp_path) == {"x.csv": b"before"}
+
+
+# --- where nothing is feasible ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "command", ["plan", "simulate --scheme two-pulse", "verify", "disperse", "trade --points 1", "loop"]
+)
+def test_where_nothing_is_feasible_the_json_file_says_so(run: Run, command: str) -> None:
+    data = result(run, f"{command} {places.case('infeasible.yaml')}", status=3)
+    assert data["spacecraft"]["name"] == "infeasible"
+    assert data.get("feasible") is False or data.get("recommended", 0) is None or "fronts" in data
+
+
+# --- names that look like markup, control the terminal, or are not UTF-8 ----------------------------------------------
+
+MARKUP = """
+name: "[red]Evil[/] [/] :rocket:"
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters:
+  - {name: "[red]", torque: [8, 0, 0]}
+  - {name: "[/]", torque: [0, 8, 0]}
+  - {name: ":rocket:", torque: [-8, 0, 0]}
+dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
+"""
+
+
+@spread(
+    "command",
+    ["check", "plan --scheme one-pulse", "simulate --scheme one-pulse --show", "disperse --scheme one-pulse --case 1",
+     "verify", "plan --robust --scheme one-pulse", "trade --points 1", "disperse --samples 100"],
+    quick=4,
+)  # fmt: skip
+def test_names_that_look_like_markup_are_shown_as_they_are(run: Run, command: str) -> None:
+    ended = call(run, f"{command} -", stdin=MARKUP)
+    assert "Traceback" not in ended.stderr
+    assert "[red]Evil[/] [/] :rocket:" in ended.stdout
+    if command == "check":
+        lines = ended.stdout.splitlines()
+        assert all(any(line.startswith(f"{name}  ") for line in lines) for name in ("[red]", "[/]", ":rocket:"))
+
+
+HOSTILE = "\x1b]0;PWNED\x07\x1b[2J\x9b31m"
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
+BODY = EXACT + "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
+
+
+def test_what_does_not_print_is_shown_as_its_escape() -> None:
+    assert visible("a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028") == r"a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028"
+    assert visible("two lines\nωθ° ×…\n") == "two lines\nωθ° ×…\n"
+    assert visible("not UTF-8: \udcff") == r"not UTF-8: \udcff"
+
+
+def test_no_control_character_of_a_name_a_unit_or_an_option_reaches_the_terminal(run: Run, tmp_path: Path) -> None:
+    """Whatever file it stands in."""
+    (tmp_path / f"there-{HOSTILE}\n.csv").write_text(SCHEDULE)
+    (tmp_path / f"there-{HOSTILE}\n.yaml").write_text(BODY.replace("inertia", "inetria") + '"\x1b[2J": 1\n')
+    (tmp_path / f"good-{HOSTILE}\n.yaml").write_text(BODY)
+    head = "CCSDS_APM_VERS = 2.0\nCREATION_DATE = 2026-03-01T12:00:00\nORIGINATOR = X\n"
+    written(tmp_path, body_yaml=BODY, message_txt=f"{head}INERTIA_START\nIXX = 120 [{HOSTILE}]\nINERTIA_STOP\n")
+    two, said = ("plan", "body.yaml", "--scheme", "two-pulse"), ""
+    for status, *command in (
+        (1, "plan", f"{HOSTILE}\n.yaml"), (2, HOSTILE), (2, "plan", "--scheme", HOSTILE),
+        (2, "plan", "--on-time", HOSTILE), (1, "check", f"{HOSTILE}.yaml", "--json", "-"),
+        (1, *two, "--csv", f"no/{HOSTILE}/folder.csv"), (2, *two, "--plot", f"{HOSTILE}.{HOSTILE}"),
+        (1, "simulate", "body.yaml", "--schedule", f"{HOSTILE}.csv"),
+        (0, "simulate", "body.yaml", "--schedule", f"there-{HOSTILE}\n.csv"), (2, "check", f"there-{HOSTILE}\n.yaml"),
+        (2, "import", "apm", "message.txt"), (2, "import", "apm", f"there-{HOSTILE}\n.csv"),
+        *((2, *command, "body.yaml", "--schedule", str(places.case("crash-ansi-channel.csv")))
+          for command in (("simulate",), ("verify",), ("export", "--format", "json"))),
+    ):  # fmt: skip
+        ended = run(*command)
+        assert ended.returncode == status, command
+        assert not CONTROL.search(ended.stdout + ended.stderr)
+        said += ended.stderr.rpartition("\nError: ")[2].replace(str(places.CASES), "CASES").replace(str(tmp_path), "")
+    check_text("cli.streams.hostile", said)
+    assert not CONTROL.search(run("plan", f"--{HOSTILE}").stderr)
+    shown = run("check", f"good-{HOSTILE}\n.yaml", "--json", "-").stdout
+    assert not CONTROL.search(shown)
+    assert json.loads(shown)["files"][0]["file"] == f"good-{HOSTILE}\n.yaml"
+
+
+ODD = os.fsdecode(b"d\xfcse")
+"""A name in Latin-1."""
+
+
+@pytest.fixture
+def odd(run: Run, tmp_path: Path) -> None:
+    """A spacecraft with an attitude; beside it a schedule, odd as well."""
+    (tmp_path / f"{ODD}.yaml").write_text(example_text() + BODY[BODY.index("attitude") :])
+    assert run("plan", f"{ODD}.yaml", "--scheme", "two-pulse", "--csv", f"{ODD}.csv", "--quiet").returncode == 0
+
+
+@LINUX
+@pytest.mark.weekly
+@pytest.mark.usefixtures("odd")
+@pytest.mark.parametrize(
+    "command",
+    [
+        "plan {0}.yaml --json out.json --plot out.png",
+        "check {0}.yaml --json out.json",
+        "simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg",
+        "verify {0}.yaml --schedule {0}.csv --json out.json",
+        "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out",
+        "trade {0}.yaml --points 1 --json out.json --schedules {0}",
+        "report {0}.yaml -o {0}.html",
+        "animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320",
+        "export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml",
+        *(f"export {{0}}.yaml --schedule {{0}}.csv --format {form} -o {{0}}.{ending}" for form, ending in (
+            ("apm", "apm"), ("aem", "aem"), ("stk", "a"), ("basilisk", "py"), ("json", "json"))),
+    ],
+)  # fmt: skip
+def test_every_command_takes_names_that_are_not_utf_8(run: Run, tmp_path: Path, command: str) -> None:
+    ended = run(*command.format(ODD).split())
+    assert ended.returncode in (0, 4), ended.stderr
+    assert "Traceback" not in ended.stderr
+    for path in tmp_path.iterdir():
+        if path.suffix == ".json":
+            json.loads(path.read_text(encoding="utf-8"))
+        elif path.suffix in (".html", ".apm", ".xml", ".aem", ".py"):
+            path.read_text(encoding="utf-8")
+
+
+@LINUX
+@pytest.mark.usefixtures("odd")
+def test_where_such_names_are_shown_or_written_they_are_escaped_and_json_gives_them_back(
+    run: Run, tmp_path: Path
+) -> None:
+    """A message of such a name becomes a spacecraft file."""
+    assert run("export", f"{ODD}.yaml", "--format", "apm", "--scheme", "none", "-o", f"{ODD}.apm").returncode == 4
+    message = run("import", "apm", f"{ODD}.apm")
+    assert message.stdout.startswith(r"# From the attitude parameter message d\udcfcse.apm; numbers as given there.")
+    written(tmp_path, again_yaml=message.stdout)
+    assert run("check", "again.yaml").returncode == 0
+    ended = run("check", f"{ODD}.yaml", "missing" + ODD, "--json", "-")
+    assert [entry["file"] for entry in json.loads(ended.stdout)["files"]] == [f"{ODD}.yaml", "missing" + ODD]
+    assert ended.stderr == "nutdamp: cannot read missingd\\udcfcse: no such file or directory\n"

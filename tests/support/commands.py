@@ -1,0 +1,109 @@
+"""Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of others."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from support.process import Run, environment
+
+EXACT = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+"""The shortest spacecraft file: ideal impulses, and no requirement."""
+DATED = """
+name: Dated
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [0.3, -0.2, 0.9, 0.1]}
+steerable: {torque: 20 N m}
+"""
+SCHEDULE = "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,steerable,4,0,0\n"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder, by its path there."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def names(folder: Path) -> list[str]:
+    """What is in a folder."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def written(folder: Path, **files: str) -> None:
+    """Write files: ``written(folder, craft_yaml="name: X")`` writes craft.yaml."""
+    for name, text in files.items():
+        (folder / name.replace("_", ".")).write_text(text, encoding="utf-8")
+
+
+def refusals(run: Run, folder: Path, commands: Iterable[str], status: int = 2, stdin: str | None = None) -> str:
+    """What each of the commands says, behind it; none prints a result, and none touches a file of the folder."""
+    before = contents(folder)
+    said = []
+    for command in commands:
+        refused = run(*shlex.split(command.replace("FOLDER", str(folder))), stdin=stdin)
+        assert (refused.returncode, refused.stdout) == (status, ""), command
+        assert "Traceback" not in refused.stderr, command
+        assert contents(folder) == before, command
+        shown = refused.stderr.rpartition("\nError: ")[2].replace(str(folder), "FOLDER").rstrip("\n")
+        shown = re.sub("^No such option.*", "No such option", shown)  # each version of click says more in its own way
+        said.append(f"$ {command}\n{shown}")
+    return "\n".join(said)
+
+
+def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
+    """What commands print, behind each of them; behind a semicolon the exit status that is right, where it is not 0.
+
+    Of their results only paragraphs that have what ``only`` is a pattern of.
+    """
+    shown = ""
+    for line in commands:
+        command, _, status = line.partition("; ")
+        ended = call(run, command)
+        assert ended.returncode == int(status or 0), f"{command}\n{ended.stderr}"
+        kept = "\n\n".join(part for part in ended.stdout.split("\n\n") if re.search(only, part)).rstrip()
+        shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
+    return shown
+
+
+def words(text: str) -> str:
+    """A text without its line breaks."""
+    return " ".join(text.split())
+
+
+def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run one command line, given as one text."""
+    return run(*shlex.split(command), **options)
+
+
+def result(run: Run, command: str, *, status: int = 0, stdin: str | None = None) -> Any:
+    """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
+    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin)
+    assert ended.returncode == status, ended.stderr
+    return json.loads(ended.stdout)
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    """Rows of a CSV text."""
+    return list(csv.DictReader(text.splitlines()))
+
+
+def python(folder: Path, code: str, *arguments: str, status: int = 0) -> subprocess.CompletedProcess[str]:
+    """Run code in a Python of its own."""
+    ended = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        env={**os.environ, **environment(80)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == status, ended.stderr
+    return ended
