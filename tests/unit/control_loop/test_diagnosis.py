@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.builders import channel, spinner
-from support.cases import spread
+from support.builders import spinner
+from support.cases import deep, spread
+from support.loops import around, fired_by, fires, rad
 
 from nutdamp.errors import Infeasible
 from nutdamp.loop.diagnosis import Stop
@@ -18,23 +19,12 @@ from nutdamp.loop.sensor import Estimator, gain
 from nutdamp.loop.stability import Cause, Margin, feeding
 from nutdamp.loop_settings import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
 from nutdamp.presentation.loop_tables import margin_table
-from nutdamp.spacecraft import Channel, Spacecraft
+from nutdamp.spacecraft import Spacecraft
 from nutdamp.tolerances import Dispersions, Tolerance
 
-
-def rad(degrees: float) -> float:
-    return math.radians(degrees)
-
-
-def around(count: int, torque: float, first: float = 0.0, least: float = 0.002) -> tuple[Channel, ...]:
-    """Channels ``T0``, ``T1`` … with torques evenly round axis 3."""
-    angles = [first + 2.0 * math.pi * number / count for number in range(count)]
-    torques = [(torque * math.cos(angle), torque * math.sin(angle), 0.0) for angle in angles]
-    return tuple(channel(f"T{number}", *one, min_on_time=least, max_on_time=1.0) for number, one in enumerate(torques))
-
-
-CRAFT = spinner(degrees=2.0, channels=around(4, 2.0))
+CRAFT = fired_by(channels=around(4, 2.0))
 PERIOD = CRAFT.body_period
+LAWS = (FOUR_PULSE, ONE_PULSE, BANG)
 
 
 def wrong(loop: Loop) -> tuple[Loop, Loop]:
@@ -42,43 +32,47 @@ def wrong(loop: Loop) -> tuple[Loop, Loop]:
     return replace(loop, reversed=("T0",)), replace(loop, sensor=replace(loop.sensor, scale=-loop.sensor.scale))
 
 
-@pytest.mark.parametrize("settle", [0.0, 5.0])
-@pytest.mark.parametrize("delay", [0.0, 5.0])
-@pytest.mark.parametrize("law", [FOUR_PULSE, ONE_PULSE, BANG])
-def test_after_five_periods_it_is_named_by_as_many_firings_as_at_once(law: str, delay: float, settle: float) -> None:
-    sensor = Sensor(rate=20.0 / PERIOD, noise=rad(0.002), delay=delay * PERIOD)
-    on_time = 0.05 if law == BANG else None
-    channel, reverse = wrong(Loop(sensor, law, rad(0.3), rad(0.1), settle=settle * PERIOD, on_time=on_time))
-    late = (delay + settle + 1.0) * PERIOD
-    run = fly(CRAFT, channel, 40.0 * late)
+def check_named(loop: Loop, until: float) -> Run:
+    """T0 fires once where it is wired backwards; gives the run with the sensor reversed."""
+    channel, reverse = wrong(loop)
+    run = fly(CRAFT, channel, until)
     assert (run.stop, run.channel) == (Stop.CHANNEL, "T0")
     assert [pulse.channel for pulse in run.schedule].count("T0") == 1
-    run = fly(CRAFT, reverse, 40.0 * late)
-    assert (run.stop, len(run.fired)) == (Stop.SENSOR, 2)
+    run = fly(CRAFT, reverse, until)
+    assert run.stop is Stop.SENSOR
+    return run
+
+
+@pytest.mark.parametrize(
+    ("law", "delay", "settle"),
+    [*zip(LAWS, (0.0, 5.0, 5.0), (0.0, 0.0, 5.0), strict=True)]
+    + [deep(FOUR_PULSE, 5.0, 5.0), deep(ONE_PULSE, 0.0, 5.0), deep(BANG, 5.0, 0.0)],
+)
+def test_after_five_periods_it_is_named_by_as_many_firings_as_at_once(law: str, delay: float, settle: float) -> None:
+    sensor = Sensor(rate=20.0 / PERIOD, noise=rad(0.002), delay=delay * PERIOD)
+    late = (delay + settle + 1.0) * PERIOD
+    run = check_named(fires(sensor, law=law, settle=settle * PERIOD, on_time=0.05 if law == BANG else None), 40 * late)
+    assert len(run.fired) == 2
     assert run.fired[1].pulse.start - run.fired[0].pulse.start < late
 
 
-@pytest.mark.parametrize("sensor", [Sensor(), Sensor(rate=20.0, noise=rad(0.02))], ids=["continuous", "noisy"])
+@pytest.mark.parametrize("sensor", [deep(Sensor()), Sensor(rate=20.0, noise=rad(0.02))], ids=["continuous", "noisy"])
 def test_a_bias_as_large_as_half_of_start_hides_no_channel(sensor: Sensor) -> None:
     """Firings of 0.1 deg in a bias of 0.25 deg, every quarter of a period."""
-    bias = Law(CRAFT, Loop(sensor, start=rad(0.5))).size(rad(0.25), 3.0) / math.sqrt(2.0)
-    loop = Loop(replace(sensor, bias=bias), BANG, rad(0.5), rad(0.2), on_time=0.05)
-    channel, reverse = wrong(loop)
-    assert fly(CRAFT, loop, 400.0).stop is Stop.END
-    run = fly(CRAFT, channel, 400.0)
-    assert (run.stop, run.channel) == (Stop.CHANNEL, "T0")
-    assert [pulse.channel for pulse in run.schedule].count("T0") == 1
-    assert fly(CRAFT, reverse, 400.0).stop is Stop.SENSOR
+    bias = Law(CRAFT, fires(sensor, 0.5)).size(rad(0.25), 3.0) / math.sqrt(2.0)
+    loop = fires(replace(sensor, bias=bias), 0.5, 0.2, law=BANG, on_time=0.05)
+    assert fly(CRAFT, loop, 200.0).stop is Stop.END
+    check_named(loop, 200.0)
 
 
-@spread("law", [FOUR_PULSE, ONE_PULSE, BANG], quick=1)
+@spread("law", LAWS, quick=1)
 @spread("share", [1.0, 3.0], quick=1)
 @spread("stop", [0.0, 0.1], quick=1)
 def test_a_healthy_loop_in_more_noise_than_start_is_not_accused(law: str, share: float, stop: float) -> None:
-    noise = share * Law(CRAFT, Loop(Sensor(), start=rad(0.3))).size(rad(0.3), 3.0)
+    noise = share * Law(CRAFT, fires()).size(rad(0.3), 3.0)
     for rate, settle in ((5.0, 0.0), (20.0, 1.0)):
         sensor = Sensor(rate=rate, noise=noise, bias=0.2 * noise, low_pass=0.3 * settle)
-        loop = Loop(sensor, law, rad(0.3), rad(stop), settle=settle, on_time=0.02 if law == BANG else None)
+        loop = fires(sensor, 0.3, stop, law=law, settle=settle, on_time=0.02 if law == BANG else None)
         run = fly(CRAFT, loop, 150.0, seed=7)
         assert (run.stop, run.channel) == (Stop.END, None)
         assert len(run.fired) > 20
@@ -86,12 +80,11 @@ def test_a_healthy_loop_in_more_noise_than_start_is_not_accused(law: str, share:
 
 def test_a_body_that_is_not_as_known_makes_no_fault_of_a_healthy_loop() -> None:
     """The rate of nutation off by 6 %, pulses of a hundredth of the nutation each."""
-    spread = Tolerance("normal", 0.02, relative=True)
-    body = replace(CRAFT, channels=around(4, 6.0))
-    known = replace(body, dispersions=Dispersions(A=spread, C=spread))
+    about = Tolerance("normal", 0.02, relative=True)
+    known = replace(CRAFT, channels=around(4, 6.0), dispersions=Dispersions(A=about, C=about))
     inertia = replace(CRAFT.inertia, moments=(122.5, 122.5, 79.0))
-    truth = replace(body, inertia=inertia, omega0=CRAFT.omega0 * [1.5, 1.5, 1.0])
-    loop = Loop(Sensor(delay=0.5 * PERIOD), BANG, rad(0.5), rad(0.2), settle=PERIOD, on_time=0.02)
+    truth = replace(known, inertia=inertia, omega0=CRAFT.omega0 * [1.5, 1.5, 1.0])
+    loop = fires(Sensor(delay=0.5 * PERIOD), 0.5, 0.2, law=BANG, settle=PERIOD, on_time=0.02)
     run = fly(truth, loop, 300.0, law=Law(known, loop))
     assert run.stop is Stop.END
     assert len(run.fired) > 25
@@ -107,8 +100,7 @@ def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
     craft = spinner(C=C, spin=rng.choice([-3.0, 3.0]), degrees=rng.uniform(1.0, 4.0), channels=channels)
     if rng.random() < 0.3:
         craft = replace(craft, dissipation=30.0 * craft.body_period)
-    period, start = craft.body_period, rad(rng.uniform(0.3, 1.0))
-    law = str(rng.choice([FOUR_PULSE, ONE_PULSE, BANG]))
+    period, start, law = craft.body_period, rad(rng.uniform(0.3, 1.0)), str(rng.choice(LAWS))
     kind, at = Sensor().kind, np.array([1.0, 0.3, 0.2])
     size = craft.inertia.C * 3.0 / craft.inertia.A * math.tan(start)
     if rng.random() < 0.35:
@@ -125,23 +117,14 @@ def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
         low_pass=period * rng.choice([0.0, 0.0, 0.3]) * sampled,
         position=at,
     )
-    loop = Loop(
-        sensor,
-        law,
-        start,
-        start * rng.choice([0.1, 0.5]),
-        settle=period * rng.choice([0.0, 0.3, 5.0]),
-        min_interval=period * rng.choice([0.0, 1.5]),
-        predict=bool(rng.random() < 0.7),
-        on_time=0.05 * period if law == BANG else None,
-    )
-    return craft, loop
+    stop, settle = start * rng.choice([0.1, 0.5]), period * rng.choice([0.0, 0.3, 5.0])
+    pause, predict = period * rng.choice([0.0, 1.5]), bool(rng.random() < 0.7)
+    return craft, Loop(sensor, law, start, stop, settle, pause, predict, 0.05 * period if law == BANG else None)
 
 
 def fed_for(craft: Spacecraft, run: Run, names: set[str]) -> float:
     """Periods from the first firing of ``names`` to the last, beyond what it takes to see what a firing did."""
-    loop = run.loop
-    sensor = loop.sensor
+    loop, sensor = run.loop, run.loop.sensor
     latency = sensor.delay + loop.settle + 5.0 * sensor.low_pass + loop.min_interval
     latency += craft.body_period if sensor.kind == ACCELEROMETER else 0.0
     starts = [pulse.start for pulse in run.schedule if pulse.channel in names]
@@ -163,10 +146,10 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
             assert fly(craft, loop, span).stop is Stop.END
             if abs(act.acts) < 12.0 * math.hypot(doubts.noise, doubts.steps):
                 continue
-            runs = [fly(craft, one, span) for one in wrong(loop)]
+            runs = [fly(craft, faulty, span) for faulty in wrong(loop)]
         except Infeasible:
             continue
-        every = {one.name for one in craft.channels}
+        every = {each.name for each in craft.channels}
         for run, stop, names in zip(runs, (Stop.CHANNEL, Stop.SENSOR), ({"T0"}, every), strict=True):
             if any(pulse.channel in names for pulse in run.schedule):
                 assert run.stop is stop, loop
@@ -178,5 +161,5 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
 
 
 def test_rounding_is_no_share_that_a_firing_leaves() -> None:
-    one = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, Cause(sensor=False, backwards=False))
-    assert list(margin_table((one,)).columns[2].cells) == ["0"]
+    margin = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, Cause(sensor=False, backwards=False))
+    assert list(margin_table((margin,)).columns[2].cells) == ["0"]
