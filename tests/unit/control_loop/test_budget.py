@@ -277,7 +277,6 @@ def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until
 def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     follow_few_cycles(monkeypatch)
     start = Law(craft(), loop(gyro())).size(rad(0.5), 3.0)
-    monkeypatch.setattr("nutdamp.loop.cycles.FIRINGS", 20)
     for share, noisy in ((0.05, False), (0.2, True)):
         held, cycle = held_by(craft(loop=loop(gyro(noise=share * start))))
         assert (held.noisy, cycle.doubt >= 0.2) == (noisy, noisy)
