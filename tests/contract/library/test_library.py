@@ -1,9 +1,11 @@
-"""nutdamp as a library: the names it promises, spacecraft from files and dicts, sweeps of them, and what it refuses."""
+"""nutdamp as a library: names, spacecraft from files and dicts, what it refuses; that its benchmarks stay runnable."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
+import runpy
 import subprocess
 import sys
 from collections.abc import Callable
@@ -20,7 +22,10 @@ from support.tilted import KEYS, TILTED
 import nutdamp
 from nutdamp import errors, flight, planning, spacecraft
 from nutdamp.comparison import Comparison
+from nutdamp.dispersion.inputs import list_inputs
 from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile, Infeasible
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.planning import plan
 from nutdamp.schemes.options import OptimalOptions
 
 CRAFT = nutdamp.example()
@@ -33,9 +38,6 @@ def planned() -> nutdamp.Plan:
 
 def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False)
-
-
-# --- names, types, examples -----------------------------------------------------------------------------------------
 
 
 def test_importing_loads_nothing_that_takes_time(tmp_path: Path) -> None:
@@ -66,7 +68,9 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
 @pytest.mark.deep
 def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
     run("init")
-    example, sweep = (python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py")) for name in SCRIPTS)
+    example, sweep = (
+        python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py")) for name in ("example", "sweep")
+    )
     assert example.returncode == sweep.returncode == 0, example.stderr + sweep.stderr
     assert "<Plan optimal: 10 pulses" in example.stdout
     assert (tmp_path / "track.csv").stat().st_size > 100_000
@@ -78,9 +82,6 @@ def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
         assert plan["flown"]["nutation_deg"] < 1e-6
         lines.append(f"{angle} deg: {plan['propellant_kg']:.5f} kg of propellant")
     assert sweep.stdout.splitlines() == lines
-
-
-SCRIPTS = ("example", "sweep")
 
 
 def test_there_is_one_type_of_each_name() -> None:
@@ -108,9 +109,6 @@ def test_numbers_of_numpy_are_numbers() -> None:
     plan = nutdamp.plan(CRAFT, "four-pulse", Options(on_time=np.float64(0.5), per_turn=np.int64(2)))
     assert max(plan.to_numpy()["on_time_s"]) == 0.5
     assert len(plan.fly(until=np.float64(3.0), samples=np.int64(5)).track.t) >= 5  # type: ignore[arg-type]
-
-
-# --- spacecraft from files and dicts --------------------------------------------------------------------------------
 
 
 def test_a_dict_is_read_as_the_file_is() -> None:
@@ -150,8 +148,6 @@ def test_fields_are_replaced_in_si() -> None:
     assert CRAFT.mass != 200.0
     assert (CRAFT.source is None, lighter.source is None) == (False, True)  # it is no longer what its file says
 
-
-# --- what is refused ------------------------------------------------------------------------------------------------
 
 CALM = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n")
 LIB: Any = nutdamp
@@ -219,9 +215,9 @@ def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
             call()
         messages.append(str(raised.value).partition("; there are ")[0])
     check_text("library.wrong-arguments", "\n".join(messages))
-    for plan in (planning.plan, planning.alternatives):
+    for below in (planning.plan, planning.alternatives):
         with pytest.raises(KeyError):
-            plan(CRAFT, "three-pulse")
+            below(CRAFT, "three-pulse")
 
 
 def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> None:
@@ -244,3 +240,61 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> No
     for number, each in enumerate([*keys, {"thrusters": {"T9": {"force": 3}}}]):
         with refused(errors.FaultyFile, f"library.with-{number}"):
             CRAFT.with_(**each)
+
+
+FOLDER = places.TESTS / "benchmarks"
+CLOCKS = re.compile(r"\btimeout *=|\bperf_counter\b|\bmonotonic\b|\btime\.time\b|\bprocess_time\b|\bsetitimer\b")
+MEASURING = {"benchmarks", "mutants.py", Path(__file__).name}
+
+
+@pytest.fixture(scope="module")
+def run_py() -> dict[str, Any]:
+    return runpy.run_path(str(FOLDER / "run.py"))
+
+
+def test_their_files_are_sound(run_py: dict[str, Any]) -> None:
+    body = read_spacecraft(run_py["DISPERSED"], "dispersed.yaml")
+    inputs = list_inputs(body, plan(body, "two-pulse").pulses)
+    assert (len(inputs.drawn), inputs.unused) == (11, ())
+    for channels, periods in ((4, 40.0), (16, 100.0)):
+        body = read_spacecraft(run_py["fan"](channels, periods), "fan.yaml")
+        assert len(body.channels) == channels
+        assert body.horizon / body.body_period == pytest.approx(periods)
+    names = {*run_py["BASES"], *(process.name for process in run_py["PROCESSES"])}
+    for process in run_py["PROCESSES"]:
+        assert process.against in names
+        files = {part for part in process.arguments if part.endswith(".yaml")}
+        assert all(Path(part).is_file() for part in files - {"four.yaml", "sixteen.yaml", "dispersed.yaml"})
+
+
+def test_peers_fly_the_same_cases(run_py: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "dispersed.yaml").write_text(run_py["DISPERSED"], encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    works = runpy.run_path(str(FOLDER / "inside.py"))["works"]()  # compares solve_ivp with the flight on the way
+    assert works["one flight"]() == works["solve_ivp"]() > 10
+
+
+def test_the_table_of_the_readme_and_missed_limits(run_py: dict[str, Any]) -> None:
+    row, line = run_py["Row"], run_py["line"]
+    rows = [row("plan", 0.25, 3.04, "import numpy"), row("a case", 3e-7, 5432.1, "faster than it")]
+    assert run_py["markdown"](rows).splitlines()[2:] == [
+        "| plan | 250 ms | 3.0 × import numpy |",
+        "| a case | 300 ns | 5,432 × faster than it |",
+    ]
+    for ratio, memory, missed in ((1.4, 200.0, False), (1.6, 200.0, True), (1.4, 260.0, True)):
+        text = line(row("name", 0.1, ratio, "import numpy", 1.5, memory=memory, memory_limit=250.0))
+        assert ("MISSED" in text) is missed
+    for ratio, missed in ((4000.0, True), (6000.0, False)):
+        assert ("MISSED" in line(row("name", 1e-7, ratio, "faster than it", 5000.0, at_least=True))) is missed
+
+
+def test_no_test_looks_at_a_clock() -> None:
+    sources = [path for path in places.TESTS.rglob("*.py") if not MEASURING & {*path.relative_to(places.TESTS).parts}]
+    lines = [
+        f"{path}:{number}: {line.strip()}"
+        for path in sources
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if CLOCKS.search(line)
+    ]
+    assert len(sources) > 50
+    assert lines == []

@@ -117,9 +117,6 @@ def test_dictionaries_hold_no_number_that_json_has_not() -> None:
         written(each.to_dict())
 
 
-# --- studies, exports, reports --------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def dispersed(tmp_path: Path) -> Path:
     shutil.copy(places.CONFIGS / "single-thruster.yaml", tmp_path / "spacecraft.yaml")
@@ -203,9 +200,6 @@ def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
     assert made.dispersed.met_fraction == nutdamp.disperse(made.comparison.recommended, 200, seed=3).met_fraction
     assert made.verdict.startswith(f"Requirement {'met' if made.good else 'NOT met'}: ")
     assert "and in 200 dispersed cases" in text
-
-
-# --- figures and notebooks ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep

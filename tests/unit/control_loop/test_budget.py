@@ -168,9 +168,6 @@ def test_dissipation_slows_the_spin_as_in_flight() -> None:
     assert slows < -0.004
 
 
-# --- what is seen, and when it shows a threshold --------------------------------------------------------------------
-
-
 def body_of(sensor: Sensor) -> Spacecraft:
     return STAGE if sensor.kind == "accelerometer" else craft()
 
@@ -232,9 +229,6 @@ def test_when_damping_must_begin_is_that_of_the_course_example() -> None:
     assert reached(oblate, rad(1.0)) == pytest.approx(100.0 * math.log(math.tan(rad(5.0)) / math.tan(rad(1.0))))
     assert reached(oblate, rad(6.0)) == 0.0
     assert reached(replace(stage, omega0=np.array([0.0, 0.0, 1.0])), 0.1) == math.inf
-
-
-# --- what follows from a cycle --------------------------------------------------------------------------------------
 
 
 def held_by(body: Spacecraft) -> tuple[Held, Cycle]:

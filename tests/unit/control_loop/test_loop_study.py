@@ -81,9 +81,6 @@ def output(results: LoopResults, name: str) -> Any:
     return results.values[OUTPUTS.index(name)]
 
 
-# --- what is drawn --------------------------------------------------------------------------------------------------
-
-
 def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
     body, dispersed = craft(), study(craft())
     draws, case = dispersed.draws_of(40), dispersed.case(40)
@@ -140,9 +137,6 @@ def test_tolerances_of_zero_fly_the_file_itself_but_for_the_noise() -> None:
     assert np.allclose(results.values, results.study.nominal[:, None], rtol=1e-12, atol=1e-15)
 
 
-# --- one case, alone and among others -------------------------------------------------------------------------------
-
-
 def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     small, large = (results_of(craft(), count, 30.0) for count in (6, 20))
     assert np.allclose(small.values, large.values[:, :6], rtol=1e-12, atol=1e-15, equal_nan=True)
@@ -183,9 +177,6 @@ def test_cases_that_cannot_fly_together_fly_each_for_itself(kind: str) -> None:
     assert results.settled == 3
     plan = loop_of(body, 30.0, seed=3, case=1)
     assert plan.largest[0] == pytest.approx(output(results, "nutation")[1], rel=1e-9)
-
-
-# --- what is made of many -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
@@ -245,8 +236,6 @@ def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     with refused(BadRequest, "loop.study-too-dear"):
         affordable.expect_affordable(1000)
 
-
-# --- the dead band --------------------------------------------------------------------------------------------------
 
 NOISY = {
     "noise": Sensor(rate=20.0, noise=rad(0.03)),

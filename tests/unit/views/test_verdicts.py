@@ -44,9 +44,6 @@ def verdict(compared: Comparison) -> str:
     return "\n".join(verdicts.warnings(compared))
 
 
-# --- the words ------------------------------------------------------------------------------------------------------
-
-
 def test_reasons_and_warnings_say_what_decided_and_what_is_missed() -> None:
     damped, far = judged("a", 0.0, propellant=0.1), judged("far", 1e-12, shift=3.5, impulse=20.0, required=BOTH)
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
@@ -87,8 +84,6 @@ def test_a_share_is_never_rounded_to_what_it_is_not() -> None:
     pairs = [*((share, 0.997) for share in shares), (0.99999, 1e-9), (0.99996, 0.9973), (0.9999999, 0.999999)]
     check_text("verdicts.shares", "\n".join(f"{share}: {verdicts.cases_verdict(share, of)}" for share, of in pairs))
 
-
-# --- what stands in the way -----------------------------------------------------------------------------------------
 
 TILTING = (Disturbance(0.5 + 0j),)
 SINGLE = spinner(channels=(channel("T", 0.0, 1.0, 0.0),), limits=Limits(horizon=7.0))
@@ -168,9 +163,6 @@ def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
         assert Hindrance(body, made, aware=False, nutation=0.01).binding == binding
 
 
-# --- how far a plan is from what is required ------------------------------------------------------------------------
-
-
 def test_the_parts_that_are_missed_and_by_how_much() -> None:
     plan = judged("a", 0.6, shift=0.3, required=BOTH, goal=WIDE, spin=4.0)
     assert [bound.part for bound in plan.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
@@ -199,9 +191,6 @@ def test_the_severity_of_many_is_that_of_each() -> None:
         assert many[row] == alone
         within = nutation[row] <= math.radians(0.5) and aim[row] <= math.radians(0.2)
         assert (alone <= 1.0) == (within and abs(spin[row] / 3.0 - 1.0) <= 1e-3)
-
-
-# --- nothing to do --------------------------------------------------------------------------------------------------
 
 
 def test_where_no_pulse_is_needed_it_says_so() -> None:
@@ -271,8 +260,6 @@ def test_the_spin_that_dissipation_changes_counts(
     ended = reference.fly(body.inertia.moments, body.omega0, [], horizon, growth=body.growth)
     assert bool(abs(ended.rates[2] - 3.0) <= 3e-3) is kept is compliance.unaided(body)
 
-
-# --- disturbances ---------------------------------------------------------------------------------------------------
 
 SHAKEN = replace(FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0))
 AWARE = schemes.Options(with_disturbances=True)
