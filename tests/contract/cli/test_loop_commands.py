@@ -64,9 +64,7 @@ def table(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text().splitlines()))
 
 
-def test_a_loop_is_flown_and_written_and_its_pulses_fired_again_fly_the_same(
-    run: Run, file: str, tmp_path: Path
-) -> None:
+def test_a_loop_is_flown_and_written_and_fired_again(run: Run, file: str, tmp_path: Path) -> None:
     screen = run("loop", file, "--json", "loop.json", "--csv", "pulses.csv", "--track", "track.csv")
     assert screen.returncode == 0, screen.stderr
     check_text("loop.screen", screen.stdout)
@@ -118,9 +116,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
 
 
 @pytest.mark.deep
-def test_a_loop_that_is_never_quiet_misses_the_requirement_alone_as_in_a_study(
-    run: Run, file: str, tmp_path: Path
-) -> None:
+def test_a_loop_that_is_never_quiet_misses_the_requirement(run: Run, file: str, tmp_path: Path) -> None:
     never = (*settings("loop.stop=1e-8 deg"), "--until", "60s")
     screen = run("loop", file, *never, "--json", "loop.json")
     written = json.loads((tmp_path / "loop.json").read_text())

@@ -49,9 +49,7 @@ def test_files_are_those_of_the_command_line(run: Run, tmp_path: Path) -> None:
     assert nutdamp.compare(CRAFT, ["two-pulse"]).to_dict() == json.loads((tmp_path / "plan.json").read_text())
 
 
-def test_arrays_have_the_columns_of_the_files_and_become_data_frames(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
     pandas = types.ModuleType("pandas")
     pandas.DataFrame = dict  # type: ignore[attr-defined]

@@ -138,10 +138,10 @@ def test_tolerances_of_zero_fly_the_file_itself_but_for_the_noise() -> None:
 
 
 def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    small, large = (results_of(craft(), count, 30.0) for count in (6, 20))
+    small, large = (results_of(craft(), count, 30.0) for count in (6, 12))
     assert np.allclose(small.values, large.values[:, :6], rtol=1e-12, atol=1e-15, equal_nan=True)
     assert small.done == 6
-    for case in (2, 5):
+    for case in (5,):
         plan = loop_of(small.study.spacecraft, 30.0, seed=3, case=case)
         outputs = dict(zip(OUTPUTS, small.values[:, case].tolist(), strict=True))
         assert plan.flown_run.settled == pytest.approx(outputs["settled"], abs=1e-9)
@@ -151,14 +151,14 @@ def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: 
         assert plan.flight.residual.momentum_shift == pytest.approx(outputs["momentum_shift"], abs=1e-9)
     monkeypatch.setattr("nutdamp.loop.study.PORTION", 6)
     seen: list[int] = []
-    stopped = run(LoopResults(study(craft(), 30.0), 20), watch=seen.append, stopped=lambda: bool(seen) and seen[-1] > 8)
+    stopped = run(LoopResults(study(craft(), 30.0), 12), watch=seen.append, stopped=lambda: bool(seen) and seen[-1] > 8)
     assert stopped.done == 6
     assert np.array_equal(stopped.values[:, :6], small.values, equal_nan=True)
     monkeypatch.setattr("nutdamp.loop.study.expects_alone", lambda *_: "a test")
-    each = results_of(craft(), 3, 30.0).values
+    each = results_of(craft(), 2, 30.0).values
     rows = [row for row, name in enumerate(OUTPUTS) if name != "nutation"]  # alone it is looked for in pulses too
-    assert np.allclose(small.values[rows, :3], each[rows], rtol=1e-9, atol=1e-12)
-    assert np.all(each >= small.values[:, :3] - 1e-9 * np.abs(each))
+    assert np.allclose(small.values[rows, :2], each[rows], rtol=1e-9, atol=1e-12)
+    assert np.all(each >= small.values[:, :2] - 1e-9 * np.abs(each))
 
 
 ALONE: dict[str, Callable[[], Spacecraft]] = {

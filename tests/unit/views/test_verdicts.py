@@ -251,9 +251,7 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     ("A", "C", "degrees", "horizon", "kept"),
     [(120.0, 80.0, 2.0, 30.0, False), (120.0, 80.0, 2.0, 2.0, True), (80.0, 120.0, 20.0, 20.0, False)],
 )
-def test_the_spin_that_dissipation_changes_counts(
-    A: float, C: float, degrees: float, horizon: float, kept: bool
-) -> None:
+def test_changes_of_spin_count(A: float, C: float, degrees: float, horizon: float, kept: bool) -> None:
     """H stays, so the spin falls with cos θ: by the reference integrator too, for either shape."""
     body = spinner(A, C, degrees=degrees, requirement=Requirement(nutation=math.radians(30)))
     body = replace(body, dissipation=30.0, goal=WIDE, limits=Limits(horizon=horizon))
