@@ -32,7 +32,7 @@ CRAFT = nutdamp.example()
 Options = nutdamp.Options
 
 
-def planned() -> nutdamp.Plan:
+def planned() -> Any:
     return nutdamp.plan(CRAFT, "two-pulse")
 
 
@@ -129,7 +129,8 @@ def test_with_changes_the_keys_named_and_no_others(tmp_path: Path) -> None:
     again = first.with_(limits={"max_pulses": 2})
     assert (again.limits.horizon, again.limits.max_pulses, first.limits.max_pulses) == (300.0, 2, 3)
     changed = CRAFT.with_(state={"nutation": "8 deg"}, thrusters={"+M1": {"force": 12.0}})
-    assert (changed.nutation, changed.omega0[2]) == (pytest.approx(math.radians(8.0)), CRAFT.omega0[2])
+    assert changed.nutation == pytest.approx(math.radians(8.0))
+    assert changed.omega0[2] == CRAFT.omega0[2]
     forces = {each.name: each.thrust for channel in changed.channels for each in channel.thrusters}
     assert (forces["+M1"], forces["-M1"]) == (12.0, 10.0)
     (tmp_path / "own.yaml").write_text(TILTED)

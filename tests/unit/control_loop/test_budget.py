@@ -349,7 +349,8 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
         for start, cycle in zip((0.5, 1.0), cycles, strict=True)
     )
     lost = Held(body, Thresholds(rad(3.0), rad(0.1)), math.inf, why="a reason")
-    courses, bars, mass = budget_figure(Budget(body, rad(2.0), (*held, lost))).axes
+    axes: list[Any] = budget_figure(Budget(body, rad(2.0), (*held, lost))).axes
+    courses, bars, mass = axes
     names = ["no firing", "0.5 to 0.1 deg", "1 to 0.1 deg", "largest"]
     assert [str(line.get_label()) for line in courses.lines] == names
     free, first, second = (np.asarray(line.get_xydata()) for line in courses.lines[:3])
@@ -365,5 +366,5 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
     label, each = ("propellant, kg a year", propellant) if propellant else ("impulse, N m s a year", 0.01)
     assert (bars.get_xscale(), mass.get_xlabel()) == (scale, label)
     assert [patch.get_width() for patch in mass.patches] == pytest.approx([each * YEAR] * 2)
-    alone = budget_figure(Budget(replace(body, loop=None), None, ())).axes
-    assert [len(axes.lines) for axes in alone] == [1]
+    (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
+    assert len(alone.lines) == 1

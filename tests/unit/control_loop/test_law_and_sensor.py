@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support import reference
 from support.builders import channel, spinner
 from support.cases import deep, spread
@@ -168,7 +169,7 @@ def test_thrust_is_felt() -> None:
 
 
 def test_noise_of_a_sample_is_the_same_however_it_is_come_by() -> None:
-    def noise(numbers: Vector, seed: int = 7) -> Vector:
+    def noise(numbers: NDArray[np.int64], seed: int = 7) -> Vector:
         signal = Signal(body(), Sensor(rate=100.0, noise=0.1), seed)
         return signal.sampled(numbers, np.zeros((len(numbers), 2)))
 

@@ -155,6 +155,7 @@ def test_sun_pulses_are_those_of_the_motion() -> None:
     assert clock.first is not None
     start = reference.Motion(SUN_BODY.omega0, attitude.matrix(SUN_BODY.initial.quaternion))
     (then,) = reference.coast(SUN_BODY.inertia.moments, start, np.zeros(3), np.array([clock.first]))
+    assert SUN_BODY.sun is not None
     seen = then.rotation.T @ SUN_BODY.sun
     assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
     times = sun_pulses.sun_pulses(flight.flown(SUN_BODY, Schedule(), 900.0), 900.0)
