@@ -1,0 +1,243 @@
+"""What the sensors show, and when the law fires by it: Magnus' sign table, closed forms, motions by DOP853."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support import reference
+from support.builders import channel, spinner
+from support.cases import deep, spread
+from support.golden import refused
+from support.loops import fired_by, fires, four, transverse_size
+
+from nutdamp.dynamics import make_dynamics
+from nutdamp.errors import Infeasible
+from nutdamp.loop.law import ComplexArray, Firing, Law
+from nutdamp.loop.sensor import Estimator, Signal, gain, is_blind, lag
+from nutdamp.loop_settings import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
+from nutdamp.spacecraft import Spacecraft, Vector
+
+FOUR = four(least=0.01, most=1.0)
+TABLE = {"+M1": (1, 1), "-M1": (1, -1), "+M2": (0, -1), "-M2": (0, 1)}
+"""Magnus 1970, section 4, for a ω3 > 0: which of ω1, ω2 is zero as a channel fires, and how it then changes."""
+
+
+def first_firing(law: Law, z: complex, spin: float = 3.0) -> Firing:
+    firing = law.firing(law.actuators[0], z, spin)
+    assert firing is not None
+    return firing
+
+
+def after(moments: tuple[float, float, float], rates: Vector, torque: Vector, start: float, width: float) -> Vector:
+    """Rates after a coast from ``rates`` and a pulse, by DOP853; then rates along an arc of 7.5 s: (n, 3)."""
+    motion = reference.Motion(rates, np.eye(3))
+    for push, times in ((np.zeros(3), [start]), (torque, [width]), (np.zeros(3), np.linspace(0.02, 7.5, 350))):
+        path = reference.coast(moments, motion, push, np.array(times))
+        motion = path[-1]
+    return np.array([each.rates for each in path])
+
+
+@pytest.mark.parametrize(("C", "spin"), [(80.0, 3.0), (80.0, -3.0), (160.0, 3.0), (160.0, -3.0)])
+def test_sign_table_of_magnus_and_its_mirror_image(C: float, spin: float) -> None:
+    law, rate = Law(fired_by(5.0, FOUR, C=C, spin=spin), Loop(Sensor(), start=0.01)), (120.0 - C) / 120.0 * spin
+    for actuator in law.actuators:
+        z = 0.1 * cmath.exp(0.3j)
+        firing = law.firing(actuator, z, spin)
+        assert firing is not None
+        then = z * cmath.exp(-1j * rate * (firing.wait + 0.5 * firing.on_time))
+        change = -1j * rate * then
+        zero, sign = TABLE[actuator.channel.name]
+        assert (then.real, then.imag)[zero] == pytest.approx(0.0, abs=1e-14)
+        assert math.copysign(1.0, (change.real, change.imag)[zero]) == sign * (-1 if rate < 0.0 else 1)
+        assert (then * actuator.kick.conjugate()).real < 0.0  # whatever the table: against ω
+
+
+@spread("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (120.0, 95.0, 80.0), (70.0, 90.0, 130.0)], quick=1)
+@spread("spin", [2.0, -2.0], quick=1)
+def test_a_firing_lowers_the_nutation_as_much_as_can_be(moments: tuple[float, float, float], spin: float) -> None:
+    """Moved by a few degrees to either side it lowers less: by DOP853, small angles."""
+    for degrees in (10.0, 205.0):
+        push = 0.5 * cmath.exp(1j * math.radians(degrees))
+        torque = np.array([push.real, push.imag, 0.0])
+        craft = spinner(moments=moments, spin=spin, degrees=0.2, channels=(channel("T", *torque),))
+        law = Law(craft, Loop(Sensor(), start=1e-4, on_time=0.4))
+        firing = first_firing(law, complex(law.seen(complex(*craft.omega0[:2]))), spin)
+        start = firing.wait % craft.body_period + craft.body_period
+
+        def widest(
+            at: float, push: Vector = torque, of: Spacecraft = craft, sense: float = math.copysign(1.0, spin)
+        ) -> float:
+            rates = after(moments, of.omega0, push, at, 0.4)
+            return max(reference.nutation(moments, each, sense) for each in rates)
+
+        assert widest(start) < min(widest(start - 0.3), widest(start + 0.3), widest(start, np.zeros(3)))
+
+
+@pytest.mark.parametrize("kind", ["four-pulse", ONE_PULSE, BANG])
+@pytest.mark.parametrize("predict", [True, False])
+def test_waits_of_many_moments_are_those_of_each(kind: str, predict: bool) -> None:
+    rng = np.random.default_rng(3)
+    channels = (*FOUR, channel("slanted", 2.0, 3.0, 0.0, min_on_time=0.02), channel("axial", 2.0, -1.0, 0.9))
+    on_time = 0.05 if kind != ONE_PULSE else None
+    law = Law(spinner(channels=channels), Loop(Sensor(), kind, start=0.01, predict=predict, on_time=on_time))
+    z = rng.normal(size=200) * np.exp(rng.uniform(-9.0, 0.0, size=200)) * np.exp(1j * rng.uniform(0, 7, size=200))
+    spin = rng.uniform(2.5, 3.5, size=200)
+    for actuator in law.actuators:
+        single = [law.firing(actuator, complex(each), float(turn)) for each, turn in zip(z, spin, strict=True)]
+        wanted = np.array([math.nan if each is None else each.wait for each in single])
+        off = 1e-12 if actuator.spin_rate == 0.0 else 0.03
+        assert np.allclose(law.waits(actuator, z, spin), wanted, rtol=1e-12, atol=off, equal_nan=True)
+
+
+def test_on_time_is_the_exact_one_for_what_is_left() -> None:
+    """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), flown by DOP853: nothing is left."""
+    craft = fired_by(0.4, FOUR)
+    firing = first_firing(Law(craft, Loop(Sensor(), ONE_PULSE, start=1e-4)), complex(*craft.omega0[:2]))
+    rate, left = 3.0 / 3.0, 120.0 * transverse_size(craft.omega0)
+    assert firing.on_time == pytest.approx(2.0 / rate * math.asin(rate * left / (2.0 * 6.0)), rel=1e-13)
+    start, torque = firing.wait % craft.body_period, np.array([6.0, 0.0, 0.0])
+    assert transverse_size(after((120, 120, 80), craft.omega0, torque, start, firing.on_time)[0]) < 1e-11
+
+
+def test_a_pulse_that_would_leave_more_than_it_finds_is_not_fired() -> None:
+    law, smallest = Law(fired_by(5.0, FOUR), Loop(Sensor(), start=1e-4)), 0.01 * 6.0 / 120.0
+    assert law.firing(law.actuators[0], complex(0.499 * smallest), 3.0) is None
+    assert law.firing(law.actuators[0], complex(0.501 * smallest), 3.0) is not None
+
+
+def test_no_law_for_a_sphere_or_without_channels() -> None:
+    for key, body in (("sphere", fired_by(5.0, FOUR, A=100.0, C=100.0)), ("no-channels", spinner())):
+        with refused(Infeasible, f"loop.{key}"):
+            Law(body, fires())
+
+
+def test_size_and_nutation_are_inverse_and_those_of_the_arc() -> None:
+    for moments in ((120.0, 120.0, 80.0), (120.0, 95.0, 80.0), (70.0, 90.0, 130.0)):
+        craft = fired_by(0.05, FOUR, moments=moments)
+        law = Law(craft, fires())
+        size = abs(complex(law.seen(complex(*craft.omega0[:2]))))
+        assert float(law.nutation(size, 3.0)) == pytest.approx(craft.nutation, rel=1e-5)
+        assert law.size(float(law.nutation(size, 3.0)), -3.0) == pytest.approx(size)
+
+
+BODIES = ((120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (120.0, 100.0, 80.0), (70.0, 80.0, 120.0))
+UP, SIDE = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+AT, ALONG = np.array([0.9, -0.4, 0.7]), np.array([0.36, 0.48, 0.8])
+FELT = Sensor(ACCELEROMETER, 100.0, position=AT, axis=ALONG)
+
+
+def body(
+    moments: tuple[float, float, float] = BODIES[0], spin: float = 3.0, degrees: float = 0.5, mass: float | None = None
+) -> Spacecraft:
+    return spinner(moments=moments, spin=spin, degrees=degrees, mass=mass, channels=(channel("+M1", 5.0, 0.0, 0.0),))
+
+
+@pytest.mark.parametrize(("moments", "spin"), [*zip(BODIES, (3.0, -3.0, -3.0, 3.0), strict=True)])
+def test_accelerometer_shows_what_a_point_of_the_body_does(moments: tuple[float, float, float], spin: float) -> None:
+    """Its gain is the part that is linear in the transverse rate."""
+    craft, step, small = body(moments, spin, 6.0), 1e-3, 1e-6
+    start = reference.Motion(craft.omega0, np.eye(3))
+    places = reference.coast(moments, start, np.zeros(3), np.linspace(step, 5.0 * step, 5))
+    points = np.array([each.rotation @ AT for each in places])
+    acceleration = (-points[0] + 16 * points[1] - 30 * points[2] + 16 * points[3] - points[4]) / (12 * step * step)
+    middle, signal = places[2], Signal(craft, FELT, 1)
+    shown = signal.shown(middle.rates[None, :])[0, 0]
+    assert shown == pytest.approx(ALONG @ middle.rotation.T @ acceleration, abs=2e-8)
+    rates = np.array([[small, 0.0, spin], [-small, 0.0, spin], [0.0, small, spin], [0.0, -small, spin]])
+    slopes = (signal.shown(rates)[::2, 0] - signal.shown(rates)[1::2, 0]) / (2 * small)
+    assert np.array(gain(moments, AT, ALONG)) * spin == pytest.approx(slopes, rel=1e-8)
+
+
+def test_accelerometer_along_axis_3_is_blind_for_a_flat_disc_alone() -> None:
+    for C in (60.0, 150.0, 199.0):
+        assert gain((100.0, 100.0, C), np.array([2.0, 0.0, 0.3]), UP)[0] == pytest.approx(2.0 * (2.0 - C / 100.0))
+    for C, at, along, blind in ((200, SIDE, UP, True), (200, SIDE, SIDE + UP, False), (199, SIDE, UP, False)):
+        assert is_blind((100.0, 100.0, C), 2.0 * at + 0.3 * UP, along) is blind
+    assert is_blind((100.0, 100.0, 150.0), UP, UP)
+
+
+def test_thrust_is_felt() -> None:
+    craft = body(mass=200.0)
+    signal = Signal(craft, Sensor(ACCELEROMETER, 100.0, position=SIDE), 1)
+    quiet = signal.shown(craft.omega0[None, :])[0, 0]
+    pushed = signal.shown(craft.omega0[None, :], np.array([0.0, 6.0, 0.0]), np.array([0.0, 0.0, 10.0]))[0, 0]
+    assert pushed - quiet == pytest.approx(10.0 / 200.0 - 6.0 / 120.0)
+
+
+def test_noise_of_a_sample_is_the_same_however_it_is_come_by() -> None:
+    def noise(numbers: NDArray[np.int64], seed: int = 7) -> Vector:
+        signal = Signal(body(), Sensor(rate=100.0, noise=0.1), seed)
+        return signal.sampled(numbers, np.zeros((len(numbers), 2)))
+
+    whole, numbers = noise(np.arange(9000)), np.arange(4000, 8500)
+    assert whole.std() == pytest.approx(0.1, rel=0.02)
+    assert np.array_equal(noise(numbers), whole[numbers])
+    assert not np.array_equal(noise(numbers, 8), whole[numbers])
+
+
+def test_steps_scale_and_bias() -> None:
+    signal = Signal(body(), Sensor(rate=10.0, quantisation=0.02, scale=-1.5, bias=0.013), 1)
+    shown = signal.shown(np.array([[0.1, -0.2, 3.0]]))
+    assert shown[0] == pytest.approx([-0.15 + 0.013, 0.3 + 0.013])
+    assert signal.sampled(np.array([0]), shown)[0] == pytest.approx([-0.14, 0.32])
+
+
+def estimates(
+    craft: Spacecraft, sensor: Sensor, cuts: tuple[int, ...] = ()
+) -> tuple[Vector, ComplexArray, ComplexArray]:
+    """Times, estimates of z with the filter taken out, and z itself, along a coast; fed in pieces at ``cuts``."""
+    law = Law(craft, Loop(sensor, start=0.01))
+    signal, path = Signal(craft, sensor, 1), make_dynamics(craft).path(craft.initial, 0.0, 40.0, most=9999)[0]
+    assert sensor.rate is not None
+    numbers = np.arange(int(40.0 * sensor.rate))
+    times = numbers / sensor.rate
+    rates = path.motion(times)[0]
+    estimator, values = Estimator(law, sensor, 0.0), signal.sampled(numbers, signal.shown(rates))
+    pieces = [
+        estimator.best(estimator.feed(times[i], values[i], rates[i, 2]), rates[i, 2])
+        for i in np.split(np.arange(len(times)), cuts)
+    ]
+    return times, np.concatenate(pieces), np.asarray(law.seen(rates[:, 0] + 1j * rates[:, 1]))
+
+
+@pytest.mark.parametrize("moments", [BODIES[0], deep(BODIES[1]), deep(BODIES[2]), BODIES[3]])
+def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(moments: tuple[float, float, float]) -> None:
+    for at, along in (((1.0, 0.3, 0.2), UP), ((0.1, 0.3, 0.8), SIDE)):
+        craft = body(moments, degrees=0.01 if moments[0] != moments[1] else 3.0)
+        sensor = Sensor(ACCELEROMETER, 50.0, bias=0.3, position=np.array(at), axis=along)
+        times, shown, true = estimates(craft, sensor)
+        known = ~np.isnan(shown)
+        assert times[known][0] == pytest.approx(craft.body_period, abs=0.05)
+        assert np.abs(shown[known] - true[known]).max() < 1e-3 * np.abs(true).max()
+
+
+def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:
+    for sensor in (
+        Sensor(rate=50.0, low_pass=0.3, noise=0.001),
+        Sensor(ACCELEROMETER, 50.0, low_pass=0.1, noise=0.001, position=SIDE),
+    ):
+        whole, parts = (estimates(body(), sensor, cuts)[1] for cuts in ((), (3, 40, 41, 700, 1500)))
+        assert np.allclose(whole, parts, rtol=1e-9, atol=1e-12, equal_nan=True)
+
+
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+def test_low_pass_filter_is_the_recursion_and_its_lag_is_known(spin: float) -> None:
+    craft, sensor = body(spin=spin), Sensor(rate=20.0, low_pass=0.4, delay=0.05)
+    law = Law(craft, Loop(sensor, start=0.01))
+    values, beta = np.random.default_rng(5).normal(size=(500, 2)), math.exp(-0.05 / 0.4)
+    level, wanted = values[0].copy(), []
+    for row in values:
+        level = beta * level + (1.0 - beta) * row
+        wanted.append(complex(*level))
+    filtered = Estimator(law, sensor, 0.0).feed(np.arange(500) / 20.0, values, np.full(500, spin))
+    assert np.isnan(filtered[:40]).all()  # not used before it has forgotten how it began
+    assert filtered[40:] == pytest.approx(np.array(wanted)[40:], abs=1e-13)
+    _, best, true = estimates(craft, sensor)
+    assert best[-1] == pytest.approx(true[-1], abs=1e-12)
+    raw = best[-1] * (1.0 - beta) / (1.0 - beta * np.exp(1j * law.rate(spin) * 0.05))
+    behind = np.angle(raw / true[-1]) + law.rate(spin) * 0.05
+    assert lag(law, sensor, spin) == pytest.approx(behind, abs=1e-12)

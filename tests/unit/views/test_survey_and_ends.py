@@ -1,0 +1,359 @@
+"""``check``: what actuators and disturbances do; where spin axis and H end, when pulses start, what is shown as 0."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import reference
+from support.builders import Outcome, aimed, spinner
+from support.cases import deep
+from support.golden import check_text
+from support.places import CASES, case
+from support.process import Run
+
+from nutdamp import flight, planning, rounding, survey
+from nutdamp.files.examples import example_text
+from nutdamp.files.plan_json import final_json, plan_json, target_json
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.flight import Residual
+from nutdamp.physics import attitude, forced
+from nutdamp.presentation import figures
+from nutdamp.presentation.plan_tables import channel_text, pulse_table
+from nutdamp.presentation.text import longitude, steering, vector
+from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.schemes import one_pulse
+from nutdamp.schemes.options import SchemeOptions
+from nutdamp.schemes.tools import sun_pulses
+from nutdamp.spacecraft import Attitude, Disturbance, Spacecraft, Steerable
+
+pytestmark = pytest.mark.usefixtures("plans_shared")
+
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
+CALM = replace(EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]))
+SUNNY = """
+name: Spinner
+inertia: {A: 80 kg m^2, C: 120 kg m^2}
+state: {spin: -30 rpm, nutation: 2 deg}
+attitude: {quaternion: [1, 0, 0, 0]}
+thrusters: [{name: T1, torque: [8, 0, 0], max_on_time: 900 ms}]
+sun: [40 deg, 20 deg]
+sun_sensor: {azimuth: 35 deg}
+commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, max: 1.8 s}, every: [1, 2]}
+keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
+"""
+SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
+
+
+def fired(body: Spacecraft, on_time: float) -> Residual:
+    """What one pulse of the first channel leaves."""
+    return flight.flown(body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))).residual
+
+
+HALF = 0.5 * CALM.body_period
+"""A longer pulse takes back what it has done."""
+
+
+@pytest.mark.parametrize(
+    ("given", "tick", "shortest", "longest"),
+    [
+        ({}, None, CALM.channels[0].min_on_time, CALM.channels[0].max_on_time),
+        ({"min_on_time": 0.025, "max_on_time": math.inf}, None, 0.025, HALF),
+        ({"min_on_time": 0.025, "max_on_time": 0.2}, 0.01, 0.03, 0.2),
+        ({"min_on_time": 0.02, "max_on_time": 0.2}, 0.01, 0.02, 0.2),
+        ({"min_on_time": 0.0, "max_on_time": 0.2}, 0.01, 0.01, 0.2),
+    ],
+)
+def test_steps_are_what_the_shortest_and_the_longest_pulse_do_to_a_pure_spin(
+    given: dict[str, Any], tick: float | None, shortest: float, longest: float
+) -> None:
+    channel = CALM.channels[0]
+    channel = replace(channel, thrusters=tuple(replace(each, **given) for each in channel.thrusters))
+    body = replace(CALM, channels=(channel,), limits=replace(CALM.limits, tick=tick))
+    (steps,) = survey.channel_steps(body)
+    assert steps.smallest == pytest.approx(fired(body, shortest).nutation, rel=1e-9)
+    assert steps.largest == pytest.approx(fired(body, min(longest, HALF)).nutation, rel=1e-9)
+
+
+def test_a_channel_that_spins_up_does_most_by_a_shorter_pulse() -> None:
+    """Over half a nutation period the spin rises by so much that such a pulse does nothing across the axis.
+
+    By impulses: 5.42 s of T1 oppose all of ω, and no reason names a horizon that is far off.
+    """
+    body = read_spacecraft((CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml")
+    (steps,) = survey.channel_steps(replace(body, channels=body.channels[:1]))
+    assert steps.largest > math.radians(80.0)
+    planned = one_pulse.schedule(body, SchemeOptions())
+    assert planned.pulses[0].channel == "T1"
+    assert planned.pulses[0].on_time == pytest.approx(5.4214, rel=1e-4)
+    assert planned.end < 1e-2 * body.horizon
+
+
+def test_the_nearest_pair_is_the_least_off_the_turn_between_halves() -> None:
+    pair = survey.nearest_pair(EXAMPLE)
+    assert pair is not None
+    assert (pair.first.name, pair.second.name) == ("+M1", "-M2")
+    assert abs(math.degrees(pair.miss)) == pytest.approx(0.086, abs=1e-3)  # 90° · (1 - cos 2.5°)
+    assert math.degrees(survey.mounting_angle(EXAMPLE)) == pytest.approx(90.0, abs=0.1)
+
+
+@pytest.mark.parametrize("periods", [2.9, 3.1])
+def test_a_beat_over_three_horizons_is_a_resonance(periods: float) -> None:
+    """The beat has the period 2π/|aω3 + r|."""
+    rate = 2.0 * math.pi / (periods * EXAMPLE.horizon) - EXAMPLE.inertia.a * EXAMPLE.spin
+    (effect,) = survey.consequences(replace(EXAMPLE, disturbances=(Disturbance(1e-3 + 0j, rate=rate),)))
+    assert effect.beat_period == pytest.approx(periods * EXAMPLE.horizon, rel=1e-9)
+    assert (effect.tilt is None) is bool(effect.resonant) is (periods > 3.0)
+
+
+def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> None:
+    body = replace(EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=-EXAMPLE.inertia.a * EXAMPLE.spin),))
+    (effect,) = survey.consequences(body)
+    assert effect.tilt is None
+    mark, time = effect.resonant[0]
+    assert mark == pytest.approx(math.radians(10.0))
+    assert flight.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
+
+
+def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
+    """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it swells to the beat."""
+    A, C = CALM.inertia.A, CALM.inertia.C
+    for torque, rate, precession in (  # equations K14, K15
+        (0.4 - 0.3j, 0.0, 0.5 / (abs(A - C) * 3.0)),
+        (0.24 + 0.1j, -3.0, 0.26 / (C * 3.0)),
+        (0.3j, 0.7, None),
+    ):
+        body = replace(CALM, disturbances=(Disturbance(torque, rate=rate),))
+        (effect,) = survey.consequences(body)
+        assert effect.tilt is not None
+        assert effect.beat is not None
+        swollen = flight.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
+        assert swollen.max() == pytest.approx(effect.beat, rel=1e-4)
+        assert swollen[-1] < 1e-12
+        steady = forced.steady_response(A, C, 3.0, torque, rate)
+        assert effect.precession == pytest.approx(abs(steady), rel=1e-12)
+        assert precession is None or effect.precession == pytest.approx(precession, rel=1e-12)
+        kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
+        angles = flight.flown(kept, Schedule(), 10.0).sampled(50, 10.0).nutation
+        assert np.abs(angles - effect.tilt).max() < 1e-12
+
+
+def test_sun_pulses_are_those_of_the_motion() -> None:
+    """The first is a root of the Sun's azimuth in the body by the reference integrator; on average they are a turn."""
+    clock = survey.sun_clock(SUN_BODY)
+    assert clock is not None
+    assert clock.first is not None
+    start = reference.Motion(SUN_BODY.omega0, attitude.matrix(SUN_BODY.initial.quaternion))
+    (then,) = reference.coast(SUN_BODY.inertia.moments, start, np.zeros(3), np.array([clock.first]))
+    assert SUN_BODY.sun is not None
+    seen = then.rotation.T @ SUN_BODY.sun
+    assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
+    times = sun_pulses.sun_pulses(flight.flown(SUN_BODY, Schedule(), 900.0), 900.0)
+    assert (times[-1] - times[0]) / (len(times) - 1) == pytest.approx(clock.turn, rel=1e-3)
+    assert survey.sun_clock(EXAMPLE) is None
+
+
+def test_the_turn_by_one_pulse_is_what_a_flight_from_rest_does() -> None:
+    body = replace(SUN_BODY, omega0=np.array([0.0, 0.0, -math.pi]))
+    (turn,) = survey.turns(body)
+    assert [turn.smallest_width, turn.largest_width] == pytest.approx([0.02, 0.9])
+    for width, angle in ((turn.smallest_width, turn.smallest), (turn.largest_width, turn.largest)):
+        assert angle == pytest.approx(fired(body, width).momentum_shift, rel=2e-2)
+    assert survey.turns(EXAMPLE) == ()
+
+
+def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Path) -> None:
+    disturbances = (
+        "[{name: leak, torque: [20 mN m, 0, 0]}, {kind: axial, torque: 1 mN m},"
+        " {name: tune, kind: rotating, torque: [1 mN m, 0, 0], rate: -1}]"
+    )
+    text = f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
+    shown = run("check", "-", "--json", "d.json", stdin=text).stdout
+    (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
+    assert file["disturbances"][0]["precession_rad_s"] > 0.0
+    assert file["disturbances"][2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
+    check_text("survey.disturbances", shown)
+    check_text("survey.sun", run("check", "-", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
+    (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
+    assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
+    assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
+    blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
+    assert "does not see the Sun at" in " ".join(run("check", "-", stdin=blind).stdout.split())
+
+
+POINTED = """
+name: Pointed
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 3 rad/s, nutation: 6 deg}
+attitude: {quaternion: [0.809017, 0.081804, 0.582065, 0], epoch: 2016-12-31T23:59:59Z, frame: EME2000}
+steerable: {torque: 60 N m}
+"""
+"""Its axis is 2 or 3 deg from right ascension 350 deg, declination 20 deg, and dated a second before a leap second."""
+
+part = st.floats(-1.0, 1.0, allow_subnormal=False)
+
+
+@given(st.tuples(part, part, part))
+def test_angles_of_a_direction_name_it(parts: tuple[float, float, float]) -> None:
+    direction = np.array(parts)
+    if np.linalg.norm(direction) < 1e-6:
+        return
+    direction /= np.linalg.norm(direction)
+    ascension, declination = attitude.sphere_angles(direction)
+    if ascension is None:
+        assert abs(declination) > 0.5 * math.pi - 1e-10
+    else:
+        assert 0.0 <= ascension < 2.0 * math.pi
+        assert 0.0 <= math.degrees(ascension) < 360.0
+    assert np.linalg.norm(attitude.on_sphere(ascension or 0.0, declination) - direction) < 2e-11
+    body = spinner(degrees=10.0)
+    azimuth, tilt = body.angles_of(direction)
+    assert np.linalg.norm(body.direction_in_n(tilt, azimuth or 0.0) - direction) < 2e-11
+
+
+def test_the_smallest_negative_angle_is_no_full_turn() -> None:
+    assert attitude.full_turn(-1e-20) == 0.0
+    assert attitude.full_turn(-0.25) == pytest.approx(2 * math.pi - 0.25)
+    shown = [longitude(math.radians(359.99999)), longitude(math.radians(-1.5)), longitude(None), steering([1.0, -1e-9])]
+    assert shown == ["0.0000 deg", "358.5000 deg", "–", "0.00°"]
+
+
+def test_final_is_where_the_reference_integrator_ends() -> None:
+    """Without an attitude: tilt and azimuth in the frame N, which the integrator builds by itself."""
+    body = aimed(spinner(degrees=6.0, spin=-3.0, steerable=Steerable(60.0)), 3.0, 200.0)
+    plan = planning.plan(body, "two-pulse")
+    assert plan.feasible
+    outcome, final = Outcome(body, plan.pulses), final_json(plan.flight)
+    ends = {
+        "axis": outcome.motion.rotation @ np.array([0.0, 0.0, -1.0]),
+        "momentum": reference.momentum(body.inertia.moments, outcome.motion),
+    }
+    for name, (x, y, z) in ends.items():
+        assert final[name]["tilt_deg"] == pytest.approx(math.degrees(math.atan2(math.hypot(x, y), z)), abs=1e-7)
+        assert final[name]["azimuth_deg"] == pytest.approx(math.degrees(math.atan2(y, x)) % 360.0, abs=1e-5)
+    assert final["spin_rad_s"] == pytest.approx(outcome.spin, rel=1e-10)
+    assert final["nutation_deg"] == pytest.approx(math.degrees(outcome.nutation), abs=1e-7)
+    target = target_json(body)
+    assert target is not None
+    assert target["axis"] == {"tilt_deg": pytest.approx(3.0), "azimuth_deg": pytest.approx(200.0)}
+    assert final["axis"]["azimuth_deg"] == pytest.approx(200.0, abs=0.1)
+
+
+def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
+    body = spinner(steerable=Steerable())
+    assert final_json(planning.plan(body, "two-pulse").flight)["momentum"]["azimuth_deg"] is None
+    assert target_json(body) is None
+    infeasible = plan_json(planning.Plan(body, "two-pulse", None, "why"))
+    assert (infeasible["final"], infeasible["target"]) == (None, None)
+
+
+@pytest.mark.parametrize("command", ["plan", "simulate", deep("verify")])
+def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, command: str) -> None:
+    """The command that shows both models gives the angles of each, one a row."""
+    options = ("--scheme", "two-pulse", "--target", "350deg,20deg", "--json", "end.json", "--quiet")
+    screen = run(command, "-", *options, stdin=POINTED).stdout
+    written = json.loads((tmp_path / "end.json").read_text())
+    written = written["plans"][0] if command == "plan" else written
+    assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})
+    final = written["final"]
+    assert set(final) == {"axis", "momentum", "spin_rad_s", "nutation_deg"}
+    assert final["spin_rad_s"] == pytest.approx(3.0, abs=0.01)
+    for end, name in (("axis", "spin axis"), ("momentum", "H")):
+        angles = [final[end]["right_ascension_deg"], final[end]["declination_deg"]]
+        assert angles == pytest.approx([350.0, 20.0], abs=0.5)
+        if command == "plan":
+            line = next(line for line in screen.splitlines() if line.startswith(f"{name} ends at"))
+            assert [float(number) for number in re.findall(r"[0-9]+\.[0-9]{4}", line)] == pytest.approx(
+                angles, abs=1e-4
+            )
+        elif command == "simulate":
+            for angle in ("right ascension", "declination"):
+                row = re.search(rf"^{name}: {angle} +([0-9.]+) deg +([0-9.]+) deg$", screen, re.MULTILINE)
+                assert row is not None
+                assert float(row[1]) == pytest.approx(angles.pop(0), abs=0.5)
+    if command != "verify":
+        assert re.search(r"^target +right ascension 350\.0000 deg, declination 20\.0000 deg$", screen, re.MULTILINE)
+
+
+def test_the_range_of_right_ascension_goes_through_zero(run: Run) -> None:
+    shown = run("simulate", "-", "--scheme", "none", "--json", "-", "-q", stdin=POINTED.replace("6 deg", "20 deg"))
+    west, east = json.loads(shown.stdout)["axis_track"]["right_ascension_deg"]
+    assert 300.0 < west < 360.0
+    assert 0.0 <= east < 60.0
+
+
+@pytest.mark.parametrize(("epoch", "last"), [(59.6, "2017-01-01T00:00:00"), (58.8, "2016-12-31T23:59:60")])
+def test_pulses_say_when_they_start_in_utc(run: Run, tmp_path: Path, epoch: float, last: str) -> None:
+    """Across a leap second, which a clock that adds seconds to a date would miss."""
+    (tmp_path / "leap.yaml").write_text(POINTED.replace("23:59:59Z", f"23:59:{epoch}Z"))
+    screen = run("plan", "leap.yaml", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json", "-q")
+    assert screen.returncode == 0, screen.stderr
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "pulses.csv").read_text())))
+    pulses = json.loads((tmp_path / "plan.json").read_text())["plans"][0]["pulses"]
+    for row, pulse in zip(rows, pulses, strict=True):
+        seconds = float(row["start_s"]) + epoch
+        minute = "2016-12-31T23:59" if seconds < 61.0 else "2017-01-01T00:00"
+        whole = f"{minute}:{seconds if seconds < 61.0 else seconds - 61.0:012.9f}Z"
+        assert row["utc"] == pulse["utc"] == whole
+    assert rows[-1]["utc"].startswith(last)
+    # What was written is read again, and the times of a file without an epoch stay as they are.
+    assert run("simulate", "leap.yaml", "--schedule", "pulses.csv").stderr == ""
+    assert "utc" not in run("plan", "-", "--scheme", "two-pulse", "--csv", "-", stdin=example_text()).stdout
+
+
+def dated(epoch: str | None) -> Spacecraft:
+    return replace(spinner(steerable=Steerable(5.0)), attitude=Attitude(np.array([1.0, 0.0, 0.0, 0.0]), epoch, "GCRF"))
+
+
+def steered(start: float, angle: float = 0.0) -> Pulse:
+    return steerable_pulse(Steerable(5.0), start + 0.25, angle, on_time=0.5)
+
+
+def test_a_screen_rounds_a_date_to_the_millisecond() -> None:
+    """The start of each pulse is at most half a millisecond from the date shown, and the day is that of what is shown.
+
+    The first pulse starts 0.3 ms before midnight: it is shown at midnight, on the next day.
+    """
+    pulses = Schedule(tuple(map(steered, (1.0, 2.0009, 3.0004))))
+    table = pulse_table(planning.Plan(dated("2026-03-01T23:59:58.9997Z"), "x", pulses))
+    column = next(column for column in table.columns if str(column.header).startswith("UTC"))
+    assert column.header == "UTC\n2026-03-02"
+    assert list(column.cells) == ["00:00:00.000", "00:00:01.001", "00:00:02.000"]
+
+
+def test_dates_that_no_calendar_has_are_left_out() -> None:
+    bodies = [spinner(), *map(dated, (None, "1960-01-01T00:00:00Z", "9999-12-31T23:59:59Z"))]
+    assert [body.utc(10.0) for body in bodies] == [None] * 4
+
+
+def test_a_steering_angle_is_the_same_everywhere() -> None:
+    body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
+    assert channel_text(pulse, body) == "steerable 289.88°"
+    figure = figures.flight_figure("timeline", *figures.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    assert any("289.88°" in text.get_text() for text in figure.axes[0].texts)
+
+
+def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
+    """Vectors of a track and a check have components of the order of one, or zero."""
+    noisy = np.array([[1.0, -4.484e-18, 0.0], [1e-20, 2e-20, -0.0], [5.0, 6e-13, -4.9e-13]])
+    cleaned = rounding.cleaned(noisy)
+    assert cleaned.tolist() == [[1.0, 0.0, 0.0], [1e-20, 2e-20, 0.0], [5.0, 6e-13, 0.0]]
+    assert not np.signbit(cleaned).any()
+    assert vector([4.484e-18, -0.0, 8.0]) == "(0, 0, 8)"
+    assert [rounding.cleaned_change(change, 3.0) for change in (4e-16, -4e-12)] == [0.0, -4e-12]
+    tilted = str(case("tensor-microsat.yaml"))
+    rows = list(csv.reader(io.StringIO(run("simulate", tilted, "--scheme", "none", "--csv", "-").stdout)))
+    file = json.loads(run("check", tilted, "--json", "-").stdout)["files"][0]
+    vectors = [channel["torque_Nm"] for channel in file["channels"]] + file["spacecraft"]["principal_axes"]
+    parts = [float(cell) for row in rows[1:] for cell in row[4:8]] + [value for each in vectors for value in each]
+    assert not [value for value in parts if 0.0 < abs(value) < 1e-14]
