@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from support.golden import check_text
 
-from nutdamp.errors import FaultyFile
+from nutdamp.errors import FaultyFile, printable
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
@@ -29,5 +29,5 @@ def check_faults(key: str, read: Callable[[Any], object], inputs: Iterable[Any] 
     lines = []
     for name, given in named:
         shown = name if isinstance(name, str) else " -> ".join(map(str, name))
-        lines += [shown.strip().replace("\n", " | "), *(f"    {fault}" for fault in faults(read, given))]
+        lines += [printable(shown.strip().replace("\n", " | ")), *(f"    {fault}" for fault in faults(read, given))]
     check_text(key, "\n".join(lines))
