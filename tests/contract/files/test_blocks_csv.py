@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.contract import check_faults, faults
 from support.golden import check_text
 from support.process import Run
-from support.refusals import check_faults, faults
 from support.spinners import FILE
 
 from nutdamp.cli.flown import JITTER_SEED

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.broken import BASE
+from support.contract import faults
 from support.golden import check_text
-from support.refusals import faults
 
 from nutdamp.dispersion.inputs import reachable
 from nutdamp.files.spacecraft_file import read_spacecraft

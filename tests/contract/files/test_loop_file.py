@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from support.contract import check_faults, faults
 from support.golden import check_text
-from support.refusals import check_faults, faults
 
 from nutdamp.files.loop_models import LoopFaultsSection, LoopSection, LoopSensorSection
 from nutdamp.files.spacecraft_file import read_spacecraft

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from support import places
 from support.broken import BASE, BODY
+from support.contract import check_faults
 from support.golden import check_text
-from support.refusals import check_faults
 
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile

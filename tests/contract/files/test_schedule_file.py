@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.builders import Outcome
+from support.contract import check_faults, faults
 from support.golden import check_text
 from support.process import Run
-from support.refusals import check_faults, faults
 
 from nutdamp import flight, planning
 from nutdamp.files import table

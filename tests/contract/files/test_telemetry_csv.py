@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from support.contract import check_faults
 from support.golden import check_text
-from support.refusals import check_faults
 
 import nutdamp
 from nutdamp.errors import CannotRead

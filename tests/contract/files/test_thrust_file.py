@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.contract import check_faults
 from support.golden import check_text
-from support.refusals import check_faults
 
 from nutdamp import planning
 from nutdamp.files import thrust_rules

@@ -1,4 +1,4 @@
-"""Files that must be refused: the faults of all of them as one text, kept by key."""
+"""What tests of files share: the plans that are exported, and the faults of what must be refused as one text."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import pytest
+from support import messages
+from support.cases import deep
 from support.golden import check_text
 
 from nutdamp.errors import FaultyFile, printable
+
+QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
+CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
+"""Names of the plans of `support.messages`."""
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
