@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -25,6 +25,14 @@ from nutdamp.spacecraft import Spacecraft, Vector
 QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
 CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
 """Names of the plans of `support.messages`."""
+
+T = TypeVar("T")
+
+
+def known(value: T | None) -> T:
+    """The value, which must be there."""
+    assert value is not None
+    return value
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
@@ -102,10 +110,8 @@ def motions(body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation
 def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
     """∫ R F dt / m of one pulse, m/s, by Simpson on attitudes of the reference integrator."""
     body = plan.spacecraft
-    assert pulse.force is not None
-    assert body.mass is not None
     start = messages.columns(body, body.initial.quaternion) @ body.inertia.axes
     times = np.linspace(pulse.start, pulse.end, 33)
     moved = motions(body, plan.pulses, times.tolist(), start)
-    pushes = np.array([motion.rotation @ pulse.force for motion in moved])
-    return np.asarray(simpson(pushes, x=times, axis=0) / body.mass)
+    pushes = np.array([motion.rotation @ known(pulse.force) for motion in moved])
+    return np.asarray(simpson(pushes, x=times, axis=0) / known(body.mass))

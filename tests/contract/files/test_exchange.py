@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from support import messages
 from support.builders import channel, spinner
 from support.cases import spread
-from support.contract import CASES, PUSHED, VALVED, pushing, valved, velocity_change
+from support.contract import CASES, PUSHED, VALVED, known, pushing, valved, velocity_change
 from support.golden import check_text
 
 from nutdamp import planning
@@ -130,10 +130,9 @@ def test_comments_say_what_is_commanded_and_that_the_keywords_are_the_thrust(for
     text = export_text(plan, form, xml=xml)
     assert len(plan.pulses) > 1
     for pulse in plan.pulses:
-        assert pulse.command is not None
-        assert pulse.command.on_time == pytest.approx(pulse.on_time + 7e-3)
-        utc = (plan.spacecraft.utc(pulse.command.start) or "").removesuffix("Z")
-        assert f"Commanded: {pulse.command.on_time:.9g} s from {utc} on." in text
+        assert known(pulse.command).on_time == pytest.approx(pulse.on_time + 7e-3)
+        utc = (plan.spacecraft.utc(known(pulse.command).start) or "").removesuffix("Z")
+        assert f"Commanded: {known(pulse.command).on_time:.9g} s from {utc} on." in text
         assert f"those of the thrust: {pulse.on_time:.9g} s at the torque given." in text
     assert "Commanded" not in export_text(planning.plan(read_spacecraft(VALVED, "f.yaml"), "one-pulse"), form, xml=xml)
 
@@ -157,11 +156,9 @@ def test_velocity_changes_are_those_of_each_pulse(name: str) -> None:
         velocity = 1e3 * np.array([float(manoeuvre[f"MAN_DV_{axis}"]) for axis in (1, 2, 3)])
         assert velocity == pytest.approx(velocity_change(plan, pulse), rel=1e-7, abs=1e-12)
         assert float(manoeuvre["MAN_DURATION"]) == pytest.approx(pulse.on_time, rel=1e-15)
-        assert pulse.propellant is not None
-        assert float(manoeuvre["MAN_DELTA_MASS"]) == pytest.approx(-pulse.propellant, rel=1e-15)
+        assert float(manoeuvre["MAN_DELTA_MASS"]) == pytest.approx(-known(pulse.propellant), rel=1e-15)
         total += velocity
-    assert plan.delta_v is not None
-    assert total == pytest.approx(plan.delta_v, rel=1e-9, abs=1e-15)
+    assert total == pytest.approx(known(plan.delta_v), rel=1e-9, abs=1e-15)
 
 
 def test_without_an_orbit_only_the_manoeuvres_are_written() -> None:
@@ -192,8 +189,7 @@ def test_what_cannot_be_exported_is_refused() -> None:
     plan, tilted = messages.planned("prolate"), messages.planned("tilted tensor, backwards")
     ideal = planning.plan(replace(messages.spacecraft("prolate"), steerable=None), "two-pulse")
     assert "2026-03-01T12" in export_text(ideal, "aem")
-    attitude = plan.spacecraft.attitude
-    assert attitude is not None
+    attitude = known(plan.spacecraft.attitude)
     lean = math.radians(1.0)
     turn = np.array([[1, 0, 0], [0, math.cos(lean), -math.sin(lean)], [0, math.sin(lean), math.cos(lean)]])
     tensor = (turn @ np.diag([120.0, 120.0, 80.0]) @ turn.T).tolist()

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.builders import Outcome
-from support.contract import check_faults, faults
+from support.contract import check_faults, faults, known
 from support.golden import check_text
 from support.process import Run
 
@@ -110,8 +110,7 @@ def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Rea
     assert made.pulses[0].impulse.tolist() == pytest.approx([1.5, 2.0, 0.0])
     assert made.pulses[0].propellant == pytest.approx(2.5 / (220.0 * 9.80665))
     made, unknown = read(f"{TOP},{IMPULSES}\n1,0.5,XX,1.5,2,0.25\n", STEERED)
-    assert made.pulses[0].torque is not None
-    assert made.pulses[0].torque.tolist() == pytest.approx([3.0, 4.0, 0.5])
+    assert known(made.pulses[0].torque).tolist() == pytest.approx([3.0, 4.0, 0.5])
     assert made.propellant is None
     # The torque rules over the impulse, and is flown where it is not the torquer's.
     made, ruled = read(f"{TOP},{TORQUES},{IMPULSES}\n1,0.5,steerable,6,8,0,1.5,2,0\n", STEERED)

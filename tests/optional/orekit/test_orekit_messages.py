@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import messages, orekit
-from support.contract import PUSHED, pushing, valved, velocity_change
+from support.contract import PUSHED, known, pushing, valved, velocity_change
 
 from nutdamp import flight
 from nutdamp.files.exchange import export_text
@@ -59,8 +59,7 @@ def test_parameters(case: str, xml: bool) -> None:
     body = plan.spacecraft
     data = data_of("apm", export_text(plan, "apm", xml=xml))
     state = data.getAttitude(None, None)
-    assert body.attitude is not None
-    frame = (body.attitude.frame or "").replace("J2000", "EME2000")
+    frame = (known(body.attitude).frame or "").replace("J2000", "EME2000")
     assert str(state.getReferenceFrame().getName()).replace("J2000", "EME2000") == frame.replace("J2000", "EME2000")
     rates = messages.in_file_axes(body, body.initial.rates)
     assert orekit.components(state.getSpin()) == pytest.approx(rates, rel=1e-12, abs=1e-14)
@@ -74,8 +73,7 @@ def test_parameters(case: str, xml: bool) -> None:
     for manoeuvre, pulse in zip(written, plan.pulses, strict=True):
         assert manoeuvre.getEpochStart().durationFrom(data.getEpoch()) == pytest.approx(pulse.start, abs=0.51e-9)
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
-        assert pulse.torque is not None
-        torque = messages.in_file_axes(body, pulse.torque)
+        torque = messages.in_file_axes(body, known(pulse.torque))
         assert orekit.components(manoeuvre.getTorque()) == pytest.approx(torque, rel=1e-14, abs=1e-14)
         if pulse.propellant is not None:
             assert manoeuvre.getDeltaMass() == pytest.approx(-pulse.propellant, rel=1e-15)
@@ -150,9 +148,8 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
     if form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric:
         return  # refused: see test_exchange
     flown, epoch, segments = ephemeris(case, xml, form)
-    assert flown.spacecraft.attitude is not None
     frames = orekit.java("org.orekit.frames.FramesFactory")
-    frame = frames.getGCRF() if flown.spacecraft.attitude.frame == "GCRF" else frames.getEME2000()
+    frame = frames.getGCRF() if known(flown.spacecraft.attitude).frame == "GCRF" else frames.getEME2000()
     worst_turn = worst_rate = 0.0
     for segment in segments:
         provider = segment.getAttitudeProvider()
@@ -214,8 +211,7 @@ def test_orbit_messages(name: str, xml: bool) -> None:
     plan = pushing(name)
     (segment,) = orekit.parse("opm", export_text(plan, "opm", xml=xml)).getSegments()
     data = segment.getData()
-    assert plan.spacecraft.attitude is not None
-    assert str(segment.getMetadata().getReferenceFrame().getName()) == plan.spacecraft.attitude.frame
+    assert str(segment.getMetadata().getReferenceFrame().getName()) == known(plan.spacecraft.attitude).frame
     state = data.getStateVectorBlock()
     coordinates = state.toTimeStampedPVCoordinates()
     assert orekit.components(coordinates.getPosition()) == pytest.approx([7e6, -12e3, 3.5e3], rel=1e-15)
@@ -227,7 +223,7 @@ def test_orbit_messages(name: str, xml: bool) -> None:
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         change = velocity_change(plan, pulse)
         assert orekit.components(manoeuvre.getDV()) == pytest.approx(change, rel=1e-7, abs=1e-12)
-        assert str(manoeuvre.getReferenceFrame().getName()) == plan.spacecraft.attitude.frame
+        assert str(manoeuvre.getReferenceFrame().getName()) == known(plan.spacecraft.attitude).frame
         assert manoeuvre.getDeltaMass() == pytest.approx(-(pulse.propellant or 0.0), rel=1e-15)
 
 
