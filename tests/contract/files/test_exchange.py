@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import re
 from dataclasses import replace
@@ -23,6 +24,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import APM_BLOCKS, comment, label, number
 from nutdamp.files.exchange import export_text, lacking
 from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.physics.arc_cones import arc_cones
 from nutdamp.physics.feed import Tank
 from nutdamp.planning import Plan
 from nutdamp.schedule import Schedule, channel_pulse
@@ -225,3 +227,38 @@ def test_what_cannot_be_exported_is_refused() -> None:
             export_text(other, form, **options)
         said.append(f"{name}: {refused.value}")
     check_text("files.not-exported", re.sub("[0-9]{8,} records", "very many records", "\n".join(said)))
+
+
+# --- the script for Basilisk, which tests/optional/basilisk runs -----------------------------------------------------
+
+
+def test_it_is_python_with_the_schedule_in_the_axes_of_the_file() -> None:
+    plan = messages.planned("tilted tensor, backwards")
+    tank = Tank(2.0, 22e5, 16e5, 1.0)
+    named = replace(plan, spacecraft=replace(plan.spacecraft, name='a """ name \\ of {many} parts', tank=tank))
+    tree = ast.parse(export_text(named, "basilisk"))
+    values = {
+        node.targets[0].id: node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+    schedule = ast.literal_eval(values["SCHEDULE"])
+    firing = [(duration, torque) for name, duration, torque in schedule if name != "coast"]
+    for (duration, torque), pulse in zip(firing, plan.pulses, strict=True):
+        assert duration == pytest.approx(pulse.on_time, rel=1e-12)
+        in_file = messages.in_file_axes(plan.spacecraft, known(pulse.torque))
+        assert torque == pytest.approx(in_file, rel=1e-12, abs=1e-12)
+    assert sum(duration for _, duration, _ in schedule) == pytest.approx(plan.pulses.end, rel=1e-14)
+
+
+@pytest.mark.parametrize("moments", [(100.0, 130.0, 180.0), (130.0, 100.0, 80.0), (120.0, 120.0, 80.0)])
+def test_the_cones_that_the_script_prints_are_those_of_the_residual(moments: tuple[float, float, float]) -> None:
+    """The function alone, as it stands in the script."""
+    parsed = ast.parse(export_text(messages.planned("prolate"), "basilisk"))
+    (cones,) = (node for node in parsed.body if isinstance(node, ast.FunctionDef) and node.name == "largest_cones")
+    names: dict[str, Any] = {"math": math, "PRINCIPAL_MOMENTS": np.array(moments)}
+    exec(compile(ast.Module([cones], []), "fly.py", "exec"), names)
+    for rates in ([0.4, 0.1, 2.0], [0.1, -0.4, -2.0], [1e-6, 1e-7, 2.0]):
+        for sense in (1.0, -1.0):
+            expected = tuple(arc_cones(moments, rates, sense))
+            assert names["largest_cones"](np.array(rates), sense) == pytest.approx(expected, rel=1e-9)

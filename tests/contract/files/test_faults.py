@@ -1,8 +1,9 @@
-"""Broken files: each must give exactly its faults, at their places, with a cure."""
+"""Spacecraft files that are refused or doubted: each gives exactly its faults, at their places, with a cure."""
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -10,13 +11,18 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.broken import BASE, BROKEN, SPIN, THRUSTERS
+from support import places
+from support.broken import BASE, BODY, BROKEN, SPIN, THRUSTERS
 from support.builders import within
 from support.cases import deep
+from support.contract import check_faults, faults
 from support.golden import check_text
 
+import nutdamp
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.examples import example_text
+from nutdamp.files.loop_models import LoopFaultsSection, LoopSection, LoopSensorSection
+from nutdamp.files.settings import parse_setting
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.spacecraft import Spacecraft
 
@@ -155,3 +161,204 @@ def test_any_value_of_any_shape_is_read_or_refused(entry: tuple[str, object]) ->
     key, value = entry
     lines = [line for line in BASE.splitlines() if not line.startswith(key)]
     judge(lambda: read_spacecraft("\n".join([*lines, f"{key}: {json.dumps(value)}"]), "f.yaml"))
+
+
+# --- numbers without a unit that are hardly meant --------------------------------------------------------------------
+
+DATED = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: GCRF}\n"
+THRUSTER = "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, min_on_time: {}}}]\n"
+TENSOR = "name: X\ninertia: {tensor: [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}\n"
+
+
+def whole(lines: str) -> str:
+    """A file that has these lines, and what else it needs before them."""
+    return lines if lines.startswith("name") else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
+
+
+def read_lines(lines: str) -> Spacecraft:
+    return read_spacecraft(whole(lines), "f.yaml")
+
+
+def doubts_of(lines: str) -> list[Fault]:
+    doubts: list[Fault] = []
+    read_spacecraft(whole(lines), "f.yaml", warn=doubts.append)
+    return doubts
+
+
+DOUBTED = (
+    "state: {spin: 30, nutation: 0.1}",
+    "state: {spin: -101.5, nutation: 0.1}",
+    "state: {spin: 3, nutation: 0.1, phase: 40}",
+    "omega0: [0.1, 0, 180]",
+    "state: {spin: 3, nutation: 0.5}",
+    "requirement: {nutation: 0.3 deg}\nthrusters: [{name: T, torque: [1, 0, 0]}]\n"
+    "loop: {sensor: {kind: gyro, rate: 20 Hz}, start: 0.5 deg, stop: 0.1 deg}",
+    "goal: {spin: 28}",
+    THRUSTER.format(300, 0),
+    THRUSTER.format(0.3, 20),
+    THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}",
+    THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
+    THRUSTER.format(0.3, "0, isp: 200") + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
+    THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}",
+    THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
+    "steerable: {torque: 3, lever_arm: 800}",
+    f"{DATED}orbit: {{position: [0, 7000, 0], velocity: [0, 0, 7500]}}",
+    f"{DATED}orbit: {{position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}}",
+    "requirement: {nutation: 0.5}",
+    "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}",
+    "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",  # 2.9 deg, more than there is
+    "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}",
+    f"{TENSOR}omega0: [0.02, 0, 3]\nrequirement: {{nutation: 0.05}}",
+    # In the order of the file.
+    "omega0: [40, 0.2, 3]\n" + THRUSTER.format(300, 20) + "goal: {spin: 40}",
+    # A turn takes 2.094 s at 3 rad/s, and fifty 104.7 s.
+    THRUSTER.format(0.3, "2.15"),
+    THRUSTER.format(0.3, "20 ms, max_on_time: 106"),
+)
+UNDOUBTED = (
+    "state: {spin: 30 rad/s, nutation: 0.1, phase: 40 rad}",
+    "state: {spin: 300 rpm, nutation: 89 deg, phase: 400 deg}",
+    "state: {spin: 27.4, nutation: 0.1, phase: 6.2}",
+    "state: {spin: 19, nutation: 0.1, phase: -6.2}",
+    THRUSTER.format("300 m", "20 s"),
+    THRUSTER.format(49, 2.0),
+    "goal: {tilt: 2.0, azimuth: 5, spin: 12}",
+    "requirement: {nutation: 0.01, momentum_shift: 0.09}",
+    "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}",
+    THRUSTER.format(0.3, "20 ms, max_on_time: 2000 s"),
+    THRUSTER.format(0.3, "2.05"),
+    THRUSTER.format(0.3, "20 ms, max_on_time: 103"),
+    "omega0: [0.1, 0.2, 0.3]\n" + THRUSTER.format(0.3, 20),  # a turn takes 20.9 s
+    example_text(),
+)
+
+
+def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
+    said = []
+    for lines in DOUBTED:
+        said += [lines.strip().replace("\n", " | "), *(f"    {doubt.as_warning}" for doubt in doubts_of(lines))]
+    check_text("files.doubts", "\n".join(said))
+    # What is set on the command line is doubted too.
+    doubts: list[Fault] = []
+    read_spacecraft(BASE, "f.yaml", [parse_setting("requirement.nutation=0.5")], doubts.append)
+    check_text("files.doubts-of-setting", "\n".join(doubt.as_warning for doubt in doubts))
+
+
+def test_units_and_common_numbers_give_no_warning_nor_does_any_file_that_comes_along() -> None:
+    configs = [path.read_text(encoding="utf-8") for path in sorted(places.CONFIGS.glob("*.yaml"))]
+    for lines in (*UNDOUBTED, *configs):
+        text = lines if "inertia:" in lines else whole(lines)
+        doubts: list[Fault] = []
+        read_spacecraft(text, "f.yaml", warn=doubts.append)
+        assert doubts == []
+
+
+def test_an_angle_too_large_is_refused_with_its_likely_unit_where_degrees_are_a_cure() -> None:
+    angles = (
+        "state: {spin: 3, nutation: 5}",
+        "requirement: {nutation: 2}",
+        "goal: {tilt: 30, azimuth: 0}",
+        "goal: {right_ascension: 1, declination: -22.5}",
+        *(f"state: {{spin: 3, nutation: {value}}}" for value in ("95", "-0.1", "95 deg", "2 rad")),
+        *(
+            f"name: X\ninertia: {{{keys}}}\nomega0: [0.1, 0, 3]"
+            for keys in ("Ixx: 120, Iyy: 118, Izz: 80", "I1: 1, I2: 2, I3: 2", "ixx: 1, Jyy: 1, I_zz: 1")
+        ),
+    )
+    check_faults("files.likely-units", read_lines, angles)
+
+
+def test_a_refused_file_gives_its_warnings_too() -> None:
+    doubts: list[Fault] = []
+    text = f"{BASE}thrusters: [{{name: T, torque: [8, 0, 0], min_on_time: 20, max_on_time: 2 s}}]\n"
+    with pytest.raises(FaultyFile) as caught:
+        read_spacecraft(text, "f.yaml", warn=doubts.append)
+    places = [fault.where for fault in (*caught.value.faults, *doubts)]
+    assert places == ["thrusters[0].min_on_time"] * 2
+
+
+def test_python_warns_where_the_library_was_called(tmp_path: Path) -> None:
+    text = whole("state: {spin: 30, nutation: 0.1}\n")
+    (tmp_path / "f.yaml").write_text(text)
+    for name in ("text", "file"):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            _ = nutdamp.read(text) if name == "text" else nutdamp.load(tmp_path / "f.yaml")
+        assert "state.spin" in str(caught[0].message)
+        assert caught[0].filename == __file__
+
+
+# --- loops -----------------------------------------------------------------------------------------------------------
+
+LOOPING = """\
+name: Upper
+inertia: {A: 100 kg m^2, C: 70 kg m^2}
+omega0: [0.042 rad/s, 0.036 rad/s, 3 rad/s]
+thrusters:
+  - {name: +M1, torque: [20, 0, 0], min_on_time: 5 ms, max_on_time: 50 ms}
+  - {name: -M2, torque: [0, -20, 0], min_on_time: 5 ms, max_on_time: 50 ms}
+"""
+GYRO = {"kind": "gyro", "rate": "100 Hz"}
+ACCELEROMETER = {"kind": "accelerometer", "rate": "100 Hz", "position": "[1 m, 0, 0]"}
+
+SENSELESS = {
+    "sensor.kind": "star; 1",
+    "sensor.rate": "0; -1; .nan; 100 m; 0.5 Hz; 1e9",
+    "sensor.quantisation": "-1e-3; .inf; 2 deg/s; 1 m/s^2",
+    "sensor.noise": "-1 deg/s; .nan; 1.0; 2 rpm; 1 m/s^2",
+    "sensor.bias": ".inf; -2 deg/s; 1 m/s^2",
+    "sensor.scale": "0; .inf; 2000 %; -0.01",
+    "sensor.delay": "-1; .nan; 1e6; 1 deg",
+    "sensor.low_pass": "-1; .inf; 1e6",
+    "sensor.position": "[1, 0, 0]",
+    "sensor.axis": "[0, 0, 1]",
+    "law": "three-pulse",
+    "start": "0; 2; 90 deg; .nan",
+    "stop": "0.2 deg; -1 deg; .inf",
+    "settle": "-1; 1e6",
+    "min_interval": "-1; 1e9",
+    "predict": "1",
+    "alias": "'no'",
+    "on_time": "0; 1 s; .inf",
+    "faults.reversed": "[X]; +M1; [+M1, +M1]",
+}
+OF_ACCELEROMETER = {
+    "sensor.quantisation": "1e3; 1 deg/s",
+    "sensor.noise": "-1; 1 m/s^2; 1 deg/s",
+    "sensor.bias": "1e9",
+    "sensor.position": "[0, 0, 0]; [1, 0]; [1e9 m, 0, 0]",
+    "sensor.axis": "[0, 0, 0]; [1, 1]",
+}
+
+
+def looped(sensor: dict[str, str], key: str = "", value: str = "") -> Spacecraft:
+    """A body with a loop, one key of which has another value."""
+    section, _, last = key.rpartition(".")
+    loop = {"sensor": dict(sensor), "start": "0.2 deg"}
+    inner = loop.setdefault(section, {}) if section else loop
+    if key:
+        inner[last] = value
+    return read_spacecraft(f"{LOOPING}loop: {flow(loop)}\n", "craft.yaml")
+
+
+def flow(section: object) -> str:
+    """A mapping on one line of YAML."""
+    if isinstance(section, dict):
+        return "{" + ", ".join(f"{key}: {flow(value)}" for key, value in section.items()) + "}"
+    return str(section)
+
+
+def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
+    keys = {key for key in LoopSection.fields() if key not in ("sensor", "faults")}
+    keys |= {f"sensor.{key}" for key in LoopSensorSection.fields()}
+    assert set(SENSELESS) == keys | {f"faults.{key}" for key in LoopFaultsSection.fields()}
+    for name, sensor, table in (("gyro", GYRO, SENSELESS), ("accelerometer", ACCELEROMETER, OF_ACCELEROMETER)):
+        assert looped(sensor).loop is not None
+        cases = [(key, value) for key, values in table.items() for value in values.split("; ")]
+        check_faults(f"files.loop-{name}", lambda case, sensor=sensor: looped(sensor, *case), cases)
+
+
+def test_a_bias_that_may_be_larger_than_start_is_refused() -> None:
+    text = f"{LOOPING}loop: {{sensor: {{kind: gyro, rate: 100 Hz}}, start: 0.2 deg}}\n"
+    dispersed = f"{text}dispersions: {{sensor_bias: {{normal: 100 deg/s}}}}\n"
+    check_text("files.loop-bias", "\n".join(faults(read_spacecraft, dispersed, "f.yaml")))

@@ -14,8 +14,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from support import reference
+from support import places, reference
 from support.builders import cross
+from support.cases import spread
 from support.contract import known
 from support.places import case
 
@@ -31,6 +32,7 @@ from nutdamp.files.schema import json_schema
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.outcome import seen_at
 from nutdamp.physics import attitude
+from nutdamp.remarks import broken_limits, infeasibility
 from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import CLASSIC
 from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft, Steerable
@@ -340,3 +342,32 @@ def test_what_the_example_shows_in_comments_works() -> None:
     assert known(craft.dispersions).timing_offset == Tolerance("bias", 0.002)
     others = re.sub(r"^(state|inertia): .*\n", "", example_text(), flags=re.MULTILINE)
     assert read(uncommented(others, "inertia", "omega0")).nutation == pytest.approx(math.radians(5), rel=0.05)
+
+
+# --- the files in configs/ -------------------------------------------------------------------------------------------
+
+FILES = sorted(places.CONFIGS.glob("*.yaml"))
+
+
+def test_they_name_their_sources() -> None:
+    assert len(FILES) >= 8
+    for path in FILES:
+        comment = [line for line in path.read_text(encoding="utf-8").splitlines()[:30] if line.startswith("#")]
+        assert len(comment) >= 3
+        assert any("assumed" in line.lower() for line in comment)
+
+
+@spread("path", FILES, quick=4, deep=len(FILES), ids=lambda path: str(path.stem))
+def test_it_is_planned(path: Path) -> None:
+    spacecraft = load_spacecraft(path)
+    compared = compare(spacecraft, CLASSIC)
+    best = compared.recommended
+    assert known(known(best).flown).nutation < 0.1 * spacecraft.nutation
+    assert known(best).meets_requirement is not False
+    for plan in compared.plans:
+        assert plan.feasible or infeasibility(plan)
+        assert broken_limits(spacecraft, plan.pulses) == []
+        if plan.feasible and spacecraft.inertia.symmetric and plan.residual is not None:
+            # Nothing beats the floor down to what is left: A|ω0| - C|ω3| tan θ.
+            left = spacecraft.inertia.C * abs(spacecraft.spin) * math.tan(plan.residual.nutation)
+            assert plan.pulses.total_impulse >= (spacecraft.least_impulse - left) * (1 - 1e-3)
