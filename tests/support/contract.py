@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,6 +28,7 @@ CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) f
 """Names of the plans of `support.messages`."""
 
 T = TypeVar("T")
+Write = Callable[..., Path]
 
 
 def known(value: T | None) -> T:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.contract import check_faults, faults, known
+from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 from support.places import case
 
@@ -84,19 +84,13 @@ MOMENTUM = "MOMENTUM_ALPHA = 0\nMOMENTUM_DELTA = 70\nNUTATION_VEL = 0.01\n"
 SPIN = f"SPIN_START\n{ENDS}SPIN_ALPHA = 0\nSPIN_DELTA = 80\nSPIN_ANGLE = 45\nSPIN_ANGLE_VEL = 1\n{MOMENTUM}SPIN_STOP\n"
 """The example of annex F5.4."""
 
-Read = Callable[[str], ApmContents]
+Read = Callable[[str | bytes], ApmContents]
 
 
 @pytest.fixture
-def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
+def read(write: Write) -> Read:
     """``read(text)``: the contents of a message."""
-    monkeypatch.chdir(tmp_path)
-
-    def read(text: str | bytes) -> ApmContents:
-        Path("a.apm").write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_apm("a.apm")
-
-    return read
+    return lambda text: read_apm(str(write(text, "a.apm")))
 
 
 def without(*blocks: str) -> str:

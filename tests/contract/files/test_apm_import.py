@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import messages
-from support.contract import CASES, check_faults, known
+from support.contract import CASES, Write, check_faults, known
 from support.golden import check_text
 from support.places import case as earlier
 
@@ -32,23 +32,18 @@ PLANNED_ALIKE = 1e-6
 """Relative difference of two schedules that were trimmed from states that differ in the last digit."""
 
 Taken = tuple[ApmContents, str, Spacecraft, Schedule]
+Take = Callable[[str | Plan], Taken]
 
 
 @pytest.fixture
-def take(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str | Plan], Taken]:
+def take(write: Write) -> Take:
     """``take(message)``, or that of a plan: what is read, the file it becomes, its spacecraft and schedule."""
-    monkeypatch.chdir(tmp_path)
 
     def take(message: str | Plan) -> Taken:
-        text = message if isinstance(message, str) else export_text(message, "apm")
-        Path("a.apm").write_text(text, encoding="utf-8")
-        contents = read_apm("a.apm")
+        contents = read_apm(str(write(message if isinstance(message, str) else export_text(message, "apm"), "a.apm")))
         return contents, *imported(contents, "a.apm")
 
     return take
-
-
-Take = Callable[[str | Plan], Taken]
 
 
 @CASES

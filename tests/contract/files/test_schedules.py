@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.builders import Outcome
-from support.contract import check_faults, faults, known
+from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 from support.process import Run
 from support.spinners import FILE
@@ -30,7 +30,7 @@ from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.remarks import infeasibility
 from nutdamp.schedule import Pulse, Schedule, overlapping
 from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Limits, Spacecraft, Steerable
+from nutdamp.spacecraft import Limits, Steerable
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -42,15 +42,9 @@ Read = Callable[..., tuple[Schedule, list[str]]]
 
 
 @pytest.fixture
-def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
+def read(write: Write) -> Read:
     """``read(text, body)``: a file of that text."""
-    monkeypatch.chdir(tmp_path)
-
-    def read(text: str, body: Spacecraft = EXAMPLE) -> tuple[Schedule, list[str]]:
-        Path("s.csv").write_text(text, newline="")
-        return read_pulses(Path("s.csv"), body)
-
-    return read
+    return lambda text, body=EXAMPLE: read_pulses(write(text, "s.csv"), body)
 
 
 @pytest.fixture
@@ -203,15 +197,9 @@ ReadBlocks = Callable[..., tuple[tuple[Block, ...], list[str]]]
 
 
 @pytest.fixture
-def blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ReadBlocks:
+def blocks(write: Write) -> ReadBlocks:
     """``blocks(text, body)``: a file of that text."""
-    monkeypatch.chdir(tmp_path)
-
-    def blocks(text: str, body: Spacecraft = CRAFT) -> tuple[tuple[Block, ...], list[str]]:
-        Path("blocks.csv").write_text(text)
-        return read_blocks(Path("blocks.csv"), body)
-
-    return blocks
+    return lambda text, body=CRAFT: read_blocks(write(text, "blocks.csv"), body)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

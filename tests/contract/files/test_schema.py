@@ -16,8 +16,14 @@ from nutdamp.files.yaml_tree import read_tree
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
-EVERYTHING: dict[str, Any] = read_tree(
-    """\
+
+
+def plain(text: str) -> Any:
+    """What a text of YAML says."""
+    return read_tree(text, "f.yaml")[0].plain()
+
+
+EVERYTHING = plain("""\
 name: Sat
 mass: 250 kg
 inertia: {A: 120 kg m², C: 80}
@@ -49,9 +55,7 @@ dispersions:
   timing_offset: {bias: -2 ms}
   attitude: {normal: 0.2 deg}
 limits: {horizon: 2 min, earliest: 5, gap: 0.5, tick: 1 ms, max_pulses: 8, blackout: [[10, 20]]}
-""",
-    "everything",
-)[0].plain()
+""")
 
 
 def changed(path: str, value: object) -> dict[str, Any]:
@@ -83,71 +87,62 @@ def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
     assert json.loads(json.dumps(SCHEMA)) == SCHEMA
 
 
-SLIPS: dict[str, list[Any]] = {
-    "mas": ["250 kg"],
-    "limits.horizn": [5],
-    "thrusters.0.forse": [5],
-    "name": [None, "", 5],
-    "inertia": [None],
-    "omega0": [None, [1, 2]],
-    "state": [{"spin": 3, "nutation": 0}],
-    "inertia.C": [None],
-    "inertia.tensor": [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
-    "inertia.A": [0, "120 kg"],
-    "mass": [True, "250"],
-    "omega0.2": ["20 Hz"],
-    "attitude.frame": ["ICRF"],
-    "attitude.epoch": ["2026-03-01"],
-    "attitude.quaternion": [["1", 0, 0, 0]],
-    "thrusters.0.torque": [[8, 0, 0]],
-    "thrusters.0.force": [None],
-    "thrusters.0.lever_arm": [1],
-    "channels": [{}],
-    "channels.both": [[]],
-    "disturbances.0.torque": [None, "20 mN m", [1, 2]],
-    "disturbances.0.kind": ["Constant", "rotating"],
-    "disturbances.0.nme": ["leak"],
-    "disturbances.1.rate": [None, "-3 rad"],
-    "disturbances.1.fixed_in": ["inertial"],
-    "disturbances.1.kind": ["constant"],
-    "disturbances.1.torque": [1],
-    "disturbances.2.fixed_in": ["body"],
-    "disturbances.2.kind": ["axial"],
-    "disturbances.3.kind": [None],
-    "disturbances.3.torque": ["1 N"],
-    "disturbances.3.rate": [3],
-    "dissipation": [600, {}],
-    "dissipation.time_constant": [0, "600 N"],
-    "requirement.nutation": [2.0],
-    "requirement.probability": [1],
-    "limits.max_pulses": [0, 1.5],
-    "limits.blackout": [[10, 20]],
-    "dispersions.A": ["2 %", {}, {"normal": "2 mm"}, {"sigma": "2 %"}, {"normal": -1}],
-    "dispersions.A.bias": ["1 %"],
-    "dispersions.omega0": [[{"normal": 1}, {"normal": 1}]],
-    "dispersions.thrust.a": [0.3],
-    "dispersions.position": [{}],
-    "dispersions.timing": [{"normal": "5 %"}],
-    "dispersions.tming": [{"normal": "5 ms"}],
-}
-SPELLINGS: dict[str, list[Any]] = {
-    "thrusters.0.position": [["30 cm", "0.001 km", "5mm"]],
-    "thrusters.0.min_on_time": ["0.02 sec"],
-    "limits.horizon": ["2 hours"],
-    "omega0.2": ["30 RPM"],
-    "omega0.1": ["2 degrees/sec", "2°/s"],
-    "requirement.nutation": ["0.5°", "0.5 degrees"],
-    "dispersions": [{"omega0": {"normal": 0.1}, "thrust": {"normal": "3 %"}, "A": {"bias": -1}}],
-    "dispersions.timing": [{"normal": "0.1 sec"}],
-}
+SLIPS = """
+mas: [250 kg]
+limits.horizn: [5]
+thrusters.0: [{name: a, position: [0, 0, 0.8], direction: [1, 0, 0]}, {name: a, torque: [8, 0, 0], force: 10}]
+thrusters.0.forse: [5]
+thrusters.0.torque: [[8, 0, 0]]
+thrusters.0.lever_arm: [1]
+name: [null, "", 5]
+inertia: [null, {A: 120}, {A: 0, C: 80}, {A: 120 kg, C: 80}, {A: 1, C: 1, tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]
+mass: [true, "250"]
+omega0: [null, [1, 2], [1, 2, 20 Hz]]
+state: [{spin: 3, nutation: 0}]
+attitude.frame: [ICRF]
+attitude.epoch: ["2026-03-01"]
+attitude.quaternion: [["1", 0, 0, 0]]
+channels: [{}, {both: []}]
+disturbances.0.torque: [null, 20 mN m, [1, 2]]
+disturbances.0.kind: [Constant, rotating]
+disturbances.0.nme: [leak]
+disturbances.1.rate: [null, -3 rad]
+disturbances.1.fixed_in: [inertial]
+disturbances.1.kind: [constant]
+disturbances.1.torque: [1]
+disturbances.2.fixed_in: [body]
+disturbances.2.kind: [axial]
+disturbances.3.kind: [null]
+disturbances.3.torque: [1 N]
+disturbances.3.rate: [3]
+dissipation: [600, {}, {time_constant: 0}, {time_constant: 600 N}]
+requirement: [{nutation: 2.0}, {nutation: 0.1, probability: 1}]
+limits: [{max_pulses: 0}, {max_pulses: 1.5}, {blackout: [10, 20]}]
+dispersions.A: [2 %, {}, {normal: 2 mm}, {sigma: 2 %}, {normal: -1}, {normal: 2 %, bias: 1 %}]
+dispersions.omega0: [[{normal: 1}, {normal: 1}]]
+dispersions.thrust.a: [0.3]
+dispersions.position: [{}]
+dispersions.timing: [{normal: 5 %}]
+dispersions.tming: [{normal: 5 ms}]
+"""
+SPELLINGS = """
+thrusters.0.position: [[30 cm, 0.001 km, 5mm]]
+thrusters.0.min_on_time: [0.02 sec]
+limits.horizon: [2 hours]
+omega0.2: [30 RPM]
+omega0.1: [2 degrees/sec, 2°/s]
+requirement.nutation: [0.5°, 0.5 degrees]
+dispersions: [{omega0: {normal: 0.1}, thrust: {normal: 3 %}, A: {bias: -1}}]
+dispersions.timing: [{normal: 0.1 sec}]
+"""
 
 
 def test_what_validates_and_what_not() -> None:
-    VALIDATOR.validate(read_tree(example_text(), "example.yaml")[0].plain())
+    VALIDATOR.validate(plain(example_text()))
     VALIDATOR.validate(EVERYTHING)
     VALIDATOR.validate({"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}})
     for expected, table in ((True, SPELLINGS), (False, SLIPS)):
-        for path, values in table.items():
+        for path, values in plain(table).items():
             for value in values:
                 assert VALIDATOR.is_valid(changed(path, value)) == expected, (path, value)
 

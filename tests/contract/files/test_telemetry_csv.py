@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from support.contract import check_faults
+from support.contract import Write, check_faults
 from support.golden import check_text
 
 import nutdamp
@@ -23,16 +23,11 @@ Read = Callable[..., tuple[Record, list[str]]]
 
 
 @pytest.fixture
-def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
+def read(write: Write) -> Read:
     """``read(text, body, sun)``: a file of that text, and one of the times of Sun pulses."""
-    monkeypatch.chdir(tmp_path)
-
-    def read(text: str, body: nutdamp.Spacecraft = BODY, sun: str = "") -> tuple[Record, list[str]]:
-        Path("flight.csv").write_text(text, encoding="utf-8")
-        Path("sun.csv").write_text(sun, encoding="utf-8")
-        return read_telemetry(Path("flight.csv"), body, Path("sun.csv") if sun else None)
-
-    return read
+    return lambda text, body=BODY, sun="": read_telemetry(
+        write(text, "flight.csv"), body, write(sun, "sun.csv") if sun else None
+    )
 
 
 def test_signals_in_all_their_units(read: Read) -> None:

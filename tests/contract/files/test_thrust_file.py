@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.broken import BASE
-from support.contract import check_faults, faults, known
+from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 
 from nutdamp import planning
@@ -58,15 +58,10 @@ def with_table(table: str = TABLE) -> str:
 
 
 @pytest.fixture
-def read_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ReadRows:
+def read_rows(write: Write) -> ReadRows:
     """``read_rows(body, row, …)``: a schedule of rows of start, on-time and channel."""
-    monkeypatch.chdir(tmp_path)
-
-    def read_rows(body: Spacecraft, *rows: str) -> tuple[Schedule, list[str]]:
-        Path("rows.csv").write_text("\n".join(("start_s,on_time_s,channel", *rows)), encoding="utf-8")
-        return read_pulses(Path("rows.csv"), body)
-
-    return read_rows
+    top = "start_s,on_time_s,channel"
+    return lambda body, *rows: read_pulses(write("\n".join((top, *rows)), "rows.csv"), body)
 
 
 def test_valves_impulse_bits_cold_nozzles_and_tanks_are_read() -> None:
