@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import messages, reference
 from support.cases import deep
@@ -117,3 +118,26 @@ def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
     moved = motions(body, plan.pulses, times.tolist(), start)
     pushes = np.array([motion.rotation @ known(pulse.force) for motion in moved])
     return np.asarray(simpson(pushes, x=times, axis=0) / known(body.mass))
+
+
+@st.composite
+def slips(draw: st.DrawFn, text: str) -> list[str]:
+    """The lines of ``text`` after some slips of hand: dropped, doubled, swapped, cut, with something put in."""
+    lines = text.splitlines(keepends=True)
+    for _ in range(draw(st.integers(1, 4))):
+        if not lines:
+            break
+        index, other = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        place = draw(st.integers(0, len(lines[index])))
+        match draw(st.sampled_from(["drop", "double", "swap", "cut", "insert"])):
+            case "drop":
+                del lines[index]
+            case "double":
+                lines.insert(index, lines[other])
+            case "swap":
+                lines[index], lines[other] = lines[other], lines[index]
+            case "cut":
+                lines[index] = lines[index][:place] + draw(st.text(max_size=3))
+            case "insert":
+                lines[index] = lines[index][:place] + draw(st.text(max_size=3)) + lines[index][place:]
+    return lines

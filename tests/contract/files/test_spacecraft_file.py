@@ -357,7 +357,7 @@ def test_they_name_their_sources() -> None:
         assert any("assumed" in line.lower() for line in comment)
 
 
-@spread("path", FILES, quick=4, deep=len(FILES), ids=lambda path: str(path.stem))
+@spread("path", FILES, quick=1, deep=len(FILES), ids=lambda path: str(path.stem))
 def test_it_is_planned(path: Path) -> None:
     spacecraft = load_spacecraft(path)
     compared = compare(spacecraft, CLASSIC)

@@ -131,7 +131,7 @@ def test_faults_have_their_place() -> None:
         "an impulse bit without thrust": ("", "0], lever_arm: 0.8, isp: 220", f"0], {TABLE}"),
         "no thrusters": ("", BODY[BODY.index("thrusters") :], VALVE + COLD),
     }
-    check_faults("files.thrust-others", lambda edit: read(edit[0], body=BODY.replace(*edit[1:], 1)), others)
+    check_faults("files.thrust-others", lambda edit: read(edit[0], body=BODY.replace(edit[1], edit[2], 1)), others)
 
 
 def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
