@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -232,63 +233,40 @@ def dispersed(dispersions: str, actuators: str = ACTUATORS) -> Spacecraft:
     return read_spacecraft(f"{BASE}{actuators}dispersions: {dispersions}\n", "f.yaml")
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("{}", Dispersions()),
-        *(
-            (
-                f"{{A: {{{kind}: 2 %}}, C: {{{kind}: 0.5 kg m^2}}, timing: {{{kind}: 5 ms}}}}",
-                Dispersions(Tolerance(kind, 0.02, relative=True), Tolerance(kind, 0.5), timing=Tolerance(kind, 0.005)),
-            )
-            for kind in ("normal", "uniform", "triangular", "bias")
-        ),
-        (
-            "{timing_offset: {bias: -2 ms}, attitude: {normal: 0}}",
-            Dispersions(timing_offset=Tolerance("bias", -0.002), attitude=Tolerance("normal", 0.0)),
-        ),
-        ("{omega0: {normal: 0.1 rad/s}}", Dispersions(omega0=(Tolerance("normal", 0.1),) * 3)),
-        (
-            "{omega0: [{normal: 180 deg/s}, {bias: -0.01}, {uniform: 1 %}]}",
-            Dispersions(
-                omega0=(
-                    Tolerance("normal", math.pi),
-                    Tolerance("bias", -0.01),
-                    Tolerance("uniform", 0.01, relative=True),
-                )
-            ),
-        ),
-        ("{thrust: {normal: 3 %}}", Dispersions(thrust=dict.fromkeys(NAMES, THREE_PERCENT))),
-        ("{thrust: {T2: {normal: 3 %}}}", Dispersions(thrust={"T2": THREE_PERCENT})),
-        # A thrust becomes a fraction: 10 N; 8 N m on 0.8 m; 20 N m on 2 m.
-        (
-            "{thrust: {T1: {normal: 0.3 N}, T2: {normal: 0.3 N}, steerable: {normal: 300 mN}}}",
-            Dispersions(thrust=dict.fromkeys(("T1", "T2", "steerable"), THREE_PERCENT)),
-        ),
-        ("{thrust_per_pulse: {normal: 3 %}}", Dispersions(thrust_per_pulse=THREE_PERCENT)),
-        ("{thrust_per_pulse: {normal: 0.03}}", Dispersions(thrust_per_pulse=THREE_PERCENT)),
-        (
-            "{thrust_direction: {normal: 0.5 rad}}",
-            Dispersions(thrust_direction=dict.fromkeys(NAMES, Tolerance("normal", 0.5))),
-        ),
-        ("{position: {normal: 5 mm}}", Dispersions(position=dict.fromkeys(NAMES, Tolerance("normal", 0.005)))),
-        ("{position: {T1: {normal: 5 mm}}}", Dispersions(position={"T1": Tolerance("normal", 0.005)})),
-    ],
+RATES = (Tolerance("normal", math.pi), Tolerance("bias", -0.01), Tolerance("uniform", 0.01, relative=True))
+DISPERSED: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("{}", {}),
+    ("{timing_offset: {bias: -2 ms}}", {"timing_offset": Tolerance("bias", -0.002)}),
+    ("{attitude: {normal: 0}}", {"attitude": Tolerance("normal", 0.0)}),
+    ("{omega0: {normal: 0.1 rad/s}}", {"omega0": (Tolerance("normal", 0.1),) * 3}),
+    ("{omega0: [{normal: 180 deg/s}, {bias: -0.01}, {uniform: 1 %}]}", {"omega0": RATES}),
+    ("{thrust: {normal: 3 %}}", {"thrust": dict.fromkeys(NAMES, THREE_PERCENT)}),
+    ("{thrust: {T2: {normal: 3 %}}}", {"thrust": {"T2": THREE_PERCENT}}),
+    # A thrust becomes a fraction: 10 N; 8 N m on 0.8 m; 20 N m on 2 m.
+    ("{thrust: {T1: {normal: 0.3 N}, T2: {normal: 300 mN}}}", {"thrust": dict.fromkeys(("T1", "T2"), THREE_PERCENT)}),
+    ("{thrust: {steerable: {normal: 0.3 N}}}", {"thrust": {"steerable": THREE_PERCENT}}),
+    ("{thrust_per_pulse: {normal: 3 %}}", {"thrust_per_pulse": THREE_PERCENT}),
+    ("{thrust_per_pulse: {normal: 0.03}}", {"thrust_per_pulse": THREE_PERCENT}),
+    ("{thrust_direction: {normal: 0.5 rad}}", {"thrust_direction": dict.fromkeys(NAMES, Tolerance("normal", 0.5))}),
+    ("{position: {normal: 5 mm}}", {"position": dict.fromkeys(NAMES, Tolerance("normal", 0.005))}),
+    ("{position: {T1: {normal: 5 mm}}}", {"position": {"T1": Tolerance("normal", 0.005)}}),
 )
-def test_what_is_read(text: str, expected: Dispersions) -> None:
-    assert dispersed(text).dispersions == expected
+OF_OTHERS = (
+    ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
+    ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
+    ("thrusters: [{name: normal, torque: [0, 8, 0]}]\n", "{thrust: {normal: {normal: 3 %}}}", "normal"),
+)
 
 
-@pytest.mark.parametrize(
-    ("actuators", "text", "name"),
-    [
-        ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
-        ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
-        ("thrusters: [{name: normal, torque: [0, 8, 0]}]\n", "{thrust: {normal: {normal: 3 %}}}", "normal"),
-    ],
-)
-def test_names_of_other_actuators(actuators: str, text: str, name: str) -> None:
-    assert dispersed(text, actuators).dispersions == Dispersions(thrust={name: THREE_PERCENT})
+def test_dispersions_are_read_in_si() -> None:
+    for text, fields in DISPERSED:
+        assert dispersed(text).dispersions == Dispersions(**fields), text
+    for kind in ("normal", "uniform", "triangular", "bias"):
+        text = f"{{A: {{{kind}: 2 %}}, C: {{{kind}: 0.5 kg m^2}}, timing: {{{kind}: 5 ms}}}}"
+        percent, value, time = Tolerance(kind, 0.02, relative=True), Tolerance(kind, 0.5), Tolerance(kind, 0.005)
+        assert dispersed(text).dispersions == Dispersions(A=percent, C=value, timing=time)
+    for actuators, text, name in OF_OTHERS:
+        assert dispersed(text, actuators).dispersions == Dispersions(thrust={name: THREE_PERCENT})
 
 
 def test_positions_are_in_principal_axes_as_forces_and_torques_are() -> None:
