@@ -282,15 +282,15 @@ def test_a_first_utc_that_is_none_or_another_is_a_fault_with_its_place(blocks: R
 
 
 def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, blocks: ReadBlocks) -> None:
-    blocks, _ = blocks(HEAD + "T1,1,1,0.1,40\n")
+    given, _ = blocks(HEAD + "T1,1,1,0.1,40\n")
     shaky = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, jitter: 5 ms}")
     flown = run("simulate", "-", *BLOCKS, "--json", "-", "--samples", "2", stdin=shaky)
     assert flown.returncode == 4  # it leaves more nutation than the requirement allows
     check_text("files.blocks-jitter", flown.stderr)
     starts = [pulse["start_s"] for pulse in json.loads(flown.stdout)["pulses"]]
-    again = fired(read_spacecraft(shaky, "f.yaml"), blocks, JITTER_SEED)
+    again = fired(read_spacecraft(shaky, "f.yaml"), given, JITTER_SEED)
     assert starts == [pulse.start for pulse in again.pulses]
-    still = [pulse.start for pulse in fired(CRAFT, blocks).pulses]
+    still = [pulse.start for pulse in fired(CRAFT, given).pulses]
     assert 0.003 < np.std(np.subtract(starts, still)) < 0.007
 
 

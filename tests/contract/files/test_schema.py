@@ -60,7 +60,7 @@ limits: {horizon: 2 min, earliest: 5, gap: 0.5, tick: 1 ms, max_pulses: 8, black
 
 def changed(path: str, value: object) -> dict[str, Any]:
     """`EVERYTHING` with one value changed, or left out where ``value`` is None."""
-    contents = copy.deepcopy(EVERYTHING)
+    contents: dict[str, Any] = copy.deepcopy(EVERYTHING)
     *parents, last = (int(step) if step.isdigit() else step for step in path.split("."))
     at: Any = contents
     for step in parents:

@@ -163,7 +163,8 @@ def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
     pulses = Schedule((channel_pulse(pair, 21.75, 43.5),))
     assert flight.flown(body, pulses).residual.nutation == pytest.approx(body.nutation, rel=1e-9)
     burn = run(Results(study_of(body, pulses), 500)).distribution("nutation")
-    assert known(burn).quantiles(np.array([0.95]))[0] > 1.2 * body.nutation
+    assert burn is not None
+    assert burn.quantiles(np.array([0.95]))[0] > 1.2 * body.nutation
     both = replace(body, channels=(*cross(8.0), pair), dispersions=None)
     assert pair.name not in {pulse.channel for plan in compare(both, CLASSIC) for pulse in plan.pulses}
 
