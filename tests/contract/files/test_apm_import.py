@@ -118,9 +118,12 @@ def test_overlapping_manoeuvres_keep_apart_and_stand_in_the_order_of_their_start
     assert [pulse.channel for pulse in schedule] == ["steerable", "MAN2", "steerable"]
     assert flight.flown(back, schedule).settled.spin == pytest.approx(math.pi)
     torque = np.array([1.0, 0.0, 0.0])
-    pulses = Schedule((Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.2 * torque, torque)))
+    pulses = Schedule(
+        (Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.4 * torque, 2 * torque))
+    )
     assert [pulse.channel for pulse in pulses] == ["short", "long"]
-    _, _, _, schedule = take(Plan(messages.spacecraft("prolate"), "by hand", pulses))
+    _, _, back, schedule = take(Plan(messages.spacecraft("prolate"), "by hand", pulses))
+    assert back.steerable is None  # of two torques there is none
     assert sorted(pulse.start for pulse in schedule) == pytest.approx([1.0, 1.4])
 
 
