@@ -1,0 +1,330 @@
+"""Schedules and command blocks that people wrote or edited: what is fired, and every fault with its place."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.builders import Outcome
+from support.contract import Write, check_faults, faults, known
+from support.golden import check_text
+from support.process import Run
+from support.spinners import FILE
+
+from nutdamp import flight, planning
+from nutdamp.cli.flown import JITTER_SEED
+from nutdamp.commands import Block
+from nutdamp.files import table
+from nutdamp.files.blocks_csv import HEADER, read_blocks
+from nutdamp.files.examples import example_text
+from nutdamp.files.pulses_csv import pulses_csv
+from nutdamp.files.schedule_file import read_pulses
+from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.remarks import infeasibility
+from nutdamp.schedule import Pulse, Schedule, overlapping
+from nutdamp.schemes.tools.sun_pulses import fired
+from nutdamp.spacecraft import Limits, Steerable
+
+pytestmark = pytest.mark.usefixtures("plans_shared")
+
+EXAMPLE = read_spacecraft(example_text(), "example.yaml")
+STEERED = replace(EXAMPLE, channels=(), steerable=Steerable(5.0, 220.0, 1.0))
+TOP = "start_s,on_time_s,channel"
+TORQUES, IMPULSES = "torque_1_Nm,torque_2_Nm,torque_3_Nm", "impulse_1_Nms,impulse_2_Nms,impulse_3_Nms"
+Read = Callable[..., tuple[Schedule, list[str]]]
+
+
+@pytest.fixture
+def read(write: Write) -> Read:
+    """``read(text, body)``: a file of that text."""
+    return lambda text, body=EXAMPLE: read_pulses(write(text, "s.csv"), body)
+
+
+@pytest.fixture
+def written() -> str:
+    """The four pulses of the example as `plan --csv` writes them."""
+    return pulses_csv(planning.plan(EXAMPLE, "four-pulse").flight)
+
+
+def edited(text: str, *numbers: int, **cells: str) -> str:
+    """With other cells in the rows of these numbers, from 1."""
+    rows = list(csv.DictReader(io.StringIO(text)))
+    for number in numbers:
+        rows[number - 1].update(cells)
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, rows[0].keys())
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: str) -> None:
+    """0.7 s instead of 0.564 s of pulse 4 leave 0.2477 deg, by the reference integrator too."""
+    made, longer = read(edited(written, 4, on_time_s="0.7"))
+    last = made.pulses[-1]
+    assert (last.on_time, last.channel) == (0.7, "-M2")
+    assert last.start == pytest.approx(4.884622381967264, abs=1e-15)
+    assert last.impulse.tolist() == pytest.approx([0.0, -5.6, 0.0])
+    assert last.propellant == pytest.approx(0.7 * 10.0 / (220.0 * 9.80665))
+    assert last.force is not None
+    left = flight.flown(EXAMPLE, made).residual
+    assert math.degrees(left.nutation) == pytest.approx(0.2477, abs=5e-5)
+    assert left.nutation == pytest.approx(Outcome(EXAMPLE, made).nutation, abs=1e-9)
+    # Each kind of column that contradicts is reported once: centre, impulse, propellant.
+    _, contradicting = read(edited(written, 1, 2, 3, torque_1_Nm="1", torque_2_Nm="x", propellant_kg=""))
+    _, unknown = read(f"{TOP},note,nutation_after_deg\n1,1,+M1,first,77\n")
+    check_text("files.schedule-ignored", "\n".join([*longer, *contradicting, *unknown]))
+
+
+def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(read: Read, written: str) -> None:
+    plan = planning.plan(EXAMPLE, "four-pulse")
+    whole, warnings = read(written)
+    assert flight.flown(EXAMPLE, whole).residual == plan.flown
+    assert whole.propellant == pytest.approx(plan.pulses.propellant, rel=1e-15)
+    rows = "".join(f"{pulse.start!r},{pulse.on_time!r},{pulse.channel}\n" for pulse in whole)
+    bare, more = read(f"{TOP}\n{rows}")
+    for one, other in zip(bare, whole, strict=True):
+        for name in ("t", "on_time", "channel", "propellant"):
+            assert getattr(one, name) == getattr(other, name)
+        assert np.array_equal(one.impulse, other.impulse)
+    centres = "".join(f"{pulse.t!r},{pulse.on_time!r},{pulse.channel}\n" for pulse in whole)
+    again, most = read(f"t_s,on_time_s,channel\n{centres}")
+    assert [pulse.t for pulse in again] == [pulse.t for pulse in whole]
+    assert [*warnings, *more, *most] == []
+    # Where a start is left blank the centre counts.
+    mixed, _ = read("start_s,t_s,on_time_s,channel\n,2,1,+M1\n4,,1,+M1\n")
+    assert [pulse.start for pulse in mixed] == [1.5, 4.0]
+
+
+def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Read) -> None:
+    made, warnings = read(f"{TOP},{TORQUES}\n1,0.5,steerable,3,4,0\n", STEERED)
+    assert warnings == []
+    assert made.pulses[0].impulse.tolist() == pytest.approx([1.5, 2.0, 0.0])
+    assert made.pulses[0].propellant == pytest.approx(2.5 / (220.0 * 9.80665))
+    made, unknown = read(f"{TOP},{IMPULSES}\n1,0.5,XX,1.5,2,0.25\n", STEERED)
+    assert known(made.pulses[0].torque).tolist() == pytest.approx([3.0, 4.0, 0.5])
+    assert made.propellant is None
+    # The torque rules over the impulse, and is flown where it is not the torquer's.
+    made, ruled = read(f"{TOP},{TORQUES},{IMPULSES}\n1,0.5,steerable,6,8,0,1.5,2,0\n", STEERED)
+    assert made.pulses[0].impulse.tolist() == pytest.approx([3.0, 4.0, 0.0])
+    made, ideal = read(f"{TOP},{IMPULSES}\n1,0,+M1,4,0,0\n")
+    assert made.pulses[0].torque is None
+    assert made.pulses[0].impulse.tolist() == [4.0, 0.0, 0.0]
+    check_text("files.schedule-steered", "\n".join([*unknown, *ruled, *ideal]))
+
+
+def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Path) -> None:
+    """Too short, too long, off the ticks: as given, and reported."""
+    (tmp_path / "s.csv").write_text(f"{TOP}\n1,0.001,+M1\n5.0123456,3,+M2\n")
+    flown = run("simulate", "--schedule", "s.csv", "--set", "limits.tick=10 ms", "--samples", "2", "--json", "-")
+    assert flown.returncode == 4, flown.stderr
+    pulses = json.loads(flown.stdout)["pulses"]
+    assert [pulse["on_time_s"] for pulse in pulses] == [0.001, 3.0]
+    assert [pulse["impulse_Nms"][:2] for pulse in pulses] == [[pytest.approx(0.008), 0], [0, pytest.approx(24.0)]]
+    check_text("files.schedule-limits", flown.stderr)
+
+
+FAULTY = (
+    f"{TOP}\n1,1,steerable\n3,1,XX\n",
+    f"{TOP},{IMPULSES}\n1,0,+M1,,,\n",
+    f"{TOP}\n1,1,\x1b[31mred\n",
+    f"{TOP}\n1e15,0.3,+M1\n",  # shorter than the clock tells
+    f"{TOP}\n9,1e-14,+M1\n",
+    f"{TOP}\n1,0.5,+m1\n",
+    f"{TOP}\n1,0.5,engine\n",
+    f"{TOP}\n1,-1,+M1\n-2,0.5,+M1\n1e16,1,+M1\n",
+    "start_s,on_time,chanel\n",
+    "start,on_time_s,channel\n",
+)
+
+
+def test_faults_say_what_would_be_right(read: Read, monkeypatch: pytest.MonkeyPatch) -> None:
+    check_faults("files.schedule", read, FAULTY)
+    assert len(read(f"{TOP}\n1e15,2000,+M1\n9,1e-9,+M1\n")[0]) == 2
+    with Path("huge.csv").open("wb") as stream:
+        stream.truncate(table.MOST_BYTES + 1)
+    huge = faults(read_pulses, Path("huge.csv"), EXAMPLE)
+    monkeypatch.setattr(table, "MOST_ROWS", 3)
+    rows = "".join(f"{start},0.5,+M1\n" for start in range(4))
+    assert len(read(f"{TOP}\n{rows.partition('3,')[0]}")[0]) == 3
+    check_text("files.schedule-size", "\n".join([*huge, *faults(read, f"{TOP}\n{rows}")]))
+
+
+@pytest.mark.parametrize("start", [0.0, 1e6, 1e15 - 1e5])
+def test_pulses_of_one_channel_never_overlap(read: Read, start: float) -> None:
+    """Side by side is allowed at any time, a hundredth of the on-time too early at none."""
+    on_time = 4096.0 if start else 0.5
+    text = f"{TOP}\n{{!r}},{on_time!r},+M1\n{start!r},{on_time!r},+M1\n{start!r},{on_time!r},-M1\n"
+    assert len(read(text.format(start + on_time))[0]) == 3
+    assert [fault.partition(":1: ")[::2] for fault in faults(read, text.format(start + on_time * 0.99))] == [
+        ("2", "start_s: its channel is still firing the pulse of line 3")
+    ]
+
+
+def test_an_overlap_behind_a_shorter_pulse_is_seen() -> None:
+    """The long pulse still fires when the third begins, whatever came in between."""
+    times = {"a": (0.0, 10.0), "b": (1.0, 1.0), "c": (5.0, 1.0)}
+    pulses = [(name, Pulse(start + 0.5 * on, on, "T", np.zeros(3))) for name, (start, on) in times.items()]
+    assert overlapping(pulses) == [("b", "a"), ("c", "a")]
+
+
+@pytest.mark.parametrize("late", [1e14, 1e15 - 1000.0])
+def test_schemes_plan_no_pulse_that_the_clock_cannot_tell(late: float) -> None:
+    """It was planned, left nutation, and the on-times were said to be why."""
+    body = replace(EXAMPLE, limits=Limits(horizon=late + 1000.0, earliest=late))
+    plans = [planning.plan(body, scheme) for scheme in ("one-pulse", "two-pulse", "four-pulse")]
+    assert not any(plan.feasible for plan in plans)
+    (reason,) = {(infeasibility(plan) or "").rpartition(") ")[2] for plan in plans}  # which pulse hangs on rounding
+    check_text(f"files.schedule-late-{late:.0e}", reason)
+
+
+# --- command blocks --------------------------------------------------------------------------------------------------
+
+CRAFT = read_spacecraft(FILE, "f.yaml")
+WIDTHS = FILE.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: [500 ms, 100 ms, 300 ms]")
+HEAD = "channel,first_sun_pulse,delay_s,width_s,count\n"
+COUNTS = "channel,first_sun_pulse,delay_counts,width_counts,count\n"
+GOAL = ("--target", "10deg,89deg")
+BLOCKS = ("--blocks", "blocks.csv")
+ReadBlocks = Callable[..., tuple[tuple[Block, ...], list[str]]]
+
+
+@pytest.fixture
+def blocks(write: Write) -> ReadBlocks:
+    """``blocks(text, body)``: a file of that text."""
+    return lambda text, body=CRAFT: read_blocks(write(text, "blocks.csv"), body)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(path.read_text())))
+
+
+def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
+    """The screen has what an operator compares before and after."""
+    text = FILE + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
+    planned = run("plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, "--csv", "pulses.csv", stdin=text)
+    assert planned.returncode == 0, planned.stderr
+    (row,) = rows_of(tmp_path / "blocks.csv")
+    assert tuple(row) == HEADER
+    assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
+    assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
+    assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))
+    pulses = rows_of(tmp_path / "pulses.csv")
+    assert row["first_utc"] == pulses[0]["utc"]
+    assert len(pulses) == int(row["count"])
+    flown = run("simulate", "-", *GOAL, *BLOCKS, "--samples", "2", stdin=text)
+    assert flown.returncode == 0, flown.stderr
+    assert flown.stderr == ""
+    blocks = flown.stdout[flown.stdout.index("Command blocks") :].split("\npulse ")[0].strip()
+    assert blocks.partition("\n\n")[0] in planned.stdout
+    check_text("files.blocks-screen", blocks)
+
+
+def test_an_edited_block_is_fired(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "blocks.csv").write_text(HEAD + "T1,3,1.001,0.1,4\nT1,20,1.5,0.1,40\n")
+    flown = run("simulate", "-", *BLOCKS, "--samples", "2", stdin=FILE)
+    assert flown.returncode == 4
+    lines = flown.stdout.splitlines()
+    assert sum(line.split()[:1] in (["1"], ["4"], ["44"]) for line in lines) >= 3
+    cut = next(line for line in lines if "of 44 pulses" in line)
+    check_text("files.blocks-edited", f"{flown.stderr}{cut}")
+
+
+def test_counts_alone_are_read_where_the_spacecraft_file_has_the_steps(blocks: ReadBlocks) -> None:
+    """Of a list of widths they count the entries, the shortest first."""
+    (block,), warned = blocks(COUNTS + "T1,3,500,12,4\n")
+    assert [block.delay, block.width] == pytest.approx([1.0, 0.12], rel=1e-12)
+    assert warned == []
+    listed = read_spacecraft(WIDTHS, "f.yaml")
+    (block,), _ = blocks(COUNTS + "T1,1,500,2,4\n", listed)
+    assert (block.delay, block.width) == (1.0, 0.3)
+    check_faults("files.blocks-widths", lambda text: blocks(text, listed), [COUNTS + "T1,1,500,4,4\n"])
+    bare = read_spacecraft("\n".join(row for row in FILE.splitlines() if not row.startswith("commands")), "f.yaml")
+    check_faults("files.blocks-no-commands", lambda text: blocks(text, bare), [COUNTS + "T1,1,500,2,4\n"])
+
+
+def test_widths_of_a_list_are_written_by_their_number(run: Run, tmp_path: Path) -> None:
+    assert run("plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, stdin=WIDTHS).returncode in (0, 4)
+    rows = rows_of(tmp_path / "blocks.csv")
+    assert rows
+    assert {(row["width_s"], row["width_counts"]) for row in rows} <= {("0.1", "1"), ("0.3", "2"), ("0.5", "3")}
+
+
+FAULTY_BLOCKS = (
+    HEAD + "T2,1,1,0.1,4\nT1,0,-1,0,1.5\nT1,4,1,0.1,10\nT1,8,1,0.1,2\nT1,30,x,0.1,1\n",
+    HEAD + "T1,1,1,0.1,3000\nT1,3001,1,0.1,3000\n",
+    HEAD + "T1,1,1,0.1,100000\n",
+    COUNTS + "T1,3,-4,0,4\nT1,9,2.5,3,4\n",
+    "channel,delay\nT1,1\n",
+)
+
+
+def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(blocks: ReadBlocks) -> None:
+    check_faults("files.blocks", blocks, FAULTY_BLOCKS)
+    assert [block.count for block in blocks(HEAD + "T1,1,1,0.1,5000\n")[0]] == [5000]
+    every = HEAD.replace("\n", ",every\n")
+    check_text("files.blocks-warned", "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]))
+
+
+def test_a_first_utc_that_is_none_or_another_is_a_fault_with_its_place(blocks: ReadBlocks) -> None:
+    text = HEAD.strip() + ",first_utc\nT1,3,1.0,0.1,4,"
+    begins = CRAFT.utc(fired(CRAFT, blocks(f"{text}\n")[0]).pulses[0].loaded[0])
+    assert blocks(f"{text}{begins}\n")[1] == []
+    wrong = [fault for utc in ("yesterday", "1998-01-07T13:00:00Z") for fault in faults(blocks, f"{text}{utc}\n")]
+    check_text("files.blocks-first-utc", "\n".join(wrong).replace(str(begins), "UTC"))
+
+
+def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, blocks: ReadBlocks) -> None:
+    given, _ = blocks(HEAD + "T1,1,1,0.1,40\n")
+    shaky = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, jitter: 5 ms}")
+    flown = run("simulate", "-", *BLOCKS, "--json", "-", "--samples", "2", stdin=shaky)
+    assert flown.returncode == 4  # it leaves more nutation than the requirement allows
+    check_text("files.blocks-jitter", flown.stderr)
+    starts = [pulse["start_s"] for pulse in json.loads(flown.stdout)["pulses"]]
+    again = fired(read_spacecraft(shaky, "f.yaml"), given, JITTER_SEED)
+    assert starts == [pulse.start for pulse in again.pulses]
+    still = [pulse.start for pulse in fired(CRAFT, given).pulses]
+    assert 0.003 < np.std(np.subtract(starts, still)) < 0.007
+
+
+def test_where_no_blocks_can_be_written_or_fired(run: Run, tmp_path: Path) -> None:
+    refused = [run("plan", "-", *GOAL, "--scheme", "rhumb-line", *BLOCKS, stdin=FILE)]
+    assert not (tmp_path / "blocks.csv").exists()
+    (tmp_path / "blocks.csv").write_text(HEAD + "+M1,1,0.1,0.1,4\n")
+    refused += [run("simulate", *BLOCKS), run("simulate", *BLOCKS, "--scheme", "none")]
+    # Sun along the axis, delay longer than a spin, no width, rising pressure, min > max of a cone.
+    bad = FILE.replace("sun: epoch", "sun: [0 deg, 90 deg]").replace("delay_max: 4.9 s", "delay_max: 6 s")
+    bad = bad.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: []")
+    bad += "keep: [{name: Moon, direction: [10 deg, 5 deg], min: 20 deg, max: 4 deg}]\n"
+    bad += "tank: {propellant: 30 kg, pressure: 8 bar, final_pressure: 22 bar}\n"
+    blind = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, elevation: 60 deg, half_width: 20 deg}")
+    refused += [run("plan", "-", stdin=bad), run("check", "-", stdin=blind)]
+    assert [screen.returncode for screen in refused] == [2, 3, 2, 2, 2]
+    check_text("files.blocks-refused", "\n".join(screen.stderr.rpartition("\n\n")[2] for screen in refused))
+
+
+@pytest.mark.deep
+def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
+    """The same cases as of the plan from which the file was written: each from its own Sun pulses."""
+    text = FILE + "dispersions: {thrust: {normal: 3 %}, A: {normal: 1 %}}\n"
+    scheme = ("--scheme", "command-block")
+    assert run("plan", "-", *GOAL, *scheme, *BLOCKS, stdin=text).returncode in (0, 4)
+    flown = []
+    for source in (BLOCKS, scheme):
+        screen = run("disperse", "-", *GOAL, *source, "--samples", "100", "--json", "-", stdin=text)
+        assert screen.returncode in (0, 4), screen.stderr
+        flown.append(json.loads(screen.stdout))
+    assert flown[0]["requirement"] == flown[1]["requirement"]
+    for name, percentiles in flown[0]["percentiles"].items():
+        assert percentiles == pytest.approx(flown[1]["percentiles"][name], rel=1e-9, abs=1e-9)
+    verified = run("verify", "-", *GOAL, *BLOCKS, stdin=text)
+    assert verified.returncode == 0, verified.stderr
+    assert "blocks.csv" in verified.stdout
+    assert run("verify", "-", *GOAL, *BLOCKS, "--schedule", "blocks.csv", stdin=text).returncode == 2

@@ -1,0 +1,143 @@
+"""What tests of files share: plans that are exported, their motion, and the faults of what must be refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+from scipy.integrate import simpson
+from support import messages, reference
+from support.cases import deep
+from support.golden import check_text
+
+from nutdamp import planning
+from nutdamp.errors import FaultyFile, printable
+from nutdamp.files.settings import parse_setting
+from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
+from nutdamp.planning import Plan
+from nutdamp.schedule import Pulse, Schedule
+from nutdamp.spacecraft import Spacecraft, Vector
+
+QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
+CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
+"""Names of the plans of `support.messages`."""
+
+T = TypeVar("T")
+Write = Callable[..., Path]
+
+
+def known(value: T | None) -> T:
+    """The value, which must be there."""
+    assert value is not None
+    return value
+
+
+def faults(read: Callable[..., object], *given: Any) -> list[str]:
+    """All that is wrong with what ``read(*given)`` must refuse, each as ``LINE:COLUMN: KEY: problem``."""
+    try:
+        read(*given)
+    except FaultyFile as wrong:
+        return [f"{fault.line}:{fault.column}: {fault.where}: {fault.problem}" for fault in wrong.faults]
+    pytest.fail(f"taken without a fault: {given}")
+
+
+def check_faults(key: str, read: Callable[[Any], object], inputs: Iterable[Any] | Mapping[str, Any]) -> None:
+    """Fails where ``read`` takes one of the inputs, or finds other faults in it than the text kept as ``key`` says.
+
+    The text has each input, or its name where they have some, and below it the faults.
+    """
+    named = inputs.items() if isinstance(inputs, Mapping) else [(given, given) for given in inputs]
+    lines = []
+    for name, given in named:
+        shown = name if isinstance(name, str) else " -> ".join(map(str, name))
+        lines += [printable(shown.strip().replace("\n", " | ")), *(f"    {fault}" for fault in faults(read, given))]
+    check_text(key, "\n".join(lines))
+
+
+ORBIT = "orbit={position: [7000 km, -12 km, 3.5 km], velocity: [0.1 km/s, 7400, 120 m/s], center: earth}"
+PUSHED = ("ace", "communications-spinner", "couples-minisat")
+"""Files whose thrusters push the body too."""
+
+VALVED = """
+name: Valved
+object_id: 2026-031A
+mass: 250 kg
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 5 deg}
+attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+orbit: {position: [7000 km, -12 km, 3.5 km], velocity: [0.1 km/s, 7400, 120 m/s], center: earth}
+thrusters:
+  - {name: T1, position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N, isp: 220 s}
+  - {name: T2, position: [0, -0.5, 0.8], direction: [-1, 0, 0], force: 10 N, isp: 220 s}
+"""
+
+
+@cache
+def pushing(name: str, *, orbit: bool = True) -> Plan:
+    """A plan whose pulses change the velocity."""
+    body = load_spacecraft(messages.CONFIGS / f"{name}.yaml", [parse_setting(ORBIT)] if orbit else [])
+    plan = planning.plan(body, "four-pulse")
+    assert plan.feasible
+    return plan
+
+
+@cache
+def valved() -> Plan:
+    """A plan whose pulses are fired through valves."""
+    text = VALVED + "valve: {open_delay: 15 ms, close_delay: 8 ms}\n"
+    return planning.plan(read_spacecraft(text, "f.yaml"), "four-pulse")
+
+
+def motions(body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation: Vector) -> list[reference.Motion]:
+    """The motion at ``times`` s by the reference integrator, from ``rotation`` on."""
+    motion = reference.Motion(body.omega0, rotation)
+    at = {0.0: motion}
+    edges = sorted({0.0, max(times), *(edge for pulse in pulses for edge in (pulse.start, pulse.end))})
+    for begin, end in pairwise(edges):
+        middle = 0.5 * (begin + end)
+        torques = [pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start < middle < pulse.end]
+        ends = sorted({end, *(time for time in times if begin < time < end)})
+        torque = np.sum([np.zeros(3), *torques], axis=0)
+        moved = reference.coast(body.inertia.moments, motion, torque, np.array(ends) - begin)
+        at.update(zip(ends, moved, strict=True))
+        motion = moved[-1]
+    return [at[time] for time in times]
+
+
+def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
+    """∫ R F dt / m of one pulse, m/s, by Simpson on attitudes of the reference integrator."""
+    body = plan.spacecraft
+    start = messages.columns(body, body.initial.quaternion) @ body.inertia.axes
+    times = np.linspace(pulse.start, pulse.end, 33)
+    moved = motions(body, plan.pulses, times.tolist(), start)
+    pushes = np.array([motion.rotation @ known(pulse.force) for motion in moved])
+    return np.asarray(simpson(pushes, x=times, axis=0) / known(body.mass))
+
+
+@st.composite
+def slips(draw: st.DrawFn, text: str) -> list[str]:
+    """The lines of ``text`` after some slips of hand: dropped, doubled, swapped, cut, with something put in."""
+    lines = text.splitlines(keepends=True)
+    for _ in range(draw(st.integers(1, 4))):
+        if not lines:
+            break
+        index, other = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        place = draw(st.integers(0, len(lines[index])))
+        match draw(st.sampled_from(["drop", "double", "swap", "cut", "insert"])):
+            case "drop":
+                del lines[index]
+            case "double":
+                lines.insert(index, lines[other])
+            case "swap":
+                lines[index], lines[other] = lines[other], lines[index]
+            case "cut":
+                lines[index] = lines[index][:place] + draw(st.text(max_size=3))
+            case "insert":
+                lines[index] = lines[index][:place] + draw(st.text(max_size=3)) + lines[index][place:]
+    return lines
