@@ -6,7 +6,7 @@ It gives data; `nutdamp.presentation.verdicts` has the words.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
@@ -53,10 +53,34 @@ class Standing(Enum):
     """Does not meet the requirement; without one: does not damp."""
 
 
+@dataclass(frozen=True, slots=True)
+class Share:
+    """The share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
+
+    ``probability``: the share that must.
+    """
+
+    low: float
+    high: float
+    probability: float
+
+    @property
+    def exact(self) -> float | None:
+        """The share; None where not all cases have flown."""
+        return self.low if self.low == self.high else None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether as many comply as must; None where the cases flown do not decide it."""
+        return True if self.low >= self.probability else False if self.high < self.probability else None
+
+
 class Ground(Enum):
     """What decided among the plans of one standing."""
 
     ONLY = "only"
+    CASES = "cases"
+    """Most cases comply, where too few do with each plan."""
     LEFT = "left"
     NEAREST = "nearest"
     COST = "cost"
@@ -81,7 +105,7 @@ class Gain(Enum):
     """It can be sent as command blocks, where the recommended one is fired pulse by pulse."""
 
 
-class Judged(Protocol):
+class Judged(Hashable, Protocol):
     """A plan with what the rule goes by."""
 
     @property
@@ -134,22 +158,28 @@ class Recommendation(Generic[Plan]):
     alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
 
 
-def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
+def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation[Plan]:
     """The plan to fly.
 
     Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
     is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
-    reach as much differ in whether the spin axis keeps its cones, those that do count alone.
+    reach as much differ in whether the spin axis keeps its cones, those that do count alone. With ``shares`` a plan
+    meets the requirement in enough dispersed cases or not at all; where none does, it is that with which most comply.
     """
     feasible = [one for one in plans if one.flown is not None]
     if not feasible:
         return Recommendation()
-    standing = next(one for one in Standing if any(plan.standing is one for plan in feasible))
-    those = [one for one in feasible if one.standing is standing]
+    reached = {one: one.standing if not shares or shares[one].met else Standing.MISSES for one in feasible}
+    standing = next(one for one in Standing if one in reached.values())
+    those = [one for one in feasible if reached[one] is standing]
     those = [one for one in those if one.kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
         return Recommendation(best, standing, ground, len(those), by_propellant(those), _alternatives(best, those))
+    most = max(shares[one].low for one in those) if shares else 0.0
+    if shares and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
+        best, _ = cheapest([one for one in those if shares[one].low >= most])
+        return Recommendation(best, standing, Ground.CASES, len(those), by_propellant(those))
     best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 

@@ -148,6 +148,8 @@ def _bounds(plan: Plan) -> Iterator[str]:
     if bounds.rigorous is not None and bounds.rigorous > 0.0:
         least = f"{down(scale * bounds.rigorous):.4g} {unit}"
         parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
+    if bounds.keeping is not None:
+        parts.append(f"keeping H would take {scale * bounds.keeping:.4g} {unit} by small angles")
     if len(parts) > 1:
         yield "; ".join(parts)
 

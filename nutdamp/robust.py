@@ -18,7 +18,7 @@ import numpy as np
 
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
-from nutdamp.decision import Cases, Decision, cases_of
+from nutdamp.decision import Decision
 from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.study import Results, run, threads_here
@@ -27,7 +27,7 @@ from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
-from nutdamp.screening import AS_GOOD, Candidate, entered, equal_from, fly_all
+from nutdamp.screening import AS_GOOD, Candidate, Cases, cases_of, entered, equal_from, fly_all
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.tightening import Tightening, tightening
 
@@ -67,7 +67,7 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobustComparison:
-    """Candidates from the best down; ``usual`` is what `recommendation.recommend` takes, ``chosen`` the robust plan.
+    """Candidates from the best down; ``usual`` is what the comparison recommends, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``tightening``: with which tolerances
@@ -109,28 +109,20 @@ class RobustComparison:
 
     @property
     def decision(self) -> Decision | None:
-        """The decision on the robust plan; the shares are those of the plans compared, not of their variants."""
-        if self.chosen is None:
-            return None
-        flown = {_kind(one.plan): one.met for one in self.candidates}
-        shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
-        known = {scheme: share for scheme, share in shares.items() if share is not None}
-        fresh = self.fresh if self.lucky else None
-        return Decision(self.chosen.plan, self.chosen.cases if fresh is None else fresh.cases, known)
+        """The decision on the robust plan, by the cases that `nutdamp.dispersion` draws for any schedule."""
+        return None if self.chosen is None else Decision(self.chosen.plan, self.chosen.cases)
 
     @property
     def lucky(self) -> bool:
-        """Whether enough cases comply, but too few of those by which the plan was not chosen: then they decide."""
+        """Whether enough cases comply, but too few of those by which the plan was not chosen."""
         if self.fresh is None or self.chosen is None:
             return False
         return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
 
     @property
     def met(self) -> float | None:
-        """The share of cases that comply with the robust plan, by the cases that decide."""
-        if self.chosen is None:
-            return None
-        return self.fresh.met if self.fresh is not None and self.lucky else self.chosen.met
+        """The share of cases that comply with the robust plan."""
+        return None if self.chosen is None else self.chosen.met
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
@@ -227,7 +219,7 @@ def ranked(
 ) -> RobustComparison:
     """The comparison of candidates that have flown, and which of them to take.
 
-    That is the cheapest of the equals; of those that cost the same the plan that is recommended for nominal values.
+    That is the cheapest of the equals; of those that cost the same the plan that the comparison recommends.
     With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
