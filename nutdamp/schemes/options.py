@@ -65,7 +65,7 @@ class SchemeOptions:
             if not kind.takes(value):
                 raise SenselessOption(field.name, shown(value), f"expected {kind.expected}")
 
-    def settled(self, *, keeps_axis: bool) -> Self:
+    def settled(self, *, keeps_axis: bool) -> Self:  # noqa: ARG002 - what some schemes go by
         """The same with what the spacecraft decides: ``keeps_axis``, whether something is asked of where H ends."""
         return self
 
