@@ -14,10 +14,13 @@ from typing import Generic, Protocol, TypeVar
 from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 from nutdamp.flight import Residual
 from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft import Spacecraft, Vector
 
 SAME_ANGLE = 1e-9
 """rad by which shifts of H may differ and be equal: the rounding of a flight."""
+
+SAME_SPEED = 1e-5
+"""m/s by which ΔV may differ and be equal."""
 
 STEADIER_SHIFT = 0.2
 """Share of the recommended plan's shift of H below which another plan keeps H so much better..."""
@@ -85,9 +88,10 @@ class Ground(Enum):
     NEAREST = "nearest"
     COST = "cost"
     NOMINAL = "nominal"
+    PULSES = "pulses"
+    DELTA_V = "delta-v"
     SHIFT = "shift"
     END = "end"
-    SHIFT_END = "shift, then end"
 
 
 class Gain(Enum):
@@ -131,6 +135,11 @@ class Judged(Hashable, Protocol):
     @property
     def kept(self) -> bool | None:
         """Whether the spin axis keeps its cones; None where there are none."""
+        ...
+
+    @property
+    def delta_v(self) -> Vector | None:
+        """Velocity change, (3,) m/s; None where it is not known."""
         ...
 
     @property
@@ -187,8 +196,8 @@ def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None)
 def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Ground]:
     """The plan of least propellant (impulse where one is not known), and what decided.
 
-    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with less shift of H
-    (distance from the target axis), then the earlier end.
+    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with fewer pulses, less
+    ΔV, less shift of H (distance from the target axis), the earlier end; the first of these that leaves one decides.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
@@ -199,10 +208,19 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
         return equal[0], Ground.COST
     if usual is not None and any(one is usual for one in equal):
         return usual, Ground.NOMINAL
-    least = min(map(_off, equal))
-    still = [one for one in equal if _off(one) <= least + SAME_ANGLE]
-    ground = Ground.SHIFT if len(still) == 1 else Ground.END if len(still) == len(equal) else Ground.SHIFT_END
-    return min(still, key=lambda one: one.pulses.end), ground
+    for ground, measure, same in (
+        (Ground.PULSES, lambda one: float(len(one.pulses)), 0.0),
+        (Ground.DELTA_V, _speed, SAME_SPEED),
+        (Ground.SHIFT, _off, SAME_ANGLE),
+    ):
+        values = [measure(one) for one in equal]
+        if any(value is None for value in values):
+            continue
+        least = min(values) + same
+        equal = [one for one, value in zip(equal, values, strict=True) if value <= least]
+        if len(equal) == 1:
+            return equal[0], ground
+    return min(equal, key=lambda one: one.pulses.end), Ground.END
 
 
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
@@ -257,6 +275,11 @@ def by_propellant(plans: Sequence[Plan]) -> bool:
 def _cost(plan: Judged, known: bool) -> float:
     """Propellant in kg where it is ``known`` for all plans compared, else impulse in N m s."""
     return plan.pulses.cost_in("kg" if known else "N m s")
+
+
+def _speed(plan: Judged) -> float | None:
+    """|ΔV| in m/s; None where it is not known."""
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
 
 
 def _off(plan: Judged) -> float:

@@ -159,7 +159,10 @@ def _remainder(plan: Plan) -> Iterator[str]:
     left = plan.flight.residual.nutation
     if left < TELLING or plan.options.uncorrected:
         return
-    yield f"{_degrees(left)} of nutation remain: {obstacle(plan)}"
+    why = obstacle(plan)
+    if plan.spacecraft.goal.spin is not None and plan.meets_requirement:
+        why = "the requirement allows it, where the spin is to change"
+    yield f"{_degrees(left)} of nutation remain: {why}"
 
 
 def obstacle(plan: Plan) -> str:

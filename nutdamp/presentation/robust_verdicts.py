@@ -36,9 +36,10 @@ def robust_reason(found: RobustComparison) -> str:
     then = {
         Ground.COST: f"least {cost}",
         Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended without --robust",
+        Ground.PULSES: f"least {cost} within 0.1 %, and fewest pulses",
+        Ground.DELTA_V: f"least {cost} within 0.1 %, and least ΔV",
         Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
-        Ground.SHIFT_END: f"least {cost} within 0.1 %, least shift of H, and first to end of these",
     }
     return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
 

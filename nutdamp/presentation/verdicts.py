@@ -75,9 +75,10 @@ def reason(compared: Comparison) -> str:
         among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
         least, equal = f"least {cost} {among}", "; of those that cost as much within 0.1 %"
         then = {
+            Ground.PULSES: f"{equal}, fewest pulses",
+            Ground.DELTA_V: f"{equal}, least ΔV",
             Ground.SHIFT: f"{equal}, least shift of H",
             Ground.END: f"{equal}, it ends first",
-            Ground.SHIFT_END: f"{equal} and shift H least, it ends first",
         }
         return f"{least}{then.get(found.ground or Ground.COST, '')}"
     meeting = found.standing is Standing.MEETS
@@ -93,9 +94,10 @@ def reason(compared: Comparison) -> str:
     least_cost = f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}"
     then = {
         Ground.COST: least_cost,
+        Ground.PULSES: f"{least_cost}, then fewest pulses",
+        Ground.DELTA_V: f"{least_cost}, then least ΔV",
         Ground.SHIFT: f"{least_cost}, then least shift of H",
         Ground.END: f"{least_cost}, then it ends first",
-        Ground.SHIFT_END: f"{least_cost}, then least shift of H, then it ends first",
     }
     return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
 

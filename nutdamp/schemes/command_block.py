@@ -65,7 +65,11 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
-    channels = [one for one in at_hand(spacecraft, usable(spacecraft)) if commandable_widths(commands, one).size]
+    spun = spacecraft.goal.spin is not None
+    if spun and spacecraft.goal.axis is not None:
+        raise Infeasible("sets the spin or turns H, not both; optimal does")
+    able = at_hand(spacecraft, usable(spacecraft, axial=spun))
+    channels = [one for one in able if commandable_widths(commands, one).size]
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = Search(spacecraft, channels, commands)

@@ -100,7 +100,8 @@ class BlockSearch:
 
     def _lowered(self, bound: compliance.Bound) -> compliance.Bound:
         """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
-        if bound.part is not Part.NUTATION or self.body.goal.axis is not None:
+        goal = self.body.goal
+        if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
             return bound
         return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
@@ -220,11 +221,15 @@ class BlockSearch:
     def _short_by(self, state: State, channel: Channel, every: int) -> Array:
         """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
 
-        With a target the length of the rhumb line: a block that is longer or shorter than the way ends no nearer than
-        a third of the difference. Without one the nutation, which they can lower by the sum of their kicks at most.
+        Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
+        shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
+        the sum of their kicks at most.
         """
         widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
         bounds = {bound.part: bound.most for bound in self.bounds}
+        if self.body.goal.spin is not None:
+            gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
+            return np.asarray(np.abs(self.body.goal.spin - self.body.spin - gained) / bounds[Part.SPIN])
         if self.body.goal.axis is None:
             trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
             kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
