@@ -18,6 +18,7 @@ import numpy as np
 
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
+from nutdamp.compliance import SAME_COST
 from nutdamp.decision import Decision
 from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
@@ -30,6 +31,7 @@ from nutdamp.schemes import Options
 from nutdamp.screening import AS_GOOD, Candidate, Cases, cases_of, entered, equal_from, fly_all
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.tightening import Tightening, tightening
+from nutdamp.trimming import trimmed
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
@@ -175,7 +177,32 @@ def compare(
     always = [one for one in candidates if one is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
     ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if ranks.chosen is None else _checked(ranks, candidates)
+    return ranks if ranks.chosen is None else _trimmed(_checked(ranks, candidates))
+
+
+def _trimmed(ranks: RobustComparison) -> RobustComparison:
+    """The comparison with the on-times of the robust plan as short as the share required allows, in new cases too."""
+    chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
+    if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
+        return ranks
+    flown: dict[Plan, Candidate] = {}
+
+    def complies(plan: Plan) -> bool:
+        with suppress(Infeasible):
+            one = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
+            if one.share is not None and one.share.met is not False:
+                fly_all([one], samples, required, [one])
+                flown[plan] = one
+                fresh = _fresh(one, samples) if (one.met or 0.0) >= required else None
+                return fresh is not None and fresh.met >= required
+        return False
+
+    best = trimmed(chosen.plan, complies)
+    if best is chosen.plan or best.pulses.cost > chosen.plan.pulses.cost * (1.0 - SAME_COST):
+        return ranks
+    made = flown[best]
+    candidates = (made, *ranks.candidates)
+    return replace(ranks, chosen=made, candidates=candidates, ground=Ground.COST, fresh=_fresh(made, samples))
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:

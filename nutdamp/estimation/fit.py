@@ -207,7 +207,7 @@ def _expect_alive(model: Model) -> None:
 
 
 def _run(model: Model, index: int) -> tuple[float, float, int, int]:
-    """First and last time (s) and number of the most samples of a signal in a row that are alike; its distinct values."""
+    """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
     rows = np.flatnonzero(model.signal == index)
     values, times = model.measured[rows], model.times[rows]
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
