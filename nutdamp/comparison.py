@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-from nutdamp import schemes, views, work
+from nutdamp import compliance, schemes, views, work
 from nutdamp.errors import NutdampError
 from nutdamp.planning import Plan, plan, reaches_spin
-from nutdamp.recommendation import Recommendation, Standing, recommend
+from nutdamp.recommendation import Recommendation, Share, Standing, recommend
 from nutdamp.spacecraft import Spacecraft
+
+if TYPE_CHECKING:  # few spacecraft have dispersions
+    from nutdamp.dispersion.study import Results
+    from nutdamp.screening import Candidate, Cases
 
 BUG = "internal error, please report"
 """Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
@@ -20,11 +25,16 @@ BUG = "internal error, please report"
 class Comparison(views.Data, views.Tabled):
     """Several plans for one spacecraft, and which of them is recommended on what ground.
 
-    ``comparison["two-pulse"]`` is one of them, iterating gives all.
+    ``comparison["two-pulse"]`` is one of them, iterating gives all. ``flown``: the feasible ones in dispersed cases;
+    None where these were not to be flown. ``named``: their schemes were; ``timed``: pulses may be timed one by one
+    though the spacecraft takes commands.
     """
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
+    flown: Mapping[Plan, Candidate] | None = field(default=None, repr=False)
+    named: bool = False
+    timed: bool = False
 
     def __len__(self) -> int:
         return len(self.plans)
@@ -51,7 +61,49 @@ class Comparison(views.Data, views.Tabled):
     @cached_property
     def recommendation(self) -> Recommendation[Plan]:
         """Which plan to fly, and what decided."""
-        return recommend(self.plans)
+        return recommend(self.eligible, self.shares)
+
+    @property
+    def eligible(self) -> tuple[Plan, ...]:
+        """The plans that may be recommended: of a spacecraft that takes commands those that can be commanded.
+
+        Others too, where they may be ``timed``, or were ``named`` and none of these can be commanded.
+        """
+        feasible = tuple(one for one in self.plans if one.feasible)
+        if self.timed:
+            return feasible
+        commanded = tuple(one for one in feasible if one.commandable)
+        return feasible if self.named and not commanded else commanded
+
+    @property
+    def needless(self) -> bool:
+        """Whether no pulse has to be fired: the recommended plan has none, or those named are not needed."""
+        chosen = self.recommended
+        return compliance.unaided(self.spacecraft) and (self.named or chosen is None or not len(chosen.pulses))
+
+    @cached_property
+    def shares(self) -> Mapping[Plan, Share]:
+        """The share of dispersed cases that comply with each feasible plan; nothing where they do not decide."""
+        if self.flown is None:
+            return {}
+        from nutdamp.screening import shares_of
+
+        return shares_of([one for one in self.plans if one.feasible], self.flown)
+
+    def cases(self, plan: Plan) -> Cases | None:
+        """How a plan fares in dispersed cases; None where they were not flown."""
+        candidate = None if self.flown is None else self.flown.get(plan)
+        return None if candidate is None else candidate.cases
+
+    def results(self, plan: Plan) -> Results | None:
+        """All its dispersed cases; None where they have not flown."""
+        candidate = None if self.flown is None else self.flown.get(plan)
+        return None if candidate is None or not candidate.cases.decided else candidate.results
+
+    def meets(self, plan: Plan) -> bool | None:
+        """Whether a plan meets the requirement, in enough dispersed cases too where they decide."""
+        met = plan.meets_requirement
+        return bool(self.shares[plan].met) if met and plan in self.shares else met
 
     @property
     def recommended(self) -> Plan | None:
@@ -90,25 +142,53 @@ class Comparison(views.Data, views.Tabled):
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     """The schemes to compare where none is named: the classic ones and optimal, with a target those that can point.
 
-    Those that can set the spin are among them where it has to change.
+    Those that can set the spin are among them where it has to change, and `none` where no pulse may be needed.
     """
     names = schemes.COMPARED if spacecraft.goal.axis is None else schemes.POINTING
+    if compliance.unaided(spacecraft):
+        names = ("none", *names)
     if spacecraft.commands is not None:  # before those that may take all the work
         slow = [name for name in names if schemes.SCHEMES[name].slow]
         names = (*(name for name in names if name not in slow), *schemes.COMMANDED, *slow)
     return names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
 
 
-def compare(spacecraft: Spacecraft, names: Sequence[str], options: schemes.Choice = None) -> Comparison:
-    """Plan the schemes named and recommend one; one that has a bug does not take the others down.
+def compare(
+    spacecraft: Spacecraft,
+    names: Sequence[str] = (),
+    options: schemes.Choice = None,
+    *,
+    samples: int | None = None,
+    timed: bool = False,
+) -> Comparison:
+    """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
 
-    Raises NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
+    With dispersions each plan flies ``samples`` cases (default `dispersion.SAMPLES`, 0: none), as many of them as it
+    takes to know whether enough comply; where nothing is required, and no number is given, none. ``timed``: pulses may
+    be timed one by one though the file has commands. Raises NutdampError, such as BadRequest, and KeyError for a name
+    not in `schemes.NAMES`.
     """
     unknown = set(names) - set(schemes.NAMES)
     if unknown:
         raise KeyError(*sorted(unknown))
     with work.budget("the comparison", work.COMMAND):
-        return Comparison(spacecraft, tuple(attempt(spacecraft, name, options) for name in names))
+        plans = tuple(attempt(spacecraft, name, options) for name in names or usual(spacecraft))
+    counts = samples is not None or compliance.judged(spacecraft)
+    if spacecraft.dispersions is None or samples == 0 or not counts:
+        return Comparison(spacecraft, plans, named=bool(names), timed=timed)
+    nominal = Comparison(spacecraft, plans, named=bool(names), timed=timed)
+    return replace(nominal, flown=_dispersed(nominal, samples))
+
+
+def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, Candidate]:
+    """The feasible plans in dispersed cases."""
+    from nutdamp.dispersion import SAMPLES
+    from nutdamp.screening import fly_compared
+
+    feasible = [one for one in compared.plans if one.feasible]
+    with work.budget("the dispersed cases", work.CASES):
+        count = SAMPLES if samples is None else samples
+        return fly_compared(feasible, count, lambda shares: recommend(compared.eligible, shares).plan)
 
 
 def attempt(spacecraft: Spacecraft, scheme: str, options: schemes.Choice) -> Plan:

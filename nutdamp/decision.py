@@ -5,54 +5,20 @@ Data, no sentences: `nutdamp.presentation.decisions` has the words, which every 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from nutdamp import aspect, compliance
 from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
-from nutdamp.compliance import Bound, Held, Part
+from nutdamp.compliance import Bound, Held
 from nutdamp.flight import Final, Flight
 from nutdamp.outcome import left_by
 from nutdamp.planning import Plan
 
 if TYPE_CHECKING:  # few decisions rest on dispersed cases
-    from nutdamp.dispersion.study import Results
-
-
-@dataclass(frozen=True, slots=True)
-class Cases:
-    """How one schedule fares in ``samples`` dispersed cases of ``seed``.
-
-    ``complying``: the share that keeps every part of the requirement, None where nothing is required;
-    ``probability``: the share that must. ``levels``: what that share of the cases does not exceed, rad, by part; the
-    spin error has none.
-    """
-
-    samples: int
-    seed: int
-    complying: float | None
-    probability: float
-    levels: Mapping[Part, float]
-
-    @property
-    def met(self) -> bool | None:
-        """Whether as many cases comply as must; None where nothing is required."""
-        return None if self.complying is None else self.complying >= self.probability
-
-
-def cases_of(results: Results) -> Cases:
-    """What a study says of its schedule."""
-    probability, levels = results.probability, {}
-    for part in (Part.NUTATION, compliance.aim(results.study.model.spacecraft)):
-        distribution = results.distribution(part.value)
-        assert distribution is not None
-        levels[part] = float(distribution.quantiles(np.array([probability]))[0])
-    return Cases(results.done, results.study.seed, results.met_fraction, probability, levels)
+    from nutdamp.screening import Cases
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +44,14 @@ class Line:
 class Decision:
     """The plan to decide on, the parts of its requirement, and how it fares in dispersed ``cases``, None if not flown.
 
-    ``shares``: of every scheme that was dispersed, by name, the share of cases that comply. ``seen``: the flight of the
-    plan through its real widths as it has come by a certain time, None for that to the end of the last pulse.
+    ``unknown``: cases were to decide, but they could not be flown, or not all of them within the budget of work.
+    ``seen``: the flight of the plan through its real widths as it has come by a certain time, None for that to the end
+    of the last pulse.
     """
 
     plan: Plan
     cases: Cases | None = None
-    shares: Mapping[str, float] = field(default_factory=dict)
+    unknown: bool = False
     seen: Flight | None = None
 
     @property
@@ -140,23 +107,14 @@ class Decision:
 
         It is not where the spin axis breaks a cone on the way.
         """
-        if self.strays:
+        if self.strays or (self.unknown and self.nominal):
             return False
         return self.nominal if not self.nominal or self.cases is None else self.cases.met
 
     @property
     def undispersed(self) -> bool:
         """Whether the file says how far its values may be off, and no such cases were flown."""
-        return self.cases is None and self.plan.spacecraft.dispersions is not None
-
-    @property
-    def better(self) -> tuple[tuple[str, float], ...]:
-        """Other schemes with which more cases comply, and the share, the most first."""
-        if self.cases is None or self.cases.complying is None:
-            return ()
-        own = self.cases.complying
-        found = [(name, share) for name, share in self.shares.items() if name != self.plan.scheme and share > own]
-        return tuple(sorted(found, key=lambda one: -one[1]))
+        return self.cases is None and not self.unknown and self.plan.spacecraft.dispersions is not None
 
     @property
     def final(self) -> Final:
@@ -164,10 +122,11 @@ class Decision:
         return self.flight.final
 
 
-def decide(compared: Comparison, cases: Mapping[str, Cases] | None = None) -> Decision | None:
-    """The decision on the recommended plan, with the ``cases`` flown by scheme; None where no scheme is feasible."""
-    plan, flown = compared.recommended, cases or {}
+def decide(compared: Comparison) -> Decision | None:
+    """The decision on the recommended plan, by its dispersed cases where they were flown; None where there is none."""
+    plan = compared.recommended
     if plan is None:
         return None
-    shares = {name: one.complying for name, one in flown.items() if one.complying is not None}
-    return Decision(plan, flown.get(plan.scheme), shares)
+    cases = compared.cases(plan)
+    undecided = plan in compared.shares and (cases is None or not cases.decided)
+    return Decision(plan, None if undecided else cases, undecided)

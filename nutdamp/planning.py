@@ -123,6 +123,11 @@ class Plan(views.Data, views.Tabled):
         return left_by(self.flight) if self.feasible else None
 
     @property
+    def commandable(self) -> bool:
+        """Whether the spacecraft can fire it: where it takes command blocks, only these, or nothing at all."""
+        return self.spacecraft.commands is None or bool(self.pulses.blocks) or not len(self.pulses)
+
+    @property
     def meets_requirement(self) -> bool | None:
         """Whether the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
@@ -235,7 +240,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
     forbidden = aspect.at_target(spacecraft) if scheme in schemes.PLANNED else None
     if forbidden is not None:
         return Plan(spacecraft, scheme, None, astray=forbidden)
-    chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
+    chosen = schemes.settled(schemes.SCHEMES[scheme], options, spacecraft)
     with work.budget(scheme, work.SCHEME) as spent:
         try:
             body = spacecraft if schemes.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
@@ -270,7 +275,7 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = 
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
-    chosen = schemes.options_of(schemes.SCHEMES[scheme], options)
+    chosen = schemes.settled(schemes.SCHEMES[scheme], options, spacecraft)
     try:
         made = schemes.alternatives(scheme, known(spacecraft, chosen), chosen)
         plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in made]

@@ -6,7 +6,7 @@ It gives data; `nutdamp.presentation.verdicts` has the words.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
@@ -14,10 +14,13 @@ from typing import Generic, Protocol, TypeVar
 from nutdamp.compliance import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 from nutdamp.flight import Residual
 from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft import Spacecraft, Vector
 
 SAME_ANGLE = 1e-9
 """rad by which shifts of H may differ and be equal: the rounding of a flight."""
+
+SAME_SPEED = 1e-5
+"""m/s by which ΔV may differ and be equal."""
 
 STEADIER_SHIFT = 0.2
 """Share of the recommended plan's shift of H below which another plan keeps H so much better..."""
@@ -53,17 +56,42 @@ class Standing(Enum):
     """Does not meet the requirement; without one: does not damp."""
 
 
+@dataclass(frozen=True, slots=True)
+class Share:
+    """The share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
+
+    ``probability``: the share that must.
+    """
+
+    low: float
+    high: float
+    probability: float
+
+    @property
+    def exact(self) -> float | None:
+        """The share; None where not all cases have flown."""
+        return self.low if self.low == self.high else None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether as many comply as must; None where the cases flown do not decide it."""
+        return True if self.low >= self.probability else False if self.high < self.probability else None
+
+
 class Ground(Enum):
     """What decided among the plans of one standing."""
 
     ONLY = "only"
+    CASES = "cases"
+    """Most cases comply, where too few do with each plan."""
     LEFT = "left"
     NEAREST = "nearest"
     COST = "cost"
     NOMINAL = "nominal"
+    PULSES = "pulses"
+    DELTA_V = "delta-v"
     SHIFT = "shift"
     END = "end"
-    SHIFT_END = "shift, then end"
 
 
 class Gain(Enum):
@@ -81,7 +109,7 @@ class Gain(Enum):
     """It can be sent as command blocks, where the recommended one is fired pulse by pulse."""
 
 
-class Judged(Protocol):
+class Judged(Hashable, Protocol):
     """A plan with what the rule goes by."""
 
     @property
@@ -110,6 +138,11 @@ class Judged(Protocol):
         ...
 
     @property
+    def delta_v(self) -> Vector | None:
+        """Velocity change, (3,) m/s; None where it is not known."""
+        ...
+
+    @property
     def severity(self) -> float:
         """See `nutdamp.compliance.severity`."""
         ...
@@ -134,22 +167,28 @@ class Recommendation(Generic[Plan]):
     alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
 
 
-def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
+def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation[Plan]:
     """The plan to fly.
 
     Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
     is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
-    reach as much differ in whether the spin axis keeps its cones, those that do count alone.
+    reach as much differ in whether the spin axis keeps its cones, those that do count alone. With ``shares`` a plan
+    meets the requirement in enough dispersed cases or not at all; where none does, it is that with which most comply.
     """
     feasible = [one for one in plans if one.flown is not None]
     if not feasible:
         return Recommendation()
-    standing = next(one for one in Standing if any(plan.standing is one for plan in feasible))
-    those = [one for one in feasible if one.standing is standing]
+    reached = {one: one.standing if not shares or shares[one].met else Standing.MISSES for one in feasible}
+    standing = next(one for one in Standing if one in reached.values())
+    those = [one for one in feasible if reached[one] is standing]
     those = [one for one in those if one.kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
         return Recommendation(best, standing, ground, len(those), by_propellant(those), _alternatives(best, those))
+    most = max(shares[one].low for one in those) if shares else 0.0
+    if shares and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
+        best, _ = cheapest([one for one in those if shares[one].low >= most])
+        return Recommendation(best, standing, Ground.CASES, len(those), by_propellant(those))
     best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
@@ -157,8 +196,8 @@ def recommend(plans: Sequence[Plan]) -> Recommendation[Plan]:
 def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Ground]:
     """The plan of least propellant (impulse where one is not known), and what decided.
 
-    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with less shift of H
-    (distance from the target axis), then the earlier end.
+    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with fewer pulses, less
+    ΔV, less shift of H (distance from the target axis), the earlier end; the first of these that leaves one decides.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
@@ -169,10 +208,19 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
         return equal[0], Ground.COST
     if usual is not None and any(one is usual for one in equal):
         return usual, Ground.NOMINAL
-    least = min(map(_off, equal))
-    still = [one for one in equal if _off(one) <= least + SAME_ANGLE]
-    ground = Ground.SHIFT if len(still) == 1 else Ground.END if len(still) == len(equal) else Ground.SHIFT_END
-    return min(still, key=lambda one: one.pulses.end), ground
+    for ground, measure, same in (
+        (Ground.PULSES, lambda one: float(len(one.pulses)), 0.0),
+        (Ground.DELTA_V, _speed, SAME_SPEED),
+        (Ground.SHIFT, _off, SAME_ANGLE),
+    ):
+        values = [measure(one) for one in equal]
+        if any(value is None for value in values):
+            continue
+        least = min(values) + same
+        equal = [one for one, value in zip(equal, values, strict=True) if value <= least]
+        if len(equal) == 1:
+            return equal[0], ground
+    return min(equal, key=lambda one: one.pulses.end), Ground.END
 
 
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
@@ -227,6 +275,11 @@ def by_propellant(plans: Sequence[Plan]) -> bool:
 def _cost(plan: Judged, known: bool) -> float:
     """Propellant in kg where it is ``known`` for all plans compared, else impulse in N m s."""
     return plan.pulses.cost_in("kg" if known else "N m s")
+
+
+def _speed(plan: Judged) -> float | None:
+    """|ΔV| in m/s; None where it is not known."""
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
 
 
 def _off(plan: Judged) -> float:

@@ -148,6 +148,8 @@ def _bounds(plan: Plan) -> Iterator[str]:
     if bounds.rigorous is not None and bounds.rigorous > 0.0:
         least = f"{down(scale * bounds.rigorous):.4g} {unit}"
         parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
+    if bounds.keeping is not None:
+        parts.append(f"keeping H would take {scale * bounds.keeping:.4g} {unit} by small angles")
     if len(parts) > 1:
         yield "; ".join(parts)
 
@@ -157,7 +159,10 @@ def _remainder(plan: Plan) -> Iterator[str]:
     left = plan.flight.residual.nutation
     if left < TELLING or plan.options.uncorrected:
         return
-    yield f"{_degrees(left)} of nutation remain: {obstacle(plan)}"
+    why = obstacle(plan)
+    if plan.spacecraft.goal.spin is not None and plan.meets_requirement:
+        why = "the requirement allows it, where the spin is to change"
+    yield f"{_degrees(left)} of nutation remain: {why}"
 
 
 def obstacle(plan: Plan) -> str:

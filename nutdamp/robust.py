@@ -18,7 +18,8 @@ import numpy as np
 
 from nutdamp import planning, surest
 from nutdamp.comparison import Comparison, attempt
-from nutdamp.decision import Cases, Decision, cases_of
+from nutdamp.compliance import SAME_COST
+from nutdamp.decision import Decision
 from nutdamp.demands import required_share
 from nutdamp.dispersion import SAMPLES, SEED, study_of
 from nutdamp.dispersion.study import Results, run, threads_here
@@ -27,9 +28,10 @@ from nutdamp.limits import keeps_limits
 from nutdamp.planning import Plan
 from nutdamp.recommendation import Ground, by_propellant, cheapest
 from nutdamp.schemes import Options
-from nutdamp.screening import AS_GOOD, Candidate, entered, equal_from, fly_all
+from nutdamp.screening import AS_GOOD, Candidate, Cases, cases_of, entered, equal_from, fly_all
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.tightening import Tightening, tightening
+from nutdamp.trimming import trimmed
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
@@ -67,7 +69,7 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobustComparison:
-    """Candidates from the best down; ``usual`` is what `recommendation.recommend` takes, ``chosen`` the robust plan.
+    """Candidates from the best down; ``usual`` is what the comparison recommends, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``tightening``: with which tolerances
@@ -109,28 +111,20 @@ class RobustComparison:
 
     @property
     def decision(self) -> Decision | None:
-        """The decision on the robust plan; the shares are those of the plans compared, not of their variants."""
-        if self.chosen is None:
-            return None
-        flown = {_kind(one.plan): one.met for one in self.candidates}
-        shares = {plan.scheme: flown.get(_kind(plan)) for plan in self.comparison.plans if plan.feasible}
-        known = {scheme: share for scheme, share in shares.items() if share is not None}
-        fresh = self.fresh if self.lucky else None
-        return Decision(self.chosen.plan, self.chosen.cases if fresh is None else fresh.cases, known)
+        """The decision on the robust plan, by the cases that `nutdamp.dispersion` draws for any schedule."""
+        return None if self.chosen is None else Decision(self.chosen.plan, self.chosen.cases)
 
     @property
     def lucky(self) -> bool:
-        """Whether enough cases comply, but too few of those by which the plan was not chosen: then they decide."""
+        """Whether enough cases comply, but too few of those by which the plan was not chosen."""
         if self.fresh is None or self.chosen is None:
             return False
         return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
 
     @property
     def met(self) -> float | None:
-        """The share of cases that comply with the robust plan, by the cases that decide."""
-        if self.chosen is None:
-            return None
-        return self.fresh.met if self.fresh is not None and self.lucky else self.chosen.met
+        """The share of cases that comply with the robust plan."""
+        return None if self.chosen is None else self.chosen.met
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
@@ -183,7 +177,32 @@ def compare(
     always = [one for one in candidates if one is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
     ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if ranks.chosen is None else _checked(ranks, candidates)
+    return ranks if ranks.chosen is None else _trimmed(_checked(ranks, candidates))
+
+
+def _trimmed(ranks: RobustComparison) -> RobustComparison:
+    """The comparison with the on-times of the robust plan as short as the share required allows, in new cases too."""
+    chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
+    if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
+        return ranks
+    flown: dict[Plan, Candidate] = {}
+
+    def complies(plan: Plan) -> bool:
+        with suppress(Infeasible):
+            one = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
+            if one.share is not None and one.share.met is not False:
+                fly_all([one], samples, required, [one])
+                flown[plan] = one
+                fresh = _fresh(one, samples) if (one.met or 0.0) >= required else None
+                return fresh is not None and fresh.met >= required
+        return False
+
+    best = trimmed(chosen.plan, complies)
+    if best is chosen.plan or best.pulses.cost > chosen.plan.pulses.cost * (1.0 - SAME_COST):
+        return ranks
+    made = flown[best]
+    candidates = (made, *ranks.candidates)
+    return replace(ranks, chosen=made, candidates=candidates, ground=Ground.COST, fresh=_fresh(made, samples))
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:
@@ -227,7 +246,7 @@ def ranked(
 ) -> RobustComparison:
     """The comparison of candidates that have flown, and which of them to take.
 
-    That is the cheapest of the equals; of those that cost the same the plan that is recommended for nominal values.
+    That is the cheapest of the equals; of those that cost the same the plan that the comparison recommends.
     With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)

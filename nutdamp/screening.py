@@ -8,19 +8,22 @@ could not be chosen even at the favourable end of its interval is flown no furth
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from nutdamp import compliance
+from nutdamp import compliance, work
 from nutdamp.compliance import SAME_COST, Part
-from nutdamp.decision import Cases, cases_of
+from nutdamp.demands import required_share
+from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.outputs import OUTPUTS
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.planning import Plan
+from nutdamp.recommendation import Share
 
 STAGES = (2_048, 8_192)
 """Cases after which it is looked whether a plan can still be chosen."""
@@ -28,8 +31,49 @@ STAGES = (2_048, 8_192)
 CERTAIN = 1.0 - 1e-6
 """Confidence of the intervals by which plans are left out."""
 
+CASE, FIRED = 2e-3, 2e-3
+"""Units of work of a case, and of each of its pulses."""
+
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cases:
+    """How one schedule fares in ``samples`` of the ``requested`` dispersed cases of ``seed``.
+
+    ``complying``: the share that keeps every part of the requirement, None where nothing is required;
+    ``probability``: the share that must. ``levels``: what that share of the cases does not exceed, rad, by part; the
+    spin error has none.
+    """
+
+    samples: int
+    requested: int
+    seed: int
+    complying: float | None
+    probability: float
+    levels: Mapping[Part, float]
+
+    @property
+    def decided(self) -> bool:
+        """Whether all cases have flown."""
+        return self.samples >= self.requested
+
+    @property
+    def met(self) -> bool | None:
+        """Whether as many cases comply as must; not where some have not flown, None where nothing is required."""
+        return None if self.complying is None else self.decided and self.complying >= self.probability
+
+
+def cases_of(results: Results, requested: int | None = None) -> Cases:
+    """What a study says of its schedule; ``requested``: cases to come in all, default those of the ``results``."""
+    probability, levels = results.probability, {}
+    for part in (Part.NUTATION, compliance.aim(results.study.model.spacecraft)):
+        distribution = results.distribution(part.value)
+        assert distribution is not None
+        levels[part] = float(distribution.quantiles(np.array([probability]))[0])
+    count = results.requested if requested is None else requested
+    return Cases(results.done, count, results.study.seed, results.met_fraction, probability, levels)
 
 
 def equal_from(share: float, samples: int) -> float:
@@ -68,6 +112,13 @@ class Candidate:
         return self.cases.complying
 
     @property
+    def share(self) -> Share | None:
+        """The share of all cases; None where nothing is required."""
+        if self.low is None or self.high is None:
+            return None
+        return Share(self.low, self.high, self.cases.probability)
+
+    @property
     def left(self) -> float:
         """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
         return float(compliance.missed(self.plan.spacecraft, self.nutation, self.off))
@@ -86,10 +137,76 @@ class Candidate:
 
 def entered(plan: Plan, variant: str, study: Study, samples: int) -> Candidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
-    results = run(Results(study, min(STAGES[0], samples)), threads=threads_here())
-    made = Candidate(plan, variant, cases_of(results), results)
+    results = _run(Results(study, min(STAGES[0], samples)))
+    made = Candidate(plan, variant, cases_of(results, samples), results)
     _bound(made, samples)
     return made
+
+
+def _run(results: Results) -> Results:
+    """`run`, counted as work."""
+    pulses, cases = len(results.study.model.schedule), results.requested - results.done
+    work.spend((CASE + FIRED * pulses) * cases)
+    return run(results, threads=threads_here())
+
+
+def fly_compared(
+    plans: Sequence[Plan],
+    samples: int,
+    choose: Callable[[Mapping[Plan, Share]], Plan | None],
+) -> dict[Plan, Candidate]:
+    """Fly so many of the ``samples`` cases with each plan that it is known whether enough comply.
+
+    All of them with the plan that `choose` takes by the shares. Plans with a case that cannot be flown are left out.
+    Ends where the budget of work does.
+    """
+    flown: dict[Plan, Candidate] = {}
+    for plan in plans:
+        if not work.exhausted():
+            with suppress(Infeasible):
+                flown[plan] = entered(plan, "", study_of(plan.spacecraft, plan.pulses), samples)
+    while not work.exhausted():
+        first = _undecided(plans, flown, samples, choose)
+        if first is None:
+            break
+        try:
+            _further(first, samples)
+        except Infeasible:
+            del flown[first.plan]
+    return flown
+
+
+def _undecided(
+    plans: Sequence[Plan],
+    flown: Mapping[Plan, Candidate],
+    samples: int,
+    choose: Callable[[Mapping[Plan, Share]], Plan | None],
+) -> Candidate | None:
+    """The next candidate to fly further; None where all is decided."""
+    shares = shares_of(plans, flown)
+    ahead = [one for one in flown.values() if one.cases.samples < samples]
+    for one in ahead:
+        if shares and shares[one.plan].met is None:
+            return one
+    chosen = choose(shares)
+    if chosen is None or chosen not in flown:
+        return None
+    if flown[chosen] in ahead:
+        return flown[chosen]
+    if not shares or shares[chosen].met:
+        return None
+    return next((one for one in ahead if shares[one.plan].high >= shares[chosen].low), None)
+
+
+def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, Candidate]) -> dict[Plan, Share]:
+    """The share of cases that comply with each plan, from none to all where they have not flown.
+
+    Nothing where nothing is required.
+    """
+    if not plans or not compliance.judged(plans[0].spacecraft):
+        return {}
+    unknown = Share(0.0, 1.0, required_share(plans[0].spacecraft.requirement))
+    return {one: (flown[one].share or unknown) if one in flown else unknown for one in plans}
 
 
 def _bound(one: Candidate, samples: int) -> None:
@@ -103,8 +220,8 @@ def _further(one: Candidate, samples: int) -> None:
     """Fly the cases of the next stage."""
     assert one.results is not None
     stage = next((count for count in STAGES if one.cases.samples < count < samples), samples)
-    one.results = run(one.results.extended(stage), threads=threads_here())
-    one.cases = cases_of(one.results)
+    one.results = _run(one.results.extended(stage))
+    one.cases = cases_of(one.results, samples)
     _bound(one, samples)
 
 

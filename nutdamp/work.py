@@ -18,6 +18,9 @@ SCHEME = 9_000.0
 COMMAND = 10_000.0
 """Units that the searches of one comparison may spend together."""
 
+CASES = 3_000.0
+"""Units that the dispersed cases of the plans of one comparison may take together."""
+
 FRONTS = 30_000.0
 """Units that the searches of all points of `trade` may spend together."""
 

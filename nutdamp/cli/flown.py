@@ -66,15 +66,17 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
     return decorate
 
 
-def compared_with(job: Job, names: Sequence[str], options: Options) -> Comparison:
+def compared_with(
+    job: Job, names: Sequence[str], options: Options, samples: int | None = None, *, timed: bool = False
+) -> Comparison:
     """The schemes named, else the usual ones, compared; which options none of them reads is said before."""
     from nutdamp.cli.progress import working
     from nutdamp.comparison import compare, usual
 
-    names = tuple(dict.fromkeys(names)) or usual(job.spacecraft)
-    expect_read(names, options, job.spacecraft, job.remark)
+    names = tuple(dict.fromkeys(names))
+    expect_read(names or usual(job.spacecraft), options, job.spacecraft, job.remark)
     with working("planning", quiet=job.quiet):
-        return compare(job.spacecraft, names, options)
+        return compare(job.spacecraft, names, options, samples=samples, timed=timed)
 
 
 def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:
@@ -130,7 +132,7 @@ def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
         job.remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
     job.warn(verdicts.warnings(compared, beside_verdict=judged))
     if plan is None:
-        raise Infeasible("no scheme is feasible; `nutdamp plan` says why")
+        raise Infeasible(f"{verdicts.reason(compared)}; `nutdamp plan` says more")
     return plan
 
 

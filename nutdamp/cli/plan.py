@@ -55,7 +55,9 @@ SCHEMES, PRIMER = "schemes", "primer"
 )
 @scheme_options
 @goal_options
-@click.option("--robust", is_flag=True, help="Recommend by how many dispersed cases comply.")
+@click.option("--robust", is_flag=True, help="Look for the cheapest plan with which enough dispersed cases comply.")
+@click.option("--nominal", is_flag=True, help="Judge nominal values alone: fly no dispersed cases.")
+@click.option("--timed", is_flag=True, help="Recommend pulses that no command block can fire, too.")
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
 @click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
@@ -69,6 +71,8 @@ def command(
     options: Options,
     aim: Aim,
     robust: bool,
+    nominal: bool,
+    timed: bool,
     csv: str | None,
     blocks: str | None,
     table: str | None,
@@ -87,6 +91,8 @@ def command(
     _expect_one_scheme(names, csv=csv, plot=one_plan)
     files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "certificate": certificate, "plot": plot}
     job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
+    if robust and nominal:
+        raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
     if robust:
         require_dispersions(job.spacecraft)
     if certificate is not None or curve is not None:
@@ -96,7 +102,7 @@ def command(
     from nutdamp.files.schemes_csv import schemes_csv
     from nutdamp.presentation import verdicts
 
-    compared = compared_with(job, names, options)
+    compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
     dispersed = _disperse(compared, options, quiet) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan

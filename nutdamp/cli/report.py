@@ -6,13 +6,13 @@ import math
 import shlex
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from nutdamp.cli.boundary import interruption, leave
+from nutdamp.cli.boundary import leave
 from nutdamp.cli.common import Input, quiet_option, require_dispersions, spacecraft_argument
-from nutdamp.cli.disperse import SAMPLES, fly
+from nutdamp.cli.disperse import SAMPLES
 from nutdamp.cli.failures import show_failures
 from nutdamp.cli.flown import compared_with
 from nutdamp.cli.job import begin, deliver
@@ -22,11 +22,6 @@ from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, goal_optio
 from nutdamp.cli.trade import trade_with
 from nutdamp.schemes import PLANNED, Options
 from nutdamp.schemes.options import LEAST
-
-if TYPE_CHECKING:
-    from nutdamp.comparison import Comparison
-    from nutdamp.dispersion.study import Results
-
 
 POINTS = 6
 """Horizons tried for each front where no number follows ``--trade``."""
@@ -85,8 +80,9 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--disperse",
     type=Count(),
     metavar="[N]",
-    help=f"Fly the schedules in N dispersed cases; {SAMPLES} where no number follows.",
+    help=f"Number of dispersed cases; {SAMPLES} where no number follows, and where something is required.",
 )
+@click.option("--nominal", is_flag=True, help="Judge nominal values alone: fly no dispersed cases.")
 @click.option(
     "--trade",
     type=click.IntRange(1, 1000),
@@ -102,6 +98,7 @@ def command(
     aim: Aim,
     output: str,
     disperse: int | None,
+    nominal: bool,
     trade: int | None,
     quiet: bool,
     **control: str | None,
@@ -126,43 +123,15 @@ def command(
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
     if disperse is not None:
         require_dispersions(job.spacecraft)
-    compared = compared_with(job, names, options)
-    dispersed: dict[str, Results] = {}
-    note = ""
-    if compared.recommended is not None and disperse is not None:
-        dispersed, note = _dispersed(compared, disperse, quiet=quiet)
+        if nominal:
+            raise click.UsageError("--disperse flies dispersed cases, which --nominal leaves out: name one of them")
+    compared = compared_with(job, names, options, 0 if nominal else disperse)
     fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
-        made = made_of(compared, repeat, dispersed, note, kept, fronts)
+        made = made_of(compared, repeat, kept, fronts)
     deliver([(output, lambda: made.content)])
     if not made.good:
         job.remark(made.verdict)
     if output != "-":
         job.remark(f"wrote {output}")
     leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=made.met is False)
-
-
-def _dispersed(compared: Comparison, samples: int, *, quiet: bool) -> tuple[dict[str, Results], str]:
-    """The schedules in many cases, the recommended one first, and how far falling moments err with it.
-
-    Of the others none is there whose cases cannot be flown. Interrupted, nothing is written.
-    """
-    from nutdamp.dispersion import study_of
-    from nutdamp.errors import BadRequest, Infeasible
-    from nutdamp.library.reports import feasible_first
-
-    found: dict[str, Results] = {}
-    notes = []
-    for plan in feasible_first(compared):
-        try:
-            study = study_of(plan.spacecraft, plan.pulses)
-            notes.append(study.lightening_error)
-            results, _, stopped_by = fly(study, samples, None, None, quiet)
-        except (BadRequest, Infeasible):
-            if not found:
-                raise
-            continue
-        if stopped_by is not None and results.done < samples:
-            raise interruption(stopped_by)
-        found[plan.scheme] = results
-    return found, notes[0] if notes else ""

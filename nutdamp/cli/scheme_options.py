@@ -130,7 +130,8 @@ def scheme_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
-        given = {name: parameters.pop(name) for name in names}
+        taken = {name: parameters.pop(name) for name in names}
+        given = {name: value for name, value in taken.items() if value is not False}
         try:
             options = Options(**given)
         except SenselessOption as wrong:

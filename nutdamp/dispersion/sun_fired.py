@@ -16,7 +16,7 @@ from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid_cases import Bodies, Stretch
 from nutdamp.physics.sun_clock import Push, SunClock
-from nutdamp.schemes.tools.sun_pulses import pushes
+from nutdamp.schemes.tools.sun_pulses import fire, pushes
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,9 @@ Array = NDArray[np.float64]
 class Fired(NamedTuple):
     """How cases move as their last pulse ends, and what was fired.
 
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n); ``starts`` (k, n) s of the pulses; ``seen`` (k, n): whether the
-    sensor saw the Sun, without which nothing fires; ``over`` (n,) s: when the last pulse ends.
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n); ``starts`` (k, n) s of the pulses; ``seen`` (k, n): whether they
+    fire, which needs the sensor to have seen the Sun up to then in the same turns as in the nominal flight: another
+    count of Sun pulses is another plan; ``over`` (n,) s: when the last pulse ends.
     """
 
     rates: Array
@@ -52,7 +53,8 @@ def fly(
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     over = np.zeros(count)
     rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    pulses, shifts = model.schedule.pulses, []
+    pulses, shifts, nominal = model.schedule.pulses, [], fire(body, model.schedule.blocks)[1]
+    passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     for pulse, start, lead in zip(pulses, cases.starts, cases.leads, strict=True):
         shifts.append(start - lead - pulse.loaded[0])
     for begin in range(0, count, rigid_cases.BLOCK):
@@ -65,9 +67,14 @@ def fly(
         sense = math.copysign(1.0, body.spin)
         clock = SunClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
+        sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
-            found = clock.sun_pulse(number)
-            seen[index, rows] = body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
+            passage = int(passages[number - 1])
+            for between in () if sees_all else range(before + 1, passage):
+                alike &= body.sun_sensor.sees(clock.angle(clock.sun_pulse(between))) == nominal[between - 1]
+            found, before = clock.sun_pulse(passage), passage
+            alike &= body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
+            seen[index, rows] = alike
             impulse = np.where(seen[index, rows], np.array([part(one) for one in cases.impulses[index]]), 0.0)
             if cases.thrust[index]:
                 torques = _pushes(cases.thrust[index], seen[index, rows], part)

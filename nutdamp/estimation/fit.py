@@ -158,6 +158,7 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     # Three moments and dissipation together take an integration: only where both are seen.
     model = Model(spacecraft, record, growing=spacecraft.inertia.symmetric)
     _expect_enough(model)
+    _expect_alive(model)
     found = _settled(model, _best(model))
     _expect_seen(found)
     found = aliases.likeliest([found, *(_settled(model, one) for one in aliases.neighbours(model, found.values))])
@@ -183,6 +184,36 @@ def _wider(found: Fit, wider: Model, more: tuple[str, ...]) -> Fit:
 
 def _named(model: Model, values: Iterable[float]) -> dict[str, float]:
     return {one.name: float(value) for one, value in zip(model.parameters, values, strict=True)}
+
+
+STUCK, FEWEST, COARSE = 0.2, 20, 10
+"""Part of the samples of a rate gyro, and number of them, that are alike in a row where it is stuck; a record that has
+so few different values is one of coarse steps."""
+
+
+def _expect_alive(model: Model) -> None:
+    """Raises Infeasible for a transverse gyro that does not change while another signal shows the nutation."""
+    varying = [index for index, one in enumerate(model.signals) if one in SHOW_NUTATION and _run(model, index)[3] > 1]
+    for index, signal in enumerate(model.signals):
+        begins, ends, alike, different = _run(model, index)
+        count = int((model.signal == index).sum())
+        if signal not in GYROS[:2] or alike < max(FEWEST, STUCK * count) or not set(varying) - {index}:
+            continue
+        if different == 1 or different > COARSE:
+            raise Infeasible(
+                f"{signal} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples) while others show a "
+                "nutation: the sensor is dead or stuck; leave its column out, or end the record before"
+            )
+
+
+def _run(model: Model, index: int) -> tuple[float, float, int, int]:
+    """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
+    rows = np.flatnonzero(model.signal == index)
+    values, times = model.measured[rows], model.times[rows]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
+    at = int(np.argmax(np.diff(edges)))
+    first, last = edges[at], edges[at + 1] - 1
+    return float(times[first]), float(times[last]), int(last - first + 1), len(np.unique(values))
 
 
 def _expect_enough(model: Model) -> None:

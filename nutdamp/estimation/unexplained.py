@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import bdtrc
 
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import aliases, noises
@@ -27,6 +28,12 @@ FAR = 2.0
 PART = 1e-3
 """Part of what varies in a signal that such residuals have at least: records without noise show smaller ones."""
 
+WINDOWS = (4, 8, 16, 32, 64)
+"""Samples in a row among which those left out are counted."""
+
+CHANCE = 1e-6
+"""Probability by which they may be scattered so unevenly."""
+
 FEWEST = 20
 """Samples of a signal that are judged at least."""
 
@@ -41,8 +48,18 @@ SHOWN = 50.0
 
 
 def expect_explained(found: Fit) -> None:
-    """Raises Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one."""
+    """Raises Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one.
+
+    So it does where samples are left out that follow each other: outliers come one by one, motion does not.
+    """
     model = found.model
+    burst = left_out_together(found)
+    if burst is not None:
+        signal, begins, ends, count = burst
+        raise Infeasible(
+            f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: {count} samples would "
+            f"have to be left out, which is motion and no outlier; {_cure(found)}"
+        )
     left = [index for index in range(len(model.signals)) if _more_than_noise(found, index)]
     if not left:
         return
@@ -51,10 +68,37 @@ def expect_explained(found: Fit) -> None:
     says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
     time = step(found, left)
     where = "" if time is None else f", with a step at about {time:.4g} s"
-    what = "pulses fired in the record are given with --schedule"
-    if model.record.fired:
-        what = "check the channels and times of the schedule"
-    raise Infeasible(f"{says}{where}; {what}, and a record of the coast before or after needs none")
+    raise Infeasible(f"{says}{where}; {_cure(found)}")
+
+
+def _cure(found: Fit) -> str:
+    fired = found.model.record.fired
+    what = "check the channels and times of the schedule" if fired else "give the pulses fired in it with --schedule"
+    return f"{what}; a record of the coast before or after needs none"
+
+
+def left_out_together(found: Fit) -> tuple[str, float, float, int] | None:
+    """Signal, first and last time (s), and number of samples that were left out though they follow each other.
+
+    None where those left out lie as scattered as chance has it: of any `WINDOWS` samples in a row no more than by the
+    share left out elsewhere (binomial tail, `CHANCE` for all windows).
+    """
+    model, least, burst = found.model, CHANCE, None
+    for index, signal in enumerate(model.signals):
+        rows = np.flatnonzero(model.signal == index)
+        rows = rows[np.argsort(model.times[rows], kind="stable")]
+        out = ~found.used[rows]
+        sums = np.concatenate([[0], np.cumsum(out)])
+        for width in (one for one in WINDOWS if one < len(rows)):
+            counts = sums[width:] - sums[:-width]
+            elsewhere = np.maximum(sums[-1] - counts, 1.0) / (len(rows) - width)
+            chances = len(rows) * bdtrc(counts - 1, width, np.minimum(elsewhere, 1.0))
+            at = int(np.argmin(np.where(counts > 0, chances, np.inf)))
+            if counts[at] > 0 and chances[at] < least:
+                least = float(chances[at])
+                those = model.times[rows][at : at + width][out[at : at + width]]
+                burst = signal, float(those[0]), float(those[-1]), int(counts[at])
+    return burst
 
 
 def _rows(found: Fit, signal: int) -> Vector:

@@ -13,7 +13,7 @@ from nutdamp.files.plan_json import aspects_json, final_json
 def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
     """The plan, whether it ``met`` what is required and the ``verdict`` in words, part by part with margins, its end.
 
-    ``cases`` is null where none were flown; ``better``: other schemes with which more cases comply.
+    ``cases`` is null where none were flown.
     """
     plan, cases, pulses = decision.plan, decision.cases, decision.flight.schedule
     return {
@@ -30,7 +30,6 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
             "probability": cases.probability,
             "met": cases.met,
         },
-        "better": [{"scheme": name, "met_fraction": share} for name, share in decision.better],
         "final": final_json(decision.flight),
         **aspects_json(decision.aspects),
         "propellant_kg": pulses.propellant,

@@ -35,10 +35,28 @@ def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str
     """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
     return {
         **heading(compared.spacecraft),
-        "plans": [plan_json(plan) for plan in compared.plans],
+        "plans": [compared_json(compared, plan) for plan in compared.plans],
         "recommended": None if compared.recommended is None else compared.recommended.scheme,
         **spoken,
     }
+
+
+def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
+    """One of the plans compared; ``cases``: the share of dispersed cases that comply, null where not all have flown."""
+    data, share, cases = plan_json(plan), compared.shares.get(plan), compared.cases(plan)
+    data["meets_requirement"] = compared.meets(plan)
+    if plan.spacecraft.commands is not None:
+        data["can_be_commanded"] = plan.commandable if plan.feasible else None
+    if compared.shares:
+        data["cases"] = share and {
+            "samples": 0 if cases is None else cases.samples,
+            "met_fraction": share.exact,
+            "low": share.low,
+            "high": share.high,
+            "probability": share.probability,
+            "met": share.met,
+        }
+    return data
 
 
 def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:

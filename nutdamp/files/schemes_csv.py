@@ -21,10 +21,14 @@ WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
 def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.void]:
     """One row a scheme; what is left is that of the flight through real widths. What is not known is NaN or empty.
 
-    ``decided``: which scheme is recommended, and in ``met_fraction`` the share of dispersed cases that comply.
+    ``decided``: which plan is recommended; ``met_fraction`` is the share of cases that comply, where all have flown.
     """
-    scheme, shares = (None, {}) if decided is None else (decided.plan.scheme, decided.shares)
-    rows = [_row(plan, plan.scheme == scheme, shares.get(plan.scheme)) for plan in compared.plans]
+    chosen, shares = None if decided is None else decided.plan, compared.shares
+    rows = []
+    for plan in compared.plans:
+        share = shares[plan].exact if plan in shares else None
+        data = plan_json(plan) | {"meets_requirement": compared.meets(plan)}
+        rows.append(_row(plan, data, plan is chosen, share))
     names = list(rows[0]) if rows else list(WORDS)
     longest = {name: max(1, *(len(row[name]) for row in rows)) if rows else 1 for name in WORDS}
     kinds = [(name, f"U{longest[name]}" if name in WORDS else "i8" if name == "pulses" else "f8") for name in names]
@@ -32,8 +36,8 @@ def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.
     return np.array(values, dtype=kinds)
 
 
-def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
-    data, speed = plan_json(plan), plan.delta_v
+def _row(plan: Plan, data: dict[str, Any], recommended: bool, share: float | None) -> dict[str, Any]:
+    speed = plan.delta_v
     final, left = data["final"], data["flown"] if plan.feasible else residual_json(None)
     around, off = ("tilt_deg", "azimuth_deg") if plan.spacecraft.attitude is None else _CELESTIAL
     angles = {
@@ -45,7 +49,7 @@ def _row(plan: Plan, recommended: bool, share: float | None) -> dict[str, Any]:
         "scheme": plan.scheme,
         "feasible": truth(plan.feasible),
         "recommended": truth(recommended),
-        "meets_requirement": truth(plan.meets_requirement),
+        "meets_requirement": truth(data["meets_requirement"]),
         "met_fraction": share,
         "pulses": len(plan.pulses),
         **{key: data[key] for key in ("end_s", "total_impulse_Nms", "least_impulse_Nms", "propellant_kg")},

@@ -58,7 +58,7 @@ class CommandsSection(Section):
     """What a command block may hold: so many pulses of one channel, fired by the Sun pulse."""
 
     delay_step: PositiveTime = Field("Resolution of the delay after the Sun pulse, s.", "2 ms")
-    delay_max: PositiveTime = Field("Longest delay, s; less than a spin turn.", "1.9 s")
+    delay_max: PositiveTime = Field("Longest delay, s; up to a spin turn is used.", "1.9 s")
     width: Widths = Field(
         "Widths that can be commanded, s: a list, or step, min and max.",
         {"step": "1 ms", "min": "20 ms", "max": "500 ms"},

@@ -42,11 +42,10 @@ def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[
         yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
     if spin is not None:
         turn = 2.0 * math.pi / abs(spin)
-        longest, width = (facts.number("time", "commands", *path) for path in (("delay_max",), ("width", "max")))
-        for path, time in ((("delay_max",), longest), (("width", "max"), width)):
-            if time is not None and time >= turn:
-                problem = f"{time:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
-                yield Finding(("commands", *path), problem)
+        width = facts.number("time", "commands", "width", "max")
+        if width is not None and width >= turn:
+            problem = f"{width:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
+            yield Finding(("commands", "width", "max"), problem)
         yield from _sun_in_view(facts, math.copysign(1.0, spin) * axis)
     least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
     if least is not None and most is not None and least > most:

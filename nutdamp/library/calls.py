@@ -25,13 +25,23 @@ def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
     return planning.plan(expected(spacecraft), name, _options(options))
 
 
-def compare(spacecraft: Spacecraft, names: Sequence[str] = (), options: Choice = None) -> Comparison:
-    """Plan the schemes named and recommend one; raises as `plan` does.
+def compare(
+    spacecraft: Spacecraft,
+    names: Sequence[str] = (),
+    options: Choice = None,
+    *,
+    samples: int | None = None,
+    timed: bool = False,
+) -> Comparison:
+    """Plan the schemes named and recommend one, as ``nutdamp plan`` does; raises as `plan` does.
 
-    Default: the classic three and optimal, or those that point where the file has a target axis.
+    Default: the classic three and optimal, or those that point where the file has a target axis. ``samples``: dispersed
+    cases of each plan where the file has dispersions, 0 to judge nominal values alone; ``timed``: recommend pulses that
+    no command block can fire, too.
     """
-    chosen = _names(names) or comparison.usual(expected(spacecraft))
-    return comparison.compare(expected(spacecraft), chosen, _options(options))
+    body, chosen = expected(spacecraft), _names(names)
+    count = samples if samples in (None, 0) else arguments.count("samples", samples)
+    return comparison.compare(body, chosen, _options(options), samples=count, timed=timed)
 
 
 def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 
-from nutdamp import arguments, dispersion
+from nutdamp import arguments
 from nutdamp.comparison import Comparison
 from nutdamp.dispersion.study import Results
-from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.errors import BadRequest
 from nutdamp.files.output import write_whole
 from nutdamp.files.yaml_tree import dotted
 from nutdamp.fronts import Front
 from nutdamp.library.calls import compare
 from nutdamp.library.craft import Source, load
-from nutdamp.library.studies import disperse as fly_cases
 from nutdamp.library.studies import trade
-from nutdamp.planning import Plan
 from nutdamp.presentation.page.content import Repeat, report_page
 from nutdamp.presentation.page.document import UNCONTROLLED, Control, Page
 from nutdamp.presentation.page.html import expect_html, page_html
@@ -60,42 +57,31 @@ def report(
     options: Choice = None,
     *,
     disperse: int | None = None,
-    seed: int = dispersion.SEED,
     points: int | None = None,
     **control: str,
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
-    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: an HTML file; ``disperse``: in how
-    many dispersed cases to fly the plans; ``points``: how many horizons to try for each front of time against cost,
-    none by default; ``control``: title, document, issue, author, date, as `controlled` takes
-    them. Raises as `load`, `compare` and `disperse` do, BadRequest for another ending, MissingExtra without the extra
-    plot, CannotWrite.
+    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: an HTML file; ``disperse``: in how many
+    dispersed cases to fly the plans, as ``samples`` of `compare`; ``points``: how many horizons to try for each front
+    of time against cost, none by default; ``control``: title, document, issue, author, date, as `controlled` takes
+    them. Raises as `load` and `compare` do, BadRequest for another ending, MissingExtra without the extra plot,
+    CannotWrite.
     """
     name, kept = arguments.path("output", output), controlled(**control)
     expect_html(name)
     body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
-    compared = compare(body, names, options)
-    cases: dict[str, Results] = {}
-    if disperse is not None:
-        for plan in feasible_first(compared):
-            with suppress(*([] if not cases else [Infeasible])):  # cases of another scheme that take too long to fly
-                cases[plan.scheme] = fly_cases(plan, disperse, seed=seed).core
+    compared = compare(body, names, options, samples=disperse)
     known = isinstance(options, Options) and options.with_disturbances
     fronts = () if points is None else trade(body, points, with_disturbances=known).fronts
-    given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "seed": disperse and seed}
+    given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse}
     given["points"] = points
     given |= {key: repr(value) for key, value in control.items()}
     more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
     named = f", {list(names)!r}" if names else ""
-    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), cases, control=kept, traded=fronts)
+    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), kept, fronts)
     write_whole(name, made.content)
     return made
-
-
-def feasible_first(compared: Comparison) -> tuple[Plan, ...]:
-    """The feasible plans, the recommended one first."""
-    return tuple(sorted((plan for plan in compared if plan.feasible), key=lambda one: one is not compared.recommended))
 
 
 def controlled(**given: str) -> Control:
@@ -116,17 +102,12 @@ def controlled(**given: str) -> Control:
 
 
 def made_of(
-    compared: Comparison,
-    repeat: Repeat,
-    dispersed: Mapping[str, Results] | None = None,
-    note: str = "",
-    control: Control = UNCONTROLLED,
-    traded: Sequence[Front] = (),
+    compared: Comparison, repeat: Repeat, control: Control = UNCONTROLLED, traded: Sequence[Front] = ()
 ) -> Report:
-    """The report, not yet written; ``dispersed`` by scheme. Raises MissingExtra without the extra plot."""
-    flown, chosen = dispersed or {}, compared.recommended
-    page = report_page(compared, repeat, dispersed=flown, note=note, traded=traded, control=control)
-    return Report(compared, None if chosen is None else flown.get(chosen.scheme), page, page_html(page))
+    """The report, not yet written. Raises MissingExtra without the extra plot."""
+    chosen = compared.recommended
+    page = report_page(compared, repeat, traded=traded, control=control)
+    return Report(compared, None if chosen is None else compared.results(chosen), page, page_html(page))
 
 
 def _repeat(body: Spacecraft, how: str) -> Repeat:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from rich.console import RenderableType
@@ -48,6 +49,8 @@ def _at_end(decision: Decision) -> str:
         what = "nutation is damped" if decision.plan.spacecraft.goal.axis is None else "target is reached"
         what = what if decision.damped else what.replace(" is ", " is NOT ")
         return f"nothing is required at the end; with nominal values the {what}"
+    if decision.unknown:
+        return f"NOT met{' with nominal values' * (not nominal)}: {verdicts.UNDECIDED}"
     if cases is not None and cases.complying is not None:
         counted = verdicts.cases_verdict(cases.complying, cases.probability)
         return counted if nominal else f"NOT met with nominal values; {counted}"
@@ -55,26 +58,36 @@ def _at_end(decision: Decision) -> str:
     return f"{said}; dispersed cases were not flown" if decision.undispersed else said
 
 
-def better(decision: Decision) -> str:
-    """Which other schemes comply in more cases; empty where none does."""
-    if not decision.better or decision.cases is None:
-        return ""
-    own, probability = decision.cases.complying or 0.0, decision.cases.probability
-    shares = listed([f"{name} ({verdicts.percent(share, probability)})" for name, share in decision.better])
-    return f"more cases comply with {shares} than with {decision.plan.scheme} ({verdicts.percent(own, probability)})."
-
-
 def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
-    """What must be known beside the verdict: which other schemes comply more often, what was idealised, what grows.
+    """What must be known beside the verdict: what was idealised, what grows.
 
     ``looped``: it is the flight of a closed loop, which goes on firing.
     """
-    yield from filter(None, (better(decision), verdicts.idealised(decision.plan)))
+    yield from filter(None, (verdicts.idealised(decision.plan),))
+    if turned := _turned(decision):
+        yield f"{decision.plan.scheme} {listed(turned)}."
+    if not decision.plan.commandable:
+        yield f"{decision.plan.scheme} cannot be commanded: no command block fires its pulses."
     if looped:
         return
     yield from _growing(decision)
     if decision.plan.spacecraft.loop is not None:
         yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
+
+
+def _turned(decision: Decision) -> list[str]:
+    """What a plan does to axis and spin that nothing asks of it, where that is more than is not worth a word."""
+    body, final, found = decision.plan.spacecraft, decision.flight.residual, []
+    if body.goal.axis is None and final.momentum_shift > TURNED:
+        found.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
+    change = decision.final.spin - body.spin
+    if body.goal.spin is None and abs(change) > compliance.SPIN_TOLERANCE * abs(body.spin):
+        found.append(f"changes the spin by {quantity(change, 'rad/s')}")
+    return found
+
+
+TURNED = math.radians(0.1)
+"""rad by which H turns, for that to be said."""
 
 
 def _growing(decision: Decision) -> Iterator[str]:
@@ -176,7 +189,7 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
         Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
         *requirement(decision),
         *[Text.assemble(("Warning: ", "bold red"), warning) for warning in missed],
-        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared, decision.shares)],
+        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
         *figures(decision),
     ]
 

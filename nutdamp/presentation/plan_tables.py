@@ -14,13 +14,13 @@ from nutdamp import compliance
 from nutdamp.aspect import at_start
 from nutdamp.comparison import Comparison
 from nutdamp.compliance import Bound, Part
-from nutdamp.decision import Decision, decide
+from nutdamp.decision import decide
 from nutdamp.demands import SLACK
 from nutdamp.flight import REAL_WIDTHS, Residual, model_name
 from nutdamp.planning import NO_NUTATION, Plan
 from nutdamp.presentation import verdicts
 from nutdamp.presentation.block_tables import blocks_screen
-from nutdamp.presentation.decisions import decision_screen, limit, size
+from nutdamp.presentation.decisions import COUNT, decision_screen, limit, size
 from nutdamp.presentation.end_tables import (
     add_aspects,
     angle_names,
@@ -193,8 +193,12 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
         rows.append(
             ("  |ΔV|", lambda plan: MISSING if plan.delta_v is None else quantity(math.hypot(*plan.delta_v), "m/s"))
         )
+    if compared.spacecraft.commands is not None:
+        rows.append(("command blocks", lambda plan: "yes" if plan.commandable else "cannot be\ncommanded"))
     if compliance.judged(compared.spacecraft):
-        rows.append(("requirement:", lambda plan: verdicts.VERDICT[Decision(plan).met if plan.feasible else None]))
+        rows.append(("requirement:", lambda plan: verdicts.VERDICT[compared.meets(plan)]))
+        if compared.shares:
+            rows.append((f"  {COUNT}", lambda plan: verdicts.share_text(compared.shares.get(plan))))
         rows += [_part(bound) for bound in compliance.required(compared.spacecraft)]
         cones = enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)])
         rows += [_cone(at, one.keep.name, kept) for at, one in cones for kept, _, _ in cone_margins(one)]

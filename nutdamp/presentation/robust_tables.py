@@ -11,7 +11,7 @@ from nutdamp.presentation import robust_verdicts, verdicts
 from nutdamp.presentation.decisions import KEPT, figures, requirement
 from nutdamp.presentation.layout import columns
 from nutdamp.presentation.plan_tables import derived_table, pulse_table
-from nutdamp.presentation.text import MISSING, in_degrees
+from nutdamp.presentation.text import in_degrees
 from nutdamp.remarks import infeasibility
 from nutdamp.robust import RobustComparison
 from nutdamp.words import listed
@@ -51,16 +51,14 @@ def robust_screen(found: RobustComparison) -> RenderableType:
 
 
 def _fresh(found: RobustComparison) -> str:
-    """How the plan fares in new cases, which decide where too few of them comply; nothing where none were flown."""
+    """How the plan fares in new cases; nothing where none were flown."""
     if found.fresh is None or found.chosen is None:
         return ""
-    cases, own = found.fresh.cases, found.chosen.met or 0.0
+    cases = found.fresh.cases
     met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
+    few = f", fewer than the {verdicts.exact_percent(found.probability)} required" * found.lucky
     new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
-    if not found.lucky:
-        return f"Of {new}, {met} comply; 95 % interval {low} to {high}."
-    chosen_by = verdicts.percent(own, found.probability)
-    return f"These are {new}; 95 % interval {low} to {high}. Of those that it was chosen by, {chosen_by} comply."
+    return f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
 
 
 def _why(plan: Plan) -> str:
@@ -92,7 +90,7 @@ def _candidates(found: RobustComparison) -> RenderableType:
             f"{spent:.4g}",
             *(in_degrees(angle) for angle in (one.nominal, one.left)),
             *[KEPT[plan.kept is not False]] * cones,
-            *[MISSING if one.met is None else verdicts.percent(one.met, found.probability)] * counted,
+            *[verdicts.share_text(one.share)] * counted,
         )
     what = robust_verdicts.left_name(found.comparison.spacecraft)
     rest = len(found.candidates) - len(named)
@@ -101,5 +99,5 @@ def _candidates(found: RobustComparison) -> RenderableType:
     if fewer:
         more += f"Plans that could not be chosen any more after {listed(fewer, 'or')} cases flew no more of them. "
     note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
-    star = " * is recommended for nominal values." if found.usual is not None else ""
+    star = " * is recommended without --robust." if found.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))

@@ -24,7 +24,7 @@ def robust_reason(found: RobustComparison) -> str:
         level = exact_percent(found.probability)
         best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
         as_good = f"{found.equals} leave about as little"
-    elif (found.met or 0.0) >= found.probability:
+    elif chosen.met >= found.probability:
         best = f"at least {exact_percent(found.probability)} of cases comply with it, of {count} plans"
         as_good = f"they do with {found.equals}"
     else:
@@ -35,21 +35,22 @@ def robust_reason(found: RobustComparison) -> str:
     cost = "propellant" if found.by_propellant else "impulse"
     then = {
         Ground.COST: f"least {cost}",
-        Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended for nominal values",
+        Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended without --robust",
+        Ground.PULSES: f"least {cost} within 0.1 %, and fewest pulses",
+        Ground.DELTA_V: f"least {cost} within 0.1 %, and least ΔV",
         Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
-        Ground.SHIFT_END: f"least {cost} within 0.1 %, least shift of H, and first to end of these",
     }
     return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
 
 
 def robust_cost(found: RobustComparison) -> str:
-    """The robust plan against the one that is recommended for nominal values."""
+    """The robust plan against the one that is recommended without ``--robust``."""
     chosen, usual, cost = found.chosen, found.usual, found.cost
     if chosen is None or usual is None or cost is None:
         return "There is nothing to compare it with."
     if chosen is usual:
-        return "It is the plan that is recommended for nominal values too."
+        return "It is the plan that is recommended without --robust too."
     if cost.propellant is None:
         spent = _more(cost.impulse, quantity(abs(cost.impulse), "N m s"), "impulse")
     else:
@@ -61,7 +62,7 @@ def robust_cost(found: RobustComparison) -> str:
     if chosen.met is not None and usual.met is not None:
         shares = (percent(one.met or 0.0, found.probability) for one in (chosen, usual))
         gained = f"{' instead of '.join(shares)} of cases comply"
-    return f"Against {usual.plan.scheme}, recommended for nominal values: {gained}; it takes {spent} and ends {when}."
+    return f"Against {usual.plan.scheme}, recommended without --robust: {gained}; it takes {spent} and ends {when}."
 
 
 def tightened(found: RobustComparison) -> str:

@@ -5,7 +5,7 @@ The floors below give data; all sentences about them are here, so that every scr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from nutdamp import compliance, outcome, schemes
@@ -15,7 +15,7 @@ from nutdamp.flight import Flight
 from nutdamp.hindrance import Obstacle
 from nutdamp.planning import Plan
 from nutdamp.presentation.text import MISSING, RPM, degrees, duration, mass, moment, most, quantity, sentence
-from nutdamp.recommendation import Gain, Ground, Standing
+from nutdamp.recommendation import Gain, Ground, Share, Standing
 from nutdamp.remarks import obstacle, strays
 from nutdamp.schemes.registry import OPTIMAL
 from nutdamp.spacecraft import Spacecraft
@@ -36,7 +36,7 @@ def no_plan(plan: Plan) -> str:
 def needless(compared: Comparison) -> str | None:
     """That nothing has to be done, where that is so."""
     body = compared.spacecraft
-    if not compliance.unaided(body):
+    if not compared.needless:
         return None
     nutation = degrees(body.nutation)
     there = [
@@ -46,7 +46,7 @@ def needless(compared: Comparison) -> str | None:
         there.append(f"the {degrees(body.to_turn)} between H and the target")
     count = "" if len(there) > 1 else "s"
     if compliance.required(body):
-        nominal = " with nominal values" * (body.dispersions is not None)
+        nominal = " with nominal values" * (body.dispersions is not None and compared.flown is None)
         verdict = f"already meet{count} the requirement ({required(body)}){nominal}"
     else:
         verdict = f"already count{count} as damped"
@@ -58,6 +58,8 @@ def needless(compared: Comparison) -> str | None:
 def reason(compared: Comparison) -> str:
     """Why the recommended plan, or none."""
     found, body = compared.recommendation, compared.spacecraft
+    if found.plan is None and any(one.feasible for one in compared.plans):
+        return "no plan can be sent as command blocks; with --timed pulses are timed one by one"
     if found.plan is None:
         untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
         damped = compliance.subsides(body) if compliance.only_nutation(body) else None
@@ -67,13 +69,16 @@ def reason(compared: Comparison) -> str:
         return _only(compared)
     cones = " and keep the cones" * bool(found.plan.kept)
     cost = "propellant" if found.by_propellant else "impulse"
+    if found.ground is Ground.CASES:
+        return f"most cases comply of the {found.count} feasible plans{cones.replace(' and', ' that')}"
     if found.standing is Standing.COMPLIES:
         among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
         least, equal = f"least {cost} {among}", "; of those that cost as much within 0.1 %"
         then = {
+            Ground.PULSES: f"{equal}, fewest pulses",
+            Ground.DELTA_V: f"{equal}, least ΔV",
             Ground.SHIFT: f"{equal}, least shift of H",
             Ground.END: f"{equal}, it ends first",
-            Ground.SHIFT_END: f"{equal} and shift H least, it ends first",
         }
         return f"{least}{then.get(found.ground or Ground.COST, '')}"
     meeting = found.standing is Standing.MEETS
@@ -89,9 +94,10 @@ def reason(compared: Comparison) -> str:
     least_cost = f", within {degrees(compliance.DAMPED_ANGLE)}; of these least {cost}"
     then = {
         Ground.COST: least_cost,
+        Ground.PULSES: f"{least_cost}, then fewest pulses",
+        Ground.DELTA_V: f"{least_cost}, then least ΔV",
         Ground.SHIFT: f"{least_cost}, then least shift of H",
         Ground.END: f"{least_cost}, then it ends first",
-        Ground.SHIFT_END: f"{least_cost}, then least shift of H, then it ends first",
     }
     return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
 
@@ -152,6 +158,9 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     found, body = compared.recommendation, compared.spacecraft
     if found.standing is Standing.COMPLIES:
         return
+    if chosen in compared.shares and chosen.standing is not Standing.MISSES:
+        yield _too_few(chosen, compared)
+        return
     required = found.standing is Standing.MISSES and bool(compliance.required(body))
     does, do, what = ("damps", "damp", "nutation") if body.goal.axis is None else ("reaches", "reach", "target")
     if required:
@@ -161,6 +170,20 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
         it, head = chosen.scheme, f"none of the {len(compared.plans)} schemes compared {does} the {what}"
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
     yield " ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared)))
+
+
+def _too_few(chosen: Plan, compared: Comparison) -> str:
+    """That no plan meets the requirement in enough dispersed cases."""
+    share = compared.shares[chosen]
+    if share.exact is None:
+        return f"{sentence(UNDECIDED)} Nominal values alone: plan --nominal."
+    least, count = exact_percent(share.probability), len(compared.plans)
+    head = f"With none of the {count} schemes compared" if count > 1 else f"With {chosen.scheme} not"
+    return f"{head} do {least} of cases comply. nutdamp plan --robust looks for a plan made for the tolerances."
+
+
+UNDECIDED = "the share of cases that comply is undecided: not all of them could be flown within the budget of work"
+"""Of dispersed cases that were to decide."""
 
 
 def idealised(plan: Plan) -> str:
@@ -253,16 +276,13 @@ def _spent(plan: Plan) -> str:
     )
 
 
-def hints(compared: Comparison, shares: Mapping[str, float] | None = None) -> tuple[str, ...]:
-    """What the reader may prefer: a plan that is much better in some way for little more, and what it is worse in.
-
-    ``shares``: of schemes that were dispersed, by name, the share of cases that comply.
-    """
+def hints(compared: Comparison) -> tuple[str, ...]:
+    """What the reader may prefer: a plan that is much better in some way for little more, and what it is worse in."""
     others = dict.fromkeys(compared.recommendation.alternatives.values())
-    return tuple(hint(compared, other, shares) for other in others)
+    return tuple(hint(compared, other) for other in others)
 
 
-def hint(compared: Comparison, other: Plan, shares: Mapping[str, float] | None = None) -> str:
+def hint(compared: Comparison, other: Plan) -> str:
     """In what one of the alternatives is better than the recommended plan, and in what it is worse."""
     found = compared.recommendation
     chosen = found.plan
@@ -270,8 +290,7 @@ def hint(compared: Comparison, other: Plan, shares: Mapping[str, float] | None =
     gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
     better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
     worse = listed([*_drawbacks(other, chosen)])
-    clauses = better, f"but it {worse}" * bool(worse), _complying(other, chosen, shares or {})
-    return f"{'; '.join(filter(None, clauses))}."
+    return f"{'; '.join(filter(None, (better, f'but it {worse}' * bool(worse))))}."
 
 
 def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
@@ -309,12 +328,6 @@ def _shift(plan: Plan) -> str:
     return degrees(plan.flown.momentum_shift)
 
 
-def _complying(other: Plan, chosen: Plan, shares: Mapping[str, float]) -> str:
-    """In how many cases two plans comply, where that differs."""
-    complying = [percent(shares[one.scheme]) for one in (other, chosen) if one.scheme in shares]
-    return f"{' instead of '.join(complying)} of cases comply" * (len(set(complying)) == 2)
-
-
 def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
     """How much more a plan costs than another, with the share of it."""
     unit, what = ("kg", "propellant") if by_propellant else ("N m s", "impulse")
@@ -335,7 +348,7 @@ FARTHER = 1.1
 def spoken(compared: Comparison) -> dict[str, Any]:
     """The words of a comparison for JSON files."""
     return {
-        "no_pulse_needed": compliance.unaided(compared.spacecraft),
+        "no_pulse_needed": compared.needless,
         "reason": reason(compared),
         "warnings": list(warnings(compared)),
         "hints": list(hints(compared)),
@@ -358,6 +371,15 @@ def cases_verdict(share: float, probability: float) -> str:
     """Whether enough cases comply: "met: 99.9 % of cases comply (99.7 % required)"."""
     shown, least = percent(share, probability), exact_percent(probability)
     return f"{VERDICT[share >= probability]}: {shown} of cases comply ({least} required)"
+
+
+def share_text(share: Share | None) -> str:
+    """The share of cases that comply with a plan; where not all have flown, on which side of the required one it is."""
+    if share is None or (share.exact is None and share.met is None):
+        return MISSING
+    if share.exact is not None:
+        return percent(share.exact, share.probability)
+    return f"{'≥' if share.met else '<'} {exact_percent(share.probability)}"
 
 
 def percent(share: float, *others: float) -> str:

@@ -70,6 +70,13 @@ def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
     raise BadRequest(f"options of {scheme.name}: expected {scheme.options.__name__}(…), got {shown(chosen)}")
 
 
+def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
+    """The options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift."""
+    required = spacecraft.requirement
+    bound = required is not None and required.momentum_shift is not None
+    return options_of(scheme, chosen).settled(keeps_axis=bound or spacecraft.goal.axis is not None)
+
+
 def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:
     """Pulses of the scheme ``name``, disturbances and all.
 
@@ -80,7 +87,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     from nutdamp.schemes.tools.symmetric_model import model_of
 
     scheme = SCHEMES[name]
-    chosen = options_of(scheme, options)
+    chosen = settled(scheme, options, spacecraft)
     if scheme.on_true_body:
         return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
     if spacecraft.thrust_laws:
@@ -144,7 +151,7 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
         return []
     from nutdamp.schemes.tools.symmetric_model import model_of
 
-    chosen = options_of(scheme, options)
+    chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
         from nutdamp.schemes.tools import commanding
 
@@ -162,7 +169,7 @@ def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choi
     from nutdamp.schemes.tools import commanding, least_squares
 
     scheme = SCHEMES[name]
-    chosen = commanding.options(spacecraft, options_of(scheme, options))
+    chosen = commanding.options(spacecraft, settled(scheme, options, spacecraft))
     return commanding.as_commands(spacecraft, made, least_squares.Correction(scheme, chosen))
 
 

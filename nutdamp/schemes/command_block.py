@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from nutdamp import flight, work
 from nutdamp.commands import Block
+from nutdamp.compliance import SAME_COST
 from nutdamp.errors import Infeasible
 from nutdamp.limits import commandable_widths, keeps_limits, usable
 from nutdamp.outcome import left_by
@@ -35,6 +37,9 @@ Array = NDArray[np.float64]
 
 FLOWN_PULSES = 1000
 """Pulses that are flown, after which no further sequence is."""
+
+DOUBTS = 100
+"""Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
 
 CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
@@ -60,7 +65,11 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
-    channels = [one for one in at_hand(spacecraft, usable(spacecraft)) if commandable_widths(commands, one).size]
+    spun = spacecraft.goal.spin is not None
+    if spun and spacecraft.goal.axis is not None:
+        raise Infeasible("sets the spin or turns H, not both; optimal does")
+    able = at_hand(spacecraft, usable(spacecraft, axial=spun))
+    channels = [one for one in able if commandable_widths(commands, one).size]
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = Search(spacecraft, channels, commands)
@@ -78,14 +87,23 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
                 flights.append(search.flown(found))
             except Infeasible as reason:
                 why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
+    search.doubted(flights)
     if not flights:
         raise Infeasible(why)
-    chosen = min(flights, key=lambda one: one.rank)
+    chosen = _cheapest(flights)
     first = chosen.found.rank[:2] <= best[0].rank[:2]
     notes = [search.note(chosen, first=first), *block_notes.off_ticks(tick, commands)]
     if chosen.rank[1] > 1.0:
         notes.insert(1, search.cures(chosen, options.max_blocks or BLOCKS))
     return replace(chosen.made, notes=tuple(notes))
+
+
+def _cheapest(flights: Sequence[Flown]) -> Flown:
+    """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
+    best = min(flights, key=lambda one: one.rank)
+    broken, missed, cost, _ = best.rank
+    equal = [one for one in flights if one.rank[:2] == (broken, missed) and one.rank[2] <= cost * (1.0 + SAME_COST)]
+    return min(equal, key=lambda one: (len(one.made), one.made.end, one.rank))
 
 
 class Search(BlockSearch):
@@ -99,6 +117,20 @@ class Search(BlockSearch):
         missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
         rank = not keeps_limits(self.body, made), missed, made.cost, made.end
         return Flown(rank, made, found)
+
+    def doubted(self, flights: list[Flown]) -> None:
+        """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
+        best = min((one.rank for one in flights if not one.rank[0]), default=None)
+        most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
+        known = {one.found.blocks for one in flights}
+        cheaper = (one for one in self.doubtful if one.rank[1] < most and one.blocks not in known)
+        for found in islice(cheaper, DOUBTS if self.small else FLOWN):
+            if work.exhausted():
+                return
+            with suppress(Infeasible):
+                flights.append(self.flown(found))
+                if flights[-1].rank[:2] == (False, 0.0):
+                    return
 
     def nearer(self, flights: Sequence[Flown]) -> list[Found]:
         """Neighbours of the best of ``flights`` that leave least where the closed form errs as it does for those.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from nutdamp.arguments import is_count, is_number, shown
 from nutdamp.errors import BadRequest, SenselessOption
@@ -64,6 +64,10 @@ class SchemeOptions:
             value, kind = getattr(self, field.name), field.metadata["kind"]
             if not kind.takes(value):
                 raise SenselessOption(field.name, shown(value), f"expected {kind.expected}")
+
+    def settled(self, *, keeps_axis: bool) -> Self:  # noqa: ARG002 - what some schemes go by
+        """The same with what the spacecraft decides: ``keeps_axis``, whether something is asked of where H ends."""
+        return self
 
     @property
     def uncorrected(self) -> bool:
@@ -150,14 +154,19 @@ class RhumbLineOptions(SchemeOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
-    """What may be chosen of optimal; ``shift`` rad, how far from its target H may end."""
+    """What may be chosen of optimal; ``shift`` rad, how far from its target H may end.
+
+    ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
+    """
 
     least: str = _option(
         LEAST[0],
         Kind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
         "What to save; impulse if propellant is unknown.",
     )
-    free_axis: bool = _option(False, FLAG, "Let the angular momentum end anywhere.")
+    free_axis: bool | None = _option(
+        None, dataclasses.replace(FLAG, none=True), "Let H end anywhere, whatever momentum_shift requires."
+    )
     shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
     def __post_init__(self) -> None:
@@ -169,7 +178,13 @@ class OptimalOptions(SchemeOptions):
     @property
     def frees_axis(self) -> bool:
         """Whether H may end anywhere."""
-        return self.free_axis
+        return bool(self.free_axis)
+
+    def settled(self, *, keeps_axis: bool) -> Self:
+        """Whether H is free, where that was not said; no ``shift`` at all is none."""
+        if self.shift is not None:
+            return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
+        return self if self.free_axis is not None else dataclasses.replace(self, free_axis=not keeps_axis)
 
 
 KINDS = (

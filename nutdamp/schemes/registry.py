@@ -75,6 +75,7 @@ COMMAND_BLOCK = Scheme(
     "nutdamp.schemes.command_block",
     CommandBlockOptions,
     reads_commands=True,
+    sets_spin=True,
     on_true_body=True,
     body_fixed=True,
     slow=True,

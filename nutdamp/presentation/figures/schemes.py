@@ -75,12 +75,13 @@ class Rows(NamedTuple):
 
 @style.styled
 def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Figure:
-    """Dot plots of the schemes; ``decided`` knows which cases of which scheme comply, where they were dispersed."""
+    """Dot plots of the schemes; the plan ``decided`` on is marked, default the recommended one."""
     columns = _columns(compared)
-    if decided is not None and decided.cases is not None and decided.shares:
-        columns.append(_complying(decided.shares, decided.cases.probability))
+    shares = {plan.scheme: share.exact for plan, share in compared.shares.items() if share.exact is not None}
+    if shares:
+        columns.append(_complying(shares, next(iter(compared.shares.values())).probability))
     chosen = compared.recommended if decided is None else decided.plan
-    short = {plan.scheme: said for plan in compared.plans if (said := _short(plan, decided))}
+    short = {plan.scheme: said for plan in compared.plans if (said := _short(plan, compared))}
     plans = sorted(compared.plans, key=lambda plan: _place(plan, short))
     abreast = min(ABREAST, -(-len(columns) // 2))
     figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
@@ -108,7 +109,7 @@ def _place(plan: Plan, short: Mapping[str, str]) -> int:
     return list(Standing).index(Standing.MISSES if plan.scheme in short else plan.standing)
 
 
-def _short(plan: Plan, decided: Decision | None) -> str:
+def _short(plan: Plan, compared: Comparison) -> str:
     """What is to be said of a plan that misses what is required of it or of its cases; empty where it does not."""
     if not plan.feasible:
         return ""
@@ -116,10 +117,7 @@ def _short(plan: Plan, decided: Decision | None) -> str:
         missed = [bound.part.label for bound in plan.shortfalls if bound.required]
         missed += ["cones"] * (plan.kept is False)
         return f"NOT met: {listed(missed)}" if missed else UNDAMPED
-    if decided is None or decided.cases is None:
-        return ""
-    few = decided.shares.get(plan.scheme, 1.0) < decided.cases.probability
-    return "NOT met: too few cases comply" if few else ""
+    return "" if compared.meets(plan) in (None, True) else "NOT met: too few cases comply"
 
 
 def _columns(compared: Comparison) -> list[Quantity]:

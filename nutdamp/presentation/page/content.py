@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +14,7 @@ from rich.console import Group
 from nutdamp import __version__, schemes
 from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
-from nutdamp.decision import Decision, cases_of, decide
+from nutdamp.decision import Decision, decide
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
@@ -73,18 +73,11 @@ def report_page(
     compared: Comparison,
     repeat: Repeat,
     *,
-    dispersed: Mapping[str, Results] | None = None,
-    note: str = "",
     traded: Sequence[Front] = (),
     control: Control = UNCONTROLLED,
 ) -> Page:
-    """The page; raises MissingExtra without matplotlib.
-
-    ``dispersed``: schemes whose schedules were flown in dispersed cases; ``note``: a remark on how; ``traded``: fronts
-    of time against cost.
-    """
-    body, flown = compared.spacecraft, dispersed or {}
-    decided = decide(compared, {scheme: cases_of(results) for scheme, results in flown.items()})
+    """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
+    body, decided = compared.spacecraft, decide(compared)
     sections = [
         Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         Section("method", "Method", tuple(method_blocks(compared))),
@@ -92,24 +85,29 @@ def report_page(
     ]
     if traded:
         sections.append(_trade(compared, traded))
+    dispersed: Results | None = None
     if decided is not None:
         chosen = decided.plan
         sections.append(_schedule(chosen))
-        sections.append(manoeuvre_section(chosen, flown.get(chosen.scheme)))
+        dispersed = compared.results(chosen)
+        sections.append(manoeuvre_section(chosen, dispersed))
         sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
         sections.append(_verification(chosen))
-        if chosen.scheme in flown:
-            sections.append(_dispersion(chosen, flown[chosen.scheme], note))
+        if dispersed is not None:
+            sections.append(_dispersion(chosen, dispersed))
     sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
     return Page(
         title=control.title or _title(body),
         control=control,
         verdict=_verdict(compared, decided, traded),
         met=None if decided is None else decided.met,
-        good=decided is not None and decided.met is not False and decided.plan.standing is Standing.COMPLIES,
+        good=decided is not None
+        and decided.met is not False
+        and decided.plan.standing is Standing.COMPLIES
+        and decided.plan.commandable,
         decision=() if decided is None else tuple(_decision(decided)),
         figures=tuple(_unplanned(body) if decided is None else _figures(decided)),
-        sections=(*sections, _repeat(repeat, flown)),
+        sections=(*sections, _repeat(repeat, dispersed)),
         made_by=f"Made by nutdamp {__version__}.",
     )
 
@@ -124,20 +122,14 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
     reason = verdicts.reason(compared)
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
-    by = "" if decided.cases is None else "with nominal values, "
-    said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {by}{reason}."
+    said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {reason}."
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
     others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
-    fired = [verdicts.hint(compared, one, decided.shares) for one in dict.fromkeys(others) if one is not None]
-    surer = [SURER] * (decided.cases is not None and decided.cases.met is False)
-    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *surer, *fired)]
+    fired = [verdicts.hint(compared, one) for one in dict.fromkeys(others) if one is not None]
+    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
     notes += filter(None, [outdone(traded, decided.plan)])
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
-
-
-SURER = "to look for a plan with which more cases comply: nutdamp plan --robust"
-"""Beside a plan with which too few do."""
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
@@ -184,8 +176,8 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 def _schemes(compared: Comparison, decided: Decision | None) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
-    hints = tuple(Prose(hint) for hint in verdicts.hints(compared, None if decided is None else decided.shares))
-    blocks: list[Block] = [comparison_sheet(compared, decided), *hints, *map(Prose, _reading(compared))]
+    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
+    blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
     if decided is not None and len(compared) > 1:
@@ -257,19 +249,19 @@ def _verification(chosen: Plan) -> Section:
     return Section("budget", "Verification and error budget", tuple(blocks))
 
 
-def _dispersion(chosen: Plan, dispersed: Results, note: str) -> Section:
+def _dispersion(chosen: Plan, dispersed: Results) -> Section:
     from nutdamp.presentation.dispersion_tables import dispersion_screen
 
     blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
-    if note:
+    if note := dispersed.study.lightening_error:
         blocks.append(Prose(f"Note: {note}."))
     blocks += dispersion_pictures_of(dispersed, chosen.scheme)
     return Section("dispersion", "Dispersion", tuple(blocks))
 
 
-def _repeat(repeat: Repeat, flown: Mapping[str, Results]) -> Section:
+def _repeat(repeat: Repeat, dispersed: Results | None) -> Section:
     blocks: list[Block] = [Listing("Command", repeat.command), Facts("Versions", tuple(_versions()))]
-    facts = [("seed of the dispersed cases", str(results.study.seed)) for results in flown.values()][:1]
+    facts = [] if dispersed is None else [("seed of the dispersed cases", str(dispersed.study.seed))]
     if repeat.text:
         facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
     if facts:

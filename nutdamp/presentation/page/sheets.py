@@ -24,11 +24,11 @@ from nutdamp.schedule import Schedule
 Cell = Callable[[Plan], str]
 
 
-def comparison_sheet(compared: Comparison, decided: Decision | None = None) -> Sheet:
+def comparison_sheet(compared: Comparison) -> Sheet:
     """One row a scheme; the recommended one is marked. With dispersed cases the share that complies."""
     columns = _columns(compared)
-    if decided is not None and decided.cases is not None and decided.shares:
-        columns.append((Column(COUNT, "%"), lambda plan: _share(decided, plan.scheme)))
+    if compared.shares:
+        columns.append((Column(COUNT, "%"), lambda plan: _share(compared, plan)))
     rows = []
     for plan in compared.plans:
         cells = [cell(plan) if plan.feasible else "" for _, cell in columns]
@@ -69,16 +69,15 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         columns.append(
             (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
         )
+    if compared.spacecraft.commands is not None:
+        columns.append((Column("can be commanded", number=False), lambda plan: "yes" if plan.commandable else "no"))
     if compliance.required(compared.spacecraft):
-        columns.append(
-            (Column("nominal requirement", number=False), lambda plan: verdicts.VERDICT[plan.meets_requirement])
-        )
+        columns.append((Column("requirement", number=False), lambda plan: verdicts.VERDICT[compared.meets(plan)]))
     return columns
 
 
-def _share(decided: Decision, scheme: str) -> str:
-    share, probability = decided.shares.get(scheme), decided.cases.probability if decided.cases else 1.0
-    return MISSING if share is None else verdicts.percent(share, probability).removesuffix(" %")
+def _share(compared: Comparison, plan: Plan) -> str:
+    return verdicts.share_text(compared.shares.get(plan)).removesuffix(" %")
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:

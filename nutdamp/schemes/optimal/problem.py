@@ -111,7 +111,14 @@ class Problem:
         program = self.program()
         first = first or program.solve()
         least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
-        return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end))
+        keeping = self._keeping() if self.options.free_axis and not work.exhausted() else None
+        return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end, keeping))
+
+    def _keeping(self) -> float | None:
+        """The first-order least cost of a schedule that keeps H; None where there is none."""
+        program = self.program(equations=Equations(shift=True, spin=self.equations.spin))
+        found = program.solve()
+        return None if found.unmet > UNMET else bounds.first_order(program, found.prices).bound
 
     def rigorous(self, made: Schedule) -> float | None:
         """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""

@@ -11,18 +11,19 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from nutdamp import work
-from nutdamp.compliance import DAMPED_ANGLE
+from nutdamp.compliance import DAMPED_ANGLE, SAME_COST
 from nutdamp.errors import Infeasible
 from nutdamp.flight import Flight
 from nutdamp.limits import keeps_limits, shortest_on_time
 from nutdamp.schedule import TOUCHING, Schedule
-from nutdamp.schemes.optimal import candidates, residual_equations, starting_points
+from nutdamp.schemes.optimal import candidates, residual_equations, spin_only, starting_points
 from nutdamp.schemes.optimal.columns import Burn
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.other_ends import elsewhere, hastened
@@ -95,11 +96,20 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
     search = _Search(_before_it_fades(spacecraft), options)
-    if options.least == "time":
-        search = search.sooner()
-    elif options.least == "pulses":
-        return _fewest(search)
-    return search.schedule()
+    simple = list(spin_only.schedules(search.spacecraft, search.flown))
+    if simple and options.least == "pulses":
+        return search.with_bounds(search.preferred(simple))
+    try:
+        if options.least == "time":
+            made = search.sooner().schedule()
+        else:
+            made = _fewest(search) if options.least == "pulses" else search.schedule()
+    except Infeasible:
+        if not simple:
+            raise
+        return search.with_bounds(search.preferred(simple))
+    best = search.preferred([made, *simple])
+    return made if best is made else search.with_bounds(best)
 
 
 def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
@@ -160,6 +170,17 @@ class _Search(Problem):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)
         return _Search(self.within(high), self.options)
+
+    def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
+        """Of schedules that all do what is required that with least of what is to be saved.
+
+        Of those that take as much within `SAME_COST` the fewest pulses, then the earlier end.
+        """
+        saved: dict[str, Callable[[Schedule], float]] = {"time": lambda one: one.end, "pulses": len}
+        spent = saved.get(self.options.least, self.price)
+        least = min(map(spent, schedules))
+        equal = [one for one in schedules if spent(one) <= least * (1.0 + SAME_COST)]
+        return min(equal, key=lambda one: (len(one), one.end))
 
     def found(self) -> bool:
         """Whether a schedule is found with this very horizon."""

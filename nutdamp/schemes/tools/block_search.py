@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import islice
 from typing import NamedTuple
 
@@ -24,6 +25,12 @@ FLOWN = 12
 
 GENTLE = 10
 """Times as many sequences of which these are those with the smallest pulses."""
+
+ALL_DELAYS = 16
+"""Delays up to which all are looked at, if there are no more."""
+
+ALL_BLOCKS, ALL_FIRSTS = 400, 300
+"""Blocks after one wait up to which all are looked at, and the cheapest of them behind which others are."""
 
 AROUND = (0, 1)
 """Steps of the delay that are looked at, from the one below the best delay."""
@@ -48,6 +55,9 @@ FIRST = 24
 
 BLOCKS = 3
 """Blocks of a schedule, at most."""
+
+DOUBTFUL = 1.5
+"""Share of a bound up to which the closed form may err, so that a flight has to tell whether it is kept."""
 
 SURELY = 3.0
 """Times its error by which the length of a block that ends at the target differs from the way there, at most."""
@@ -80,6 +90,8 @@ class BlockSearch:
         self.model = BlockModel(spacecraft)
         self.bounds = [self._lowered(bound) for bound in compliance.bounds(spacecraft)]
         self.looked = 0
+        self.most = math.inf  # what a sequence may cost
+        self.doubtful: list[Found] = []  # those that may comply in a flight, the cheapest first
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
         self.pause = math.ceil(limits.gap / self.model.turn)
@@ -88,7 +100,8 @@ class BlockSearch:
 
     def _lowered(self, bound: compliance.Bound) -> compliance.Bound:
         """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
-        if bound.part is not Part.NUTATION or self.body.goal.axis is not None:
+        goal = self.body.goal
+        if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
             return bound
         return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
@@ -98,15 +111,20 @@ class BlockSearch:
         found = self._single(start)
         firsts: list[Found] = []
         for number in range(2, most + 1):
-            if min((one.rank for one in found), default=(1.0,))[0] <= 0.0 or work.exhausted():
+            self.most = min((one.rank[1] for one in found if one.rank[0] <= 0.0), default=math.inf)
+            if work.exhausted() or (self.most < math.inf and not self.small):
                 break
             if number == 2:
                 small = self.behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
                 firsts = [*_promising(found, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
+                firsts += self._all_firsts(start) if self.small else []
             else:
                 firsts = _promising(firsts, FIRST // 2)
+            firsts = [one for one in firsts if one.rank[1] < self.most]
             firsts = [more for first in firsts for more in self.behind(first, self._rest(first), few=4)]
             found += firsts
+        self.most = math.inf
+        self.doubtful = sorted((one for one in found if one.share <= DOUBTFUL), key=lambda one: one.rank[1:])
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
         ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
@@ -145,10 +163,12 @@ class BlockSearch:
             over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
             over = over | self._dark(before.state, channel, trial, state) | self._longer_round(before.state, state)
             over = over if tank is None else over | (state.used > tank.propellant)
-            severity = np.where(np.isnan(severity) | over, np.inf, severity)
             cost = np.broadcast_to(state.cost, shape)
+            severity = np.where(np.isnan(severity) | over | (cost >= self.most), np.inf, severity)
             failed = np.where(severity <= 1.0, 0.0, severity).ravel()
+            doubted = np.where(severity <= DOUBTFUL, 0.0, severity).ravel()
             chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
+            chosen += [*np.lexsort((cost.ravel(), doubted))[:few]]
             for index in dict.fromkeys(chosen):
                 if math.isfinite(failed[index]):
                     at = np.unravel_index(index, shape)
@@ -201,11 +221,15 @@ class BlockSearch:
     def _short_by(self, state: State, channel: Channel, every: int) -> Array:
         """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
 
-        With a target the length of the rhumb line: a block that is longer or shorter than the way ends no nearer than
-        a third of the difference. Without one the nutation, which they can lower by the sum of their kicks at most.
+        Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
+        shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
+        the sum of their kicks at most.
         """
         widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
         bounds = {bound.part: bound.most for bound in self.bounds}
+        if self.body.goal.spin is not None:
+            gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
+            return np.asarray(np.abs(self.body.goal.spin - self.body.spin - gained) / bounds[Part.SPIN])
         if self.body.goal.axis is None:
             trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
             kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
@@ -227,6 +251,9 @@ class BlockSearch:
     def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
         """Blocks that go the rest of the way, or take the nutation that is left."""
         state, least = before.state, self.pause if before.blocks else self.earliest
+        if self.small:
+            yield from self._grid(state, least)
+            return
         _, way = self.model.course(state)
         for channel in self.channels:
             widths = evenly(commandable_widths(self.commands, channel), MOST_WIDTHS)
@@ -261,6 +288,38 @@ class BlockSearch:
                     for wait in self._waits(start.state, self.earliest, 1):
                         trial = Trial(wait, delay, width, count, every)
                         yield from self.behind(start, iter([(channel, trial)]), few=1)
+
+    @cached_property
+    def small(self) -> bool:
+        """Whether there are so few blocks that all are looked at."""
+        widths = sum(len(commandable_widths(self.commands, one)) for one in self.channels)
+        return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
+
+    @property
+    def _delays(self) -> Array:
+        """All delays that can be commanded."""
+        most = round(float(self.commanded(np.array(math.inf))) / self.commands.delay_step)
+        return np.arange(most + 1) * self.commands.delay_step
+
+    @property
+    def _all_counts(self) -> NDArray[np.int64]:
+        return np.arange(1, min(self.commands.max_count, self.allowed) + 1)
+
+    def _grid(self, state: State, least: int) -> Iterator[tuple[Channel, Trial]]:
+        """All blocks of each channel, from ``least`` Sun pulses on: by wait, delay, width and number of pulses."""
+        waits = np.array(self._waits(state, least, LATER_WAITS))[:, None, None, None]
+        for channel in self.channels:
+            widths = commandable_widths(self.commands, channel)[:, None]
+            parts = waits, self._delays[:, None, None], widths, self._all_counts
+            shape = np.broadcast_shapes(*map(np.shape, parts))
+            wait, delay, width, count = (np.broadcast_to(part, shape) for part in parts)
+            for every in filter(self._spaced, self.commands.every):
+                yield channel, Trial(wait, delay, width, count, every)
+
+    def _all_firsts(self, start: Found) -> list[Found]:
+        """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
+        found = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
+        return sorted(found, key=lambda one: one.rank[1])[:ALL_FIRSTS]
 
     def _waits(self, state: State, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
@@ -305,16 +364,18 @@ class BlockSearch:
             chosen.append(self.model.damping_delay(state, channel, Trial(wait, 0.0, widths, counts, every)))
         if not chosen:
             chosen.append(np.zeros(widths.shape))
-        steps = np.concatenate(
-            [np.floor(delay / self.commands.delay_step)[..., None] + AROUND for delay in chosen], axis=-1
-        )
-        delay = self.commanded(steps * self.commands.delay_step)
+        if len(self._delays) <= ALL_DELAYS:
+            delay = np.broadcast_to(self._delays, (*widths.shape, len(self._delays)))
+        else:  # and none at all: what is best just before a Sun pulse
+            near = [np.floor(delay / self.commands.delay_step)[..., None] + AROUND for delay in chosen]
+            steps = np.concatenate([*near, np.zeros((*widths.shape, 1))], axis=-1)
+            delay = self.commanded(steps * self.commands.delay_step)
         return Trial(wait, delay, widths[..., None], counts[..., None], every)
 
     def commanded(self, delay: Array) -> Array:
-        """The nearest delay that can be commanded."""
-        step = self.commands.delay_step
-        most = math.floor(self.commands.delay_max / step * (1.0 + 1e-12))
+        """The nearest delay that can be commanded, of those within a spin turn."""
+        step, longest = self.commands.delay_step, min(self.commands.delay_max, self.model.turn)
+        most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
 

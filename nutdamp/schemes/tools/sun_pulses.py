@@ -29,8 +29,11 @@ ITERATIONS = 60
 EXACT = 1e-13
 """Share of a spin turn to which it is found."""
 
-FIRED = 1.0
-"""Units of `work` of a pulse that is fired."""
+BLIND = 100
+"""Spin turns in a row without a Sun pulse, after which none is waited for."""
+
+FIRED, INTEGRATED = 1.0, 40.0
+"""Units of `work` of a pulse that is fired, of a symmetric body and of one whose motion is integrated."""
 
 
 def spin_turn(spacecraft: Spacecraft) -> float:
@@ -44,9 +47,9 @@ def spin_turn(spacecraft: Spacecraft) -> float:
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
-    """The times (n,) s from 0 to ``until`` s at which the Sun passes the sensor; the flight must reach so far.
+    """The times (n,) s from 0 to ``until`` s of the Sun pulses that the sensor gives; the flight must reach so far.
 
-    Raises Infeasible where the sensor does not see the Sun then.
+    Raises Infeasible where the sensor never sees the Sun.
     """
     body = flown.spacecraft
     sensor, turn = body.sun_sensor, spin_turn(body)
@@ -63,9 +66,11 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
         if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
     found = found[(found >= 0.0) & (found <= until)]
-    for time, angle in zip(found.tolist(), attitude.angle_between(flown.axis(found), body.sun).tolist(), strict=True):
-        _expect_seen(sensor, time, angle)
-    return found
+    angles = attitude.angle_between(flown.axis(found), body.sun)
+    seen = np.array([sensor.sees(angle) for angle in angles.tolist()], dtype=bool)
+    if len(found) and not seen.any():
+        _expect_seen(sensor, float(found[0]), float(angles[0]))
+    return np.asarray(found[seen])
 
 
 def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
@@ -88,14 +93,45 @@ def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
     return np.asarray(math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi))
 
 
-def sun_pulse(spacecraft: Spacecraft, clock: SunClock, number: int) -> Stretch:
-    """The motion as a Sun pulse comes that the sensor sees; raises Infeasible where it sees none."""
-    before, found = float(clock.time[0]), clock.sun_pulse(number)
-    if clock.lost[0]:
-        raise Infeasible(f"no Sun pulse comes after {max(before, 0.0):.4g} s: the spin axis is too near to the Sun")
-    assert spacecraft.sun_sensor is not None
-    _expect_seen(spacecraft.sun_sensor, float(found.since[0]), float(clock.angle(found)[0]))
-    return found
+class SunPulses:
+    """The Sun pulses of a spacecraft as its sensor gives them, one after the other.
+
+    ``seen``: whether the sensor saw each passage of the Sun through its azimuth so far; those that it saw count. Raises
+    Infeasible where there is no Sun or no sensor.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.clock, self.seen, self._count = sun_clock(spacecraft), list[bool](), 0
+        assert spacecraft.sun_sensor is not None
+        self._sensor = spacecraft.sun_sensor
+
+    def next(self, number: int) -> Stretch:
+        """The motion as the Sun pulse of this ``number`` comes, 1 the first after t = 0; none goes back.
+
+        Raises Infeasible where there is none: the axis is too near to the Sun, or the sensor sees it no more.
+        """
+        found, sensor = self.clock.here, self._sensor
+        if sensor.half_width >= 0.5 * math.pi:  # it sees all of them
+            before, missed = float(self.clock.time[0]), number - len(self.seen)
+            self.seen += [True] * missed
+            found = self.clock.sun_pulse(number)
+            self._expect_found(before)
+            return found
+        blind = 0
+        while self._count < number:
+            before = float(self.clock.time[0])
+            found = self.clock.sun_pulse(len(self.seen) + 1)
+            self._expect_found(before)
+            angle = float(self.clock.angle(found)[0])
+            self.seen.append(bool(sensor.sees(angle)))
+            self._count, blind = self._count + self.seen[-1], 0 if self.seen[-1] else blind + 1
+            if blind > BLIND:
+                _expect_seen(sensor, float(found.since[0]), angle)
+        return found
+
+    def _expect_found(self, before: float) -> None:
+        if self.clock.lost[0]:
+            raise Infeasible(f"no Sun pulse comes after {max(before, 0.0):.4g} s: the spin axis is too near to the Sun")
 
 
 def sun_clock(spacecraft: Spacecraft) -> SunClock:
@@ -119,18 +155,24 @@ def pushes(pulse: Pulse, torque: Vector) -> list[Push]:
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
     """When the first Sun pulse comes, s; raises Infeasible where there is none."""
-    return float(sun_pulse(spacecraft, sun_clock(spacecraft), 1).since[0])
+    return float(SunPulses(spacecraft).next(1).since[0])
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
-    """The pulses that ``blocks`` fire, with the Sun pulses of the motion that they make.
+    """The pulses that ``blocks`` fire, see `fire`."""
+    return fire(spacecraft, blocks, seed)[0]
+
+
+def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> tuple[Schedule, list[bool]]:
+    """The pulses that ``blocks`` fire, with the Sun pulses of the motion that they make, and `SunPulses.seen`.
 
     With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. Raises Infeasible
     where there is no Sun pulse, where a channel is not known, where a pulse would begin before the one before is over,
     and where the propellant does not last.
     """
     channels = {channel.name: channel for channel in spacecraft.channels}
-    clock, sensor, errors = sun_clock(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
+    sun_pulses, sensor, errors = SunPulses(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
+    clock = sun_pulses.clock
     jitter = 0.0 if seed is None or sensor is None else sensor.jitter
     supply, pulses, per_kg = Supply(spacecraft), list[Pulse](), shed(spacecraft)
     for block in blocks:
@@ -138,8 +180,8 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
         if channel is None:
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
         for number in block.sun_pulses:
-            work.spend(FIRED)
-            found, over = sun_pulse(spacecraft, clock, number), clock.over[0]
+            work.spend(FIRED if spacecraft.inertia.symmetric and not spacecraft.disturbances else INTEGRATED)
+            found, over = sun_pulses.next(number), clock.over[0]
             delay = found.since * 0.0 + jitter * errors.standard_normal() + block.delay
             due = float(found.since[0] + delay[0])
             if due < over - 1e-9:
@@ -150,4 +192,4 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
             start = float(clock.fire(found, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
             pulses.append(given.moved(start))
     supply.expect_to_last()
-    return Schedule(tuple(pulses), blocks=tuple(blocks))
+    return Schedule(tuple(pulses), blocks=tuple(blocks)), sun_pulses.seen
