@@ -266,6 +266,7 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     narrow = load(places.case("command-block-empty-widths.yaml"))
     assert narrow.commands is not None
     narrow = replace(narrow, commands=replace(narrow.commands, widths=narrow.commands.widths[::16], max_count=20))
+    narrow = replace(narrow, requirement=within(4.5))
     assert {pulse.channel for pulse in planned(narrow, ONE, met=False).pulses} == {"T1"}  # the other is left out
     cases = {
         "no keys": aimed(spinner(channels=cross(8.0)), 5.0, 0.0),
@@ -326,7 +327,7 @@ COARSE = read_spacecraft(
 def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float], horizon: float | None) -> None:
     """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°; others comply."""
     body = replace(COARSE, requirement=within(*most))
-    plan = planned(replace(body, limits=Limits(horizon=horizon or 1200.0)), ONE if key else None, met=not key)
+    plan = planned(replace(body, limits=Limits(horizon=horizon or 1200.0)), ONE, met=not key)
     cures = [note for note in plan.pulses.notes if note.startswith("to leave less: ")]
     assert plan.meets_requirement == (not key) == (not cures)
     if key:
