@@ -7,7 +7,6 @@ import math
 import re
 import subprocess
 import traceback
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
@@ -209,16 +208,6 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 20_000)
     monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
     return one
-
-
-def test_every_command_meets_every_scheme() -> None:
-    met: Counter[tuple[str, str]] = Counter()
-    for seed in range(SEEDS):
-        for arguments in commands(seed, spacecraft(np.random.default_rng(seed))):
-            met.update((arguments[0], part) for part in arguments if part in (*SCHEMES, "optimal"))
-    for name, least in {"plan": 24, "simulate": 3, "disperse": 2, "export": 2, "verify": 2, "report": 1}.items():
-        for scheme in (*SCHEMES, "optimal"):
-            assert met[name, scheme] >= least, (name, scheme)
 
 
 @pytest.mark.weekly

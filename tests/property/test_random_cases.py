@@ -1,4 +1,4 @@
-"""Random bodies, pulses and disturbances over many nutation periods: flights and closed forms against DOP853.
+"""Random bodies, pulses and disturbances over many nutation periods: flights against DOP853.
 
 The reference integrates Euler's equations and quaternions of many cases at once, each in units of its own inertial
 nutation period, restarted at every edge of every pulse.
@@ -17,7 +17,6 @@ from support.builders import pulse, spinner
 from support.cases import spread
 
 from nutdamp import flight
-from nutdamp.physics import forced, rates
 from nutdamp.schedule import Schedule
 from nutdamp.spacecraft import Disturbance, Spacecraft
 
@@ -91,29 +90,14 @@ def reference(cases: list[Case], periods: float) -> Array:
     return state
 
 
-def closed_form(body: Spacecraft, made: Schedule, time: float) -> Array | None:
-    """Impulse sum (17) with effective impulses, plus (24) from rest; None where (24) does not hold: ω3 changes."""
-    inertia, acting = body.inertia, body.disturbances
-    changing = body.spin_drift != 0.0 or (len(acting) > 0 and any(p.impulse[2] != 0.0 for p in made))
-    if changing or not inertia.symmetric:
-        return None
-    at, start, A, C = np.array([time]), complex(*body.omega0[:2]), inertia.A, inertia.C
-    moments, axial = np.array([one.t for one in made]), np.array([one.impulse[2] for one in made])
-    omega, spin = rates.impulse_sum(at, start, body.spin, A, C, moments, flight.effective_impulses(body, made), axial)
-    torques, turning = np.array([one.transverse for one in acting]), np.array([one.rate for one in acting])
-    omega = omega + forced.rotating_torques(at, 0.0, body.spin, A, C, torques, turning)
-    return np.array([omega[0].real, omega[0].imag, spin[0]])
-
-
 @spread(
-    ("seed", "count", "periods", "slimmest", "least"),
-    [*((1970 + n, 25, 10.0, 0.05, 5) for n in range(12)), *((2070 + n, 2, 100.0, 0.25, 0) for n in range(10))],
+    ("seed", "count", "periods", "slimmest"),
+    [*((1970 + n, 25, 10.0, 0.05) for n in range(12)), *((2070 + n, 2, 100.0, 0.25) for n in range(10))],
     quick=0,
     deep=0,
 )
-def test_random_cases(seed: int, count: int, periods: float, slimmest: float, least: int) -> None:
-    """Every flight agrees with the reference, and at least so many closed forms do."""
-    rng, compared = np.random.default_rng(seed), 0
+def test_random_cases(seed: int, count: int, periods: float, slimmest: float) -> None:
+    rng = np.random.default_rng(seed)
     cases = [draw(rng, periods, slimmest) for _ in range(count)]
     for (body, made), end in zip(cases, reference(cases, periods), strict=True):
         until, size = periods * body.inertial_period, float(np.linalg.norm(end[:3]))
@@ -121,8 +105,3 @@ def test_random_cases(seed: int, count: int, periods: float, slimmest: float, le
         assert np.linalg.norm(got - end[:3]) <= AGREEMENT * size
         q = end[3:] / np.linalg.norm(end[3:])  # |q - q'| is half the angle between two attitudes
         assert 2 * min(np.linalg.norm(turned - q), np.linalg.norm(turned + q)) <= AGREEMENT
-        closed = closed_form(body, made, until)
-        if closed is not None:
-            compared += 1
-            assert np.abs(closed - end[:3]).max() <= AGREEMENT * size
-    assert compared >= least

@@ -70,9 +70,6 @@ def turns(body: Spacecraft, *blocks: Block) -> np.ndarray:
     return np.array([float(model.left(state).aim), left_by(flight.flown(body, fired(body, blocks))).aim])
 
 
-# --- by an integrator that shares nothing ----------------------------------------------------------------------------
-
-
 def blocks_of(turn: float, late: float = 0.96) -> tuple[Block, Block]:
     """The first is still on when the next Sun pulse comes."""
     return Block("+1", 2, late * turn, 0.07 * turn, 4, 1), Block("-2", 9, 0.3 * turn, 0.02 * turn, 3, 2)
@@ -108,9 +105,6 @@ def test_where_no_sun_pulse_comes_the_reason_is_said() -> None:
     for key, body, count in (("cone", inside, 30), ("sensor", replace(inside, sun_sensor=None), 1), ("view", blind, 2)):
         with refused(Infeasible, f"blocks.no-sun-pulse-{key}"):
             fired(body, (Block("+1", 1, 0.1, 0.1, count),))
-
-
-# --- the closed form -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
@@ -157,9 +151,6 @@ def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
     assert float(corrected.aim) == pytest.approx(left.aim, abs=1e-9)
     assert float(corrected.nutation) == pytest.approx(left.nutation, rel=1e-9)
     assert float(corrected.spin) == pytest.approx(flown.settled.spin, rel=1e-12)
-
-
-# --- through valves, with cold nozzles, from a tank in blowdown ------------------------------------------------------
 
 
 @spread("valve", [SLOW, UNEVEN, Trapezoid(0.015, 0.005, 0.004, 0.02)], quick=1)

@@ -55,9 +55,6 @@ def a_turn(**limits: Any) -> Spacecraft:
     return replace(body, limits=replace(body.limits, **limits))
 
 
-# --- none is better --------------------------------------------------------------------------------------------------
-
-
 def scanned(body: Spacecraft) -> tuple[float, float]:
     """How good the best single block of the whole grid is in closed form: share of a bound used up, then cost.
 
@@ -183,9 +180,6 @@ def test_a_looser_requirement_is_met_as_well() -> None:
         assert plan.left.nutation < min(math.radians(most), body.nutation)
 
 
-# --- limits ----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.weekly
 @pytest.mark.parametrize("limits", [{"earliest": 60.0}, {"max_pulses": 30}, {"gap": 6.0}])
 def test_blocks_keep_the_limits(limits: dict[str, Any]) -> None:
@@ -252,9 +246,6 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
             nearest = min(nearest, *(reference.angle(axis, centre) for axis in axes))
             motion, now = path[-1], until
     assert nearest > keep.least - 1e-4
-
-
-# --- what is said ----------------------------------------------------------------------------------------------------
 
 
 def test_where_there_are_no_blocks_the_reason_is_said() -> None:

@@ -35,14 +35,13 @@ def floor(spacecraft: Spacecraft) -> float:
 def acquired(
     spacecraft: Spacecraft, scheme: str = "two-pulse", *, cones: int | None = None, by_reference: bool = True
 ) -> Schedule:
-    """What ends on the target without nutation, as flown and by the reference, and costs no less than the floor."""
+    """What ends on the target without nutation, as flown and by the reference."""
     plan = feasible_by(scheme, spacecraft, Options(cones=cones) if cones else None)
     assert len(plan.pulses) <= 2 or scheme != "two-pulse"
     assert max(left(plan).nutation, left(plan).axis_error) < 1e-9
     if by_reference:
         assert Outcome(spacecraft, plan.pulses).nutation < 1e-9
         assert off_target(spacecraft, plan.pulses) < 1e-9
-    assert plan.pulses.total_impulse >= floor(spacecraft) * (1 - 1e-2 * spacecraft.nutation - 1e-12)
     return plan.pulses
 
 
@@ -50,16 +49,10 @@ def acquired(
 @spread(("A", "C"), BODIES, quick=1)
 @spread(("tilt", "azimuth"), TARGETS, quick=12)
 def test_any_axis_from_any_nutation(tilt: float, azimuth: float, A: float, C: float, spin: float) -> None:
-    for degrees in (0.0, 5.0, 60.0):
-        acquired(aimed(spinner(A, C, spin, degrees), tilt, azimuth))
-
-
-@spread("degrees", [0.0, 1.0, 5.0, 20.0, 40.0, 60.0], quick=1)
-@spread("tilt", [0.5, 1.0, 5.0, 20.0, 60.0, 120.0], quick=3)
-def test_cost_is_never_below_the_floor(tilt: float, degrees: float) -> None:
-    for azimuth in (0.0, 45.0, 180.0, -100.0):
-        spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
-        assert acquired(spacecraft, by_reference=False).total_impulse >= floor(spacecraft) * (1 - 1e-12)
+    for degrees in (0.0, 1.0, 5.0, 20.0, 60.0):
+        spacecraft = aimed(spinner(A, C, spin, degrees), tilt, azimuth)
+        made = acquired(spacecraft, by_reference=degrees in (0.0, 5.0, 60.0))
+        assert made.total_impulse >= floor(spacecraft) * (1 - 1e-12)
 
 
 @pytest.mark.parametrize(("A", "C"), BODIES)
@@ -176,9 +169,6 @@ def test_ticks_leave_no_more_than_their_resolution() -> None:
     assert max(residual.nutation, residual.axis_error) < most
 
 
-# --- body-fixed ------------------------------------------------------------------------------------------------------
-
-
 @spread("spin", [3.0, -3.0], quick=1)
 @spread(("A", "C"), BODIES[:2], quick=1)
 @spread(("degrees", "tilt", "azimuth"), [(0.0, 5.0, 70.0), (5.0, 10.0, 45.0), (20.0, 40.0, -120.0)], quick=1)
@@ -246,9 +236,6 @@ def test_why_not() -> None:
     ]
     assert f"{math.degrees(math.atan(2.0 * 10.0 / 3.0 / 240.0)):.4g} deg at most" in infeasibility(plans[0])
     check_text("pointing.why-not", "\n".join(infeasibility(plan) for plan in plans))
-
-
-# --- bodies that are not as planned, and the geometry ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("moments", [(120.0, 110.0, 80.0), (80.0, 85.0, 120.0)], ids=["prolate", "oblate"])

@@ -33,8 +33,6 @@ from nutdamp.spacecraft import Goal, Limits, Vector
 
 BODY = spinner(channels=cross(8.0, max_on_time=2.0), limits=Limits(horizon=30.0))
 
-# --- a solver that fails ---------------------------------------------------------------------------------------------
-
 
 class Failing:
     """A solver that fails where ``fails`` says so: of the number of the call and the method."""
@@ -92,9 +90,6 @@ def test_a_solver_that_always_fails_leaves_other_schemes_and_a_plain_reason(monk
     assert made.pulses.bounds is not None
     assert made.pulses.bounds.first_order is None
     assert made.pulses.bounds.rigorous is not None
-
-
-# --- programs of its own ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -207,9 +202,6 @@ def test_the_solver_prints_nothing_whoever_used_it_before(caller: str) -> None:
         for script in (caller, caller + SOLVED_IN_SILENCE)
     )
     assert (both.stdout, both.stderr) == (of_the_caller.stdout, "")
-
-
-# --- what can be reached ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -166,9 +166,6 @@ def test_h_may_end_off_its_target_and_that_saves(body: Spacecraft, saved: float)
     assert free < kept
 
 
-# --- goals -----------------------------------------------------------------------------------------------------------
-
-
 def with_spin(body: Spacecraft, spin: float) -> Spacecraft:
     return replace(body, goal=Goal(None, spin))
 
@@ -230,9 +227,6 @@ def test_least_time_ends_sooner_and_nothing_ends_much_sooner() -> None:
 @pytest.mark.parametrize(("free", "pulses"), [(False, 2), (True, 1)])
 def test_least_pulses_fires_as_seldom_as_the_equations_allow(free: bool, pulses: int) -> None:
     assert len(flies(within(60.0, cross(40.0)), least="pulses", free_axis=free).pulses) == pulses
-
-
-# --- ticks, three moments --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
