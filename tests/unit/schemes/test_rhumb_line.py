@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from dataclasses import replace
@@ -63,6 +62,8 @@ def why_not(spacecraft: Spacecraft, **options: Any) -> str:
 def test_ends_on_the_target(per_turn: int, A: float, C: float, spin: float) -> None:
     for actuators in ({"channels": cross(60.0)}, {"steerable": Steerable(60.0)}, {}):
         train(aimed(spinner(A, C, spin, 0.0, **actuators), 12.0, 45.0), per_turn=per_turn)
+    ideal = still(A, C, 20.0, 100.0)  # comes down to the floor
+    assert 1.0 <= train(ideal).pulses.total_impulse / ideal.turning_impulse < 1.002
 
 
 @spread(
@@ -165,16 +166,11 @@ def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     assert any(f"the end is off by {off:.3g}°" in text and "without --on-time" in text for text in remarks(cut))
 
 
-def test_ideal_pulses_come_down_to_the_floor() -> None:
-    body = still(tilt=40.0, azimuth=100.0)
-    assert 1.0 <= train(body).pulses.total_impulse / body.turning_impulse < 1.002
-
-
 @spread("per_turn", [1, 2, 3], quick=1)
 def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
-    body = still(tilt=30.0, azimuth=45.0, channels=fan(3, 30.0))
+    body = still(tilt=20.0, azimuth=45.0, channels=fan(3, 30.0))
     made = feasible_by("rhumb-line", body, Options(per_turn=per_turn)).pulses
-    assert np.mean([two.t - one.t for one, two in itertools.pairwise(made)]) == pytest.approx(TURN / per_turn, rel=0.05)
+    assert np.mean(np.diff([one.t for one in made])) == pytest.approx(TURN / per_turn, rel=0.05)
     assert len({pulse.channel for pulse in made}) == per_turn
 
 

@@ -1,4 +1,4 @@
-"""What optimal tries beside its linear program: other horizons, ends and schemes, H kept, pulses side by side, short horizons."""
+"""What optimal tries beside its linear program: other horizons, ends and schemes, short horizons, divided pulses."""
 
 from __future__ import annotations
 
