@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,7 +206,7 @@ def at(name: str) -> Spacecraft:
     return load_spacecraft(case(f"{name}.yaml"))
 
 
-ODD = [{"max_on_time": 0.05}, {"min_on_time": 0.12, "max_on_time": 0.19}]
+ODD: list[dict[str, Any]] = [{"max_on_time": 0.05}, {"min_on_time": 0.12, "max_on_time": 0.19}]
 RUNS_AWAY = (
     channel("T0", 0.0, 0.07812199696304258, 0.0),
     channel("T1", 0.0017921515598551382, -0.004499826153832031, 0.00026736933327888593, min_on_time=0.0352),
@@ -253,7 +254,7 @@ ENDLESS = {
 }
 
 
-@pytest.mark.parametrize(("scheme", "body", "feasible"), ENDLESS.values(), ids=ENDLESS)
+@spread(("scheme", "body", "feasible"), ENDLESS.values(), quick=4, deep=99, ids=ENDLESS)
 def test_what_was_searched_for_ever_is_planned_or_declined(
     scheme: str, body: Spacecraft, feasible: bool | None
 ) -> None:

@@ -64,15 +64,15 @@ def reference(cases: list[Case], periods: float) -> Array:
         for column, one in enumerate(body.disturbances):
             strength[row, column], turn[row, column], axial[row, column] = one.transverse, 1j * one.rate, one.axial
     state = np.array([[*body.omega0, *body.initial.quaternion] for body, _ in cases])
-    fired = [(row, one) for row, (_, made) in enumerate(cases) for one in made]
-    knots = sorted({0.0, periods, *(time / units[row] for row, one in fired for time in (one.start, one.end))})
+    fired = [(row, fire) for row, (_, made) in enumerate(cases) for fire in made]
+    knots = sorted({0.0, periods, *(time / units[row] for row, fire in fired for time in (fire.start, fire.end))})
     for now, end in itertools.pairwise(knots):
         pushes = np.zeros((len(cases), 3))
-        for row, one in fired:
-            if one.on_time == 0.0 and one.t / units[row] == now:
-                state[row, :3] += one.impulse / moments[row]
-            if one.torque is not None and one.start / units[row] < 0.5 * (now + end) < one.end / units[row]:
-                pushes[row] += one.torque
+        for row, fire in fired:
+            if fire.on_time == 0.0 and fire.t / units[row] == now:
+                state[row, :3] += fire.impulse / moments[row]
+            if fire.torque is not None and fire.start / units[row] < 0.5 * (now + end) < fire.end / units[row]:
+                pushes[row] += fire.torque
 
         def slope(t: float, flat: Array, pushes: Array = pushes) -> Array:
             w, q = np.split(flat.reshape(len(cases), 7), [3], axis=1)

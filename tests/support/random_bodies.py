@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from support.builders import channel, fan, spinner
@@ -24,8 +25,8 @@ def random_channels(rng: np.random.Generator, needed: float, period: float) -> t
         torque = size * math.cos(angle), size * math.sin(angle), size * float(rng.choice([0.0] * 3 + [0.05, -0.2, 1.5]))
         shortest = period * power(rng, -4.0, -1.0) if rng.random() < 0.5 else 0.0
         longest = shortest + period * power(rng, -3.0, 0.0) if rng.random() < 0.5 else math.inf
-        jet = {"isp": 220.0 if rng.random() < 0.5 else None, "thrust": 1.0}
-        times = {"min_on_time": shortest, "max_on_time": longest}
+        jet: dict[str, Any] = {"isp": 220.0 if rng.random() < 0.5 else None, "thrust": 1.0}
+        times: dict[str, Any] = {"min_on_time": shortest, "max_on_time": longest}
         made.append(channel(f"T{index}", *torque, **times, **jet, force=(0.0, 0.0, 1.0)))
     return tuple(made)
 

@@ -214,9 +214,9 @@ def missed(body: Spacecraft, made: Schedule) -> float:
     for pulse in made:
         jet = named(body, pulse.channel)
         assert isinstance(jet.valve, Trapezoid)
-        times = {"opening": jet.valve.open_delay, "closing": jet.valve.close_delay}
-        ramps = {"rise": jet.valve.rise_time, "fall": jet.valve.fall_time}
-        swells += reference.through_valve(*pulse.loaded, jet.torque, **times, **ramps)
+        times: dict[str, Any] = {"opening": jet.valve.open_delay, "closing": jet.valve.close_delay}
+        ramps: dict[str, Any] = {"rise": jet.valve.rise_time, "fall": jet.valve.fall_time}
+        swells += reference.through_valve(pulse.loaded[0], pulse.loaded[1], jet.torque, **times, **ramps)
     moments, start = body.inertia.moments, attitude.matrix(body.initial.quaternion)
     motion = reference.fly(moments, body.omega0, swells, made.end + 0.1, start)
     return reference.angle(reference.momentum(moments, motion), body.target_axis)
@@ -337,7 +337,7 @@ def test_what_was_fired_before_counts_in_the_search_and_in_the_flight() -> None:
 
 
 @pytest.mark.parametrize("feed", [{}, {"tank": None}, {"cold": None}], ids=["both", "cold", "tank"])
-def test_the_number_of_weak_pulses_worth_so_many_full_ones_is_found(feed: dict[str, None]) -> None:
+def test_the_number_of_weak_pulses_worth_so_many_full_ones_is_found(feed: dict[str, Any]) -> None:
     model, jet, widths, counts = BlockModel(replace(FED, **feed)), FED.channels[0], np.array([0.3]), np.arange(1, 60)
     full, _ = model.full_pulses(model.start, jet, widths, counts)
     assert float(counts[-1] - full[-1]) > 1.0

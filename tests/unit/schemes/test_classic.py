@@ -28,7 +28,7 @@ NANODEGREE = math.radians(1e-9)
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 10.0)]
 SPINS = [3.0, -3.0]
 SPHERE = (100.0, 100.0)
-each_body = pytest.mark.parametrize(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS])
+each_body = spread(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=4, deep=4)
 each_shape = pytest.mark.parametrize(("A", "C", "spin"), [(*body, s) for body in [*BODIES, SPHERE] for s in SPINS])
 
 
@@ -36,9 +36,12 @@ def check_exact(spacecraft: Spacecraft, scheme: str, count: int, *, by_reference
     """No nutation is left, and of two pulses no shift of H, flown and by the reference integrator."""
     plan = feasible_by(scheme, spacecraft)
     assert len(plan.pulses) == count
-    for end in (left(plan), *([Outcome(spacecraft, plan.pulses)] if by_reference else [])):
-        assert end.nutation < NANODEGREE
-        assert count != 2 or (end.shift if isinstance(end, Outcome) else end.momentum_shift) < NANODEGREE
+    ends = [(left(plan).nutation, left(plan).momentum_shift)]
+    if by_reference:
+        outcome = Outcome(spacecraft, plan.pulses)
+        ends.append((outcome.nutation, outcome.shift))
+    assert max(nutation for nutation, _ in ends) < NANODEGREE
+    assert count != 2 or max(shift for _, shift in ends) < NANODEGREE
     return plan
 
 
@@ -63,9 +66,9 @@ def why_not(*cases: tuple[str, Spacecraft] | tuple[str, Spacecraft, Options]) ->
 
 def test_what_cannot_be_has_a_reason() -> None:
     axial = channel("spin-up", 1.0, 0.0, 5.0)
-    soon, narrow = {"limits": Limits(horizon=0.5)}, cross(5.0, min_on_time=0.1, max_on_time=0.5)
-    early = {"channels": cross(20.0), "limits": Limits(earliest=1e6)}
-    first = [spinner(channels=cross(20.0, min_on_time=least)[:1], **soon) for least in (0.02, 0.0)]
+    soon, narrow = Limits(horizon=0.5), cross(5.0, min_on_time=0.1, max_on_time=0.5)
+    early: dict[str, Any] = {"channels": cross(20.0), "limits": Limits(earliest=1e6)}
+    first = [spinner(channels=cross(20.0, min_on_time=least)[:1], limits=soon) for least in (0.02, 0.0)]
     check_text(
         "classic.why-not",
         why_not(
@@ -207,7 +210,7 @@ def test_one_pulse_allowed_where_more_are_needed_does_what_one_can() -> None:
 
 
 @pytest.mark.parametrize("spin", SPINS)
-@pytest.mark.parametrize("a", [round(0.1 * tenth, 1) for tenth in range(-9, 10)])
+@spread("a", [round(0.1 * tenth, 1) for tenth in range(-9, 10)], quick=7, deep=12)
 def test_two_ideal_pulses_are_exact_at_every_angle_for_the_impulse_of_the_floor(a: float, spin: float) -> None:
     """Nutation and shift of H below 1e-9 deg by (17) for θ0 = 2…60°; Σ|J| = A|ω0| to 1e-12."""
     for degrees in (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0):
@@ -288,7 +291,7 @@ def test_on_times_too_short_leave_a_remainder_and_say_so() -> None:
     check_text("classic.too-short", "\n".join(remarks(plan)))
 
 
-@pytest.mark.parametrize("channels", [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)], ids=["3", "5", "±1±2"])
+@spread("channels", [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)], deep=2, ids=["3", "5", "±1±2"])
 def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(channels: tuple[Channel, ...]) -> None:
     """With three channels the cheapest pair saves 0.04 % and ends 2.4 s later than the first exact one."""
     spacecraft = spinner(channels=channels)

@@ -246,22 +246,28 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
     assert nearest > keep.least - 1e-4
 
 
+NARROW = load(places.case("command-block-empty-widths.yaml"))
+
+
+@pytest.mark.deep
+def test_a_channel_without_a_commandable_width_is_left_out() -> None:
+    assert NARROW.commands is not None
+    commands = replace(NARROW.commands, widths=NARROW.commands.widths[::16], max_count=20)
+    plan = planned(replace(NARROW, commands=commands, requirement=within(4.5)), ONE, met=False)
+    assert {pulse.channel for pulse in plan.pulses} == {"T1"}
+
+
 def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     """Of a sensor that loses the Sun on the way a longer horizon would be no cure."""
     body = a_turn()
     assert body.sun is not None
     ends = [float(attitude.angle_between(body.sun, axis)) for axis in (body.momentum, body.target_axis)]
     sensor = SunSensor(0.4, elevation=0.5 * math.pi - ends[0], half_width=0.3 * abs(ends[1] - ends[0]))
-    narrow = load(places.case("command-block-empty-widths.yaml"))
-    assert narrow.commands is not None
-    narrow = replace(narrow, commands=replace(narrow.commands, widths=narrow.commands.widths[::16], max_count=20))
-    narrow = replace(narrow, requirement=within(4.5))
-    assert {pulse.channel for pulse in planned(narrow, ONE, met=False).pulses} == {"T1"}  # the other is left out
     cases = {
         "no keys": aimed(spinner(channels=cross(8.0)), 5.0, 0.0),
         "out of view": replace(body, sun_sensor=sensor),
         "dark": a_turn(blackout=((0.0, 100_000.0),)),
-        "no widths": replace(narrow, channels=narrow.channels[1:]),
+        "no widths": replace(NARROW, channels=NARROW.channels[1:]),
     }
     plans = {name: planning.plan(each, "command-block") for name, each in cases.items()}
     assert all(plan.failure is None for plan in plans.values())
@@ -307,7 +313,7 @@ COARSE = read_spacecraft(
 
 @pytest.mark.parametrize(
     ("key", "most", "horizon"),
-    [deep("steps", (0.03, 0.01), None), ("time", (0.03, 0.01), 110.0), ("", (1.0, 2.0), None)],
+    [deep("steps", (0.03, 0.01), None), deep("time", (0.03, 0.01), 110.0), ("", (1.0, 2.0), None)],
 )
 def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float], horizon: float | None) -> None:
     """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°; others comply."""

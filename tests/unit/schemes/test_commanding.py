@@ -50,7 +50,7 @@ def through(valve: Valve | None, body: Spacecraft) -> Spacecraft:
 def short_pulses(degrees: float = 0.4, *, axial: float = 0.0) -> Spacecraft:
     """Pulses of about 50 ms across a body at 30 rpm."""
     torques = ((8.0, 0.0), (-8.0, 0.0), (0.0, 8.0), (0.0, -8.0))
-    jet = {"min_on_time": 0.005, "max_on_time": 0.05, "isp": 220.0, "thrust": 10.0}
+    jet: dict[str, Any] = {"min_on_time": 0.005, "max_on_time": 0.05, "isp": 220.0, "thrust": 10.0}
     channels = tuple(channel(f"C{number}", *torque, axial, **jet) for number, torque in enumerate(torques))
     return spinner(spin=math.pi, degrees=degrees, channels=channels, limits=Limits(horizon=200.0))
 
@@ -75,9 +75,9 @@ def levels(made: Schedule, body: Spacecraft) -> Iterable[reference.Swell]:
         valve = valves[pulse.channel]
         assert isinstance(valve, Trapezoid)
         assert pulse.torque is not None
-        times = {"opening": valve.open_delay, "closing": valve.close_delay}
-        ramps = {"rise": valve.rise_time, "fall": valve.fall_time}
-        yield from reference.through_valve(*pulse.loaded, pulse.torque, **times, **ramps)
+        times: dict[str, Any] = {"opening": valve.open_delay, "closing": valve.close_delay}
+        ramps: dict[str, Any] = {"rise": valve.rise_time, "fall": valve.fall_time}
+        yield from reference.through_valve(pulse.loaded[0], pulse.loaded[1], pulse.torque, **times, **ramps)
 
 
 def left(made: Schedule, body: Spacecraft) -> float:
@@ -221,6 +221,7 @@ def test_no_pulse_of_a_plan_is_without_thrust() -> None:
     assert all(pulse.magnitude > 0.0 for pulse in made.pulses)
 
 
+@pytest.mark.deep
 @spread("moments", [(123.0, 117.0, 80.0), (130.0, 110.0, 80.0), (95.0, 105.0, 150.0)], quick=1)
 @spread(("degrees", "on_time"), [(0.0, 0.03), (0.0, 0.04), (0.05, 0.03)], quick=1)
 def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
@@ -241,7 +242,7 @@ def said_of(made: Schedule) -> list[float]:
     return [float(time) for note in notes for time in re.findall(r"([0-9.]+) s", note)]
 
 
-@pytest.mark.parametrize("feed", [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}], ids=["cold", "tank"])
+@spread("feed", [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}], deep=1, ids=["cold", "tank"])
 def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str, Any]) -> None:
     made = planning.plan(replace(TO_TURN, **feed), "rhumb-line").pulses
     lengths = [pulse.loaded[1] for pulse in made]

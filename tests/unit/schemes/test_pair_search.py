@@ -68,7 +68,7 @@ def test_back_to_h_is_the_damping_without_drift(A: float, C: float) -> None:
 
 @spread("spin", [3.0, -3.0], quick=1)
 @spread(("A", "C"), BODIES[:3], quick=1)
-@spread("cones", [1, 3, 2, 5, 8], quick=3)
+@spread("cones", [1, 3, 2, 5, 8], quick=2, deep=1)
 def test_from_a_pure_spin_cones_cost_the_closed_form(cones: int, A: float, C: float, spin: float) -> None:
     """2n C|ω3| tan(β/2n) in n + 1 pulses, half an inertial turn of the small cone apart; two pulses are one of them."""
     for tilt in (0.1, 1.0, 30.0, 100.0):
@@ -140,7 +140,7 @@ def test_within_a_short_horizon_h_goes_beside_its_shortest_way_for_as_little_as_
 
 
 @pytest.mark.parametrize("degrees", [0.0, 5.0])
-@pytest.mark.parametrize(("A", "C"), BODIES[:3])
+@spread(("A", "C"), BODIES[:3], quick=1, deep=2)
 def test_real_widths_are_trimmed(degrees: float, A: float, C: float) -> None:
     for torque in (500.0, 80.0):
         body = aimed(spinner(A, C, degrees=degrees, steerable=Steerable(torque)), 8.0, 45.0)
@@ -148,7 +148,7 @@ def test_real_widths_are_trimmed(degrees: float, A: float, C: float) -> None:
     acquired(aimed(spinner(degrees=degrees, steerable=Steerable(60.0)), 15.0, 45.0), "half-cone")
 
 
-@pytest.mark.parametrize(
+@spread(
     "limits",
     [
         Limits(earliest=3.3),
@@ -158,6 +158,8 @@ def test_real_widths_are_trimmed(degrees: float, A: float, C: float) -> None:
         Limits(horizon=2.2),
         Limits(earliest=1.0, gap=0.4, blackout=((2.0, 4.0), (6.0, 6.5)), max_pulses=5),
     ],
+    quick=2,
+    deep=4,
     ids=["earliest", "blackout", "gap", "narrow gates", "short horizon", "cones"],
 )
 def test_limits_are_kept_and_the_end_stays_exact(limits: Limits) -> None:
@@ -198,12 +200,12 @@ def test_channels_of_cones_wait_for_their_phase(degrees: float, cones: int) -> N
     [
         # A target on the cone of the spin axis itself: a real pulse has two widths to trim.
         ("two-pulse", spinner(steerable=Steerable(100.0)), 5.0),
-        ("two-pulse", spinner(channels=cross(500.0)), 5.0),
+        deep("two-pulse", spinner(channels=cross(500.0)), 5.0),
         # On a sphere ω stands still in the body, but from a pure spin nothing has to be waited for.
-        ("two-pulse", spinner(100.0, 100.0, degrees=0.0, channels=cross(500.0)), 10.0),
+        deep("two-pulse", spinner(100.0, 100.0, degrees=0.0, channels=cross(500.0)), 10.0),
         # 8 N m take 5° of nutation out within half a body period; they turn H by next to nothing meanwhile.
         ("two-pulse", spinner(channels=cross(8.0)), 0.0),
-        ("two-pulse", spinner(channels=cross(8.0)), 0.5),
+        deep("two-pulse", spinner(channels=cross(8.0)), 0.5),
         # Or by 1.3° at most in one pulse: 5° of nutation are 21 N m s, and damped first.
         deep("half-cone", spinner(channels=cross(8.0, max_on_time=2.0)), 10.0),
     ],

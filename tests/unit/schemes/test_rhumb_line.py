@@ -35,7 +35,7 @@ def still(A: float = 120.0, C: float = 80.0, tilt: float = 20.0, azimuth: float 
 
 def train(spacecraft: Spacecraft, *, near: float = 1e-9, **options: Any) -> planning.Plan:
     """The plan, which by the reference ends on the target with equal pulses behind what damps the nutation."""
-    plan = feasible_by("rhumb-line", spacecraft, RhumbLineOptions(**options))
+    plan = feasible_by("rhumb-line", spacecraft, Options(**options))
     sizes = np.array([pulse.on_time or pulse.magnitude for pulse in equal(plan)])
     assert sizes == pytest.approx(sizes[:1].repeat(len(sizes)), rel=1e-12)
     assert Outcome(spacecraft, plan.pulses).nutation < near
@@ -78,7 +78,8 @@ def test_ends_on_the_target(per_turn: int, A: float, C: float, spin: float) -> N
         ),
         spinner(moments=(100.0, 116.0, 140.0), degrees=0.0, channels=cross(20.0), limits=Limits(horizon=400.0)),
     ],
-    quick=4,
+    quick=1,
+    deep=3,
     ids=["along", "first", "limits", "three moments"],
 )
 def test_a_nutation_limits_and_unequal_moments_are_no_hindrance(body: Spacecraft) -> None:
@@ -189,7 +190,7 @@ def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float
 
 def test_where_there_is_no_train_the_reason_is_said() -> None:
     """Where every pulse meets the nutation in the same phase, of too little time, and of lengths no pulse can have."""
-    short = {"channels": cross(60.0), "limits": Limits(horizon=60.0)}  # with time for 200 pulses C = 0.995 A closes too
+    short: dict[str, Any] = {"channels": cross(60.0), "limits": Limits(horizon=60.0)}  # in 400 s C = 0.995 A closes
     whole = [still(100.0, C, 10.0, **short) for C in (100.0, 99.5, 200.0, 199.0)]
     facing = still(tilt=50.0, channels=cross(60.0))
     reasons = [
@@ -235,7 +236,7 @@ def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
     check_text("rhumb.sun-phase", remarks(rhumb)[0])
 
 
-@pytest.mark.parametrize(("turns", "pulses", "torque", "fixed"), [(2, 2, 15, False), (3, 2, 15, True), (8, 6, 5, True)])
+@spread(("turns", "pulses", "torque", "fixed"), [(2, 2, 15, False), (3, 2, 15, True), (8, 6, 5, True)], deep=2)
 def test_in_a_short_horizon_pulses_are_long_but_less_than_half_a_turn(
     turns: int, pulses: int, torque: float, fixed: bool
 ) -> None:

@@ -58,7 +58,7 @@ def test_the_model_turns_at_the_true_nutation_rate() -> None:
     assert model_of(EXAMPLE).exact
 
 
-@pytest.mark.parametrize("moments", [(123.0, 117.0, 80.0), (80.0, 84.0, 120.0), (120.0, 100.0, 80.0)])
+@spread("moments", [(123.0, 117.0, 80.0), (80.0, 84.0, 120.0), (120.0, 100.0, 80.0)], quick=1, deep=2)
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse"])
 def test_unequal_moments_are_trimmed_away(moments: tuple[float, ...], scheme: str) -> None:
     for steerable in (False, True):
@@ -93,9 +93,10 @@ def test_dissipation_is_planned_for(moments: tuple[float, ...]) -> None:
     assert left(growing).nutation < NEARLY_NOTHING
 
 
-@pytest.mark.parametrize(
+@spread(
     "disturbance",
     [Disturbance(0.3 + 0.1j), Disturbance(0.2j, rate=-EXAMPLE.spin), Disturbance(0.05 + 0j, rate=2.0)],
+    deep=2,
     ids=["constant", "space-fixed", "turning"],
 )
 def test_with_disturbances_only_their_steady_tilt_is_left(disturbance: Disturbance) -> None:
@@ -140,11 +141,9 @@ def test_a_walk_goes_on_while_the_spin_drifts(spin: float) -> None:
     axial, jet = np.array([0.0, 0.0, 2.0]), channel("T", 8.0, 3.0, 0.0)
     drifting = replace(spinner(spin=spin, channels=(jet,)), disturbances=(Disturbance(0j, axial=2.0),))
     builder, pulse = ImpulseBuilder(drifting), channel_pulse(jet, 12.0, 0.5)
-    edges = [0.0, pulse.start, pulse.end, 30.0]
-    torques = [axial, axial + jet.torque, axial]
 
     def flown(end: float) -> complex:
-        pushes = [reference.Push(*edge, T) for *edge, T in zip(edges, edges[1:], torques, strict=False)]
+        pushes = [reference.Push(0.0, 30.0, axial), reference.Push(pulse.start, pulse.end, jet.torque)]
         return transverse(reference.fly(drifting.inertia.moments, drifting.omega0, pushes, end).rates)
 
     assert builder.omega_at(10.0) == pytest.approx(flown(10.0), rel=1e-10)

@@ -176,7 +176,9 @@ def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) ->
     still = replace(body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels))
     fixed = bounds.rigorous(still, prices(body), 1.0, Allowed(), shift=False)
     free = body.least_impulse / max(abs(one.transverse) / prices(body)[one.name] for one in body.channels)
-    for share in (0.0, 1.0, 100.0) if fixed is not None else ():  # where there is a solution for this layout
+    for share in (0.0, 1.0, 100.0):
+        if fixed is None:  # there is no solution for this layout
+            return
         assert free * (1.0 - TIGHT) <= proved(body, cost=share * fixed) <= fixed * (1.0 + TIGHT)
 
 
