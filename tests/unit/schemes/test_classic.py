@@ -377,7 +377,7 @@ def test_on_times_of_four_pulse() -> None:
         made = feasible_by("four-pulse", spinner(channels=cross(1.0, max_on_time=longest))).pulses
         assert made.pulses[0].on_time == pytest.approx(expected, rel=1e-15)
     for senseless in (0.0, -1.0, math.inf, math.nan):
-        with refused(SenselessOption, "classic.senseless"):
+        with refused(SenselessOption, f"classic.senseless{senseless:g}"):
             FourPulseOptions(on_time=senseless)
     body = spinner(degrees=1.0, channels=cross(100.0))
     too_long, useful = (Options(on_time=share * body.least_impulse / 100.0, coarse=True) for share in (2.1, 1.9))
