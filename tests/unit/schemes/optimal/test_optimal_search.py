@@ -1,20 +1,22 @@
-"""What optimal tries beside its linear program: other horizons, ends and schemes, H kept, pulses side by side."""
+"""What optimal tries beside its linear program: other horizons, ends and schemes, short horizons, divided pulses."""
 
 from __future__ import annotations
 
+import csv
 import itertools
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from support import places
-from support.builders import aimed, cross, pulse, spinner
+from support.builders import Outcome, aimed, channel, cross, fan, pulse, spinner
 from support.cases import deep, spread, weekly
 from support.checker import violations
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
-from support.places import case
+from support.places import CASES, case
 
 import nutdamp
 from nutdamp import work
@@ -22,16 +24,19 @@ from nutdamp.compliance import DAMPED_ANGLE, SAME_COST
 from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
 from nutdamp.planning import plan
 from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule
+from nutdamp.schedule import Schedule, channel_pulse
 from nutdamp.schemes import SCHEMES, Options, two_pulse
-from nutdamp.schemes.optimal import candidates, repair
+from nutdamp.schemes.optimal import candidates, repair, starting_points
 from nutdamp.schemes.optimal.columns import Burn
+from nutdamp.schemes.optimal.descent import Descent
 from nutdamp.schemes.optimal.problem import DEARER, Problem
+from nutdamp.schemes.optimal.residual_equations import Equations
 from nutdamp.schemes.optimal.search import HALVINGS, _Search
+from nutdamp.schemes.optimal.sequences import Task
 from nutdamp.schemes.options import OptimalOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.tools import least_squares
 from nutdamp.schemes.tools.reasons import bounded_by, no_channels
-from nutdamp.spacecraft import Goal, Limits
+from nutdamp.spacecraft import Goal, Limits, Spacecraft
 
 BODY = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
 """400 s are 128 inertial nutation periods, so that the horizon can be halved six times."""
@@ -40,22 +45,13 @@ NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
 PLAIN = OptimalOptions()
 
 
-@pytest.fixture
-def search() -> _Search:
-    return _Search(BODY, PLAIN)
-
-
-def pair() -> Schedule:
-    return two_pulse.schedule(BODY, TwoPulseOptions())
-
-
-def settle(monkeypatch: pytest.MonkeyPatch, made: dict[float, Schedule]) -> list[float]:
-    """Let the program lead to ``made`` within each horizon, else to nothing; the horizons that were looked at."""
+def settle(monkeypatch: pytest.MonkeyPatch, schedules: dict[float, Schedule]) -> list[float]:
+    """Let the program lead to ``schedules`` within each horizon, else to nothing; the horizons that were looked at."""
     tried: list[float] = []
 
     def settled(self: _Search, _: float) -> Schedule | None:
         tried.append(self.spacecraft.horizon)
-        return made.get(self.spacecraft.horizon)
+        return schedules.get(self.spacecraft.horizon)
 
     monkeypatch.setattr(_Search, "settled", settled)
     return tried
@@ -65,39 +61,30 @@ def dearer(made: Schedule, share: float) -> Schedule:
     return Schedule(tuple(replace(one, on_time=one.on_time * share, impulse=one.impulse * share) for one in made))
 
 
-def test_without_a_schedule_the_horizon_is_halved_down_to_a_period(
-    search: _Search, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.deep
+def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or_is_dear(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tried = settle(monkeypatch, {})
-    search.programmed(search.program().solve())
+    """Halved down to a period; where what is found is dear, three times or until one is not."""
+    search, pair = _Search(BODY, PLAIN), two_pulse.schedule(BODY, TwoPulseOptions())
+    first = search.program().solve()
+    for known in ({400.0: dearer(pair, 2.0)}, {}):
+        tried = settle(monkeypatch, known)
+        made = search.programmed(first)
+        assert made is not None
+        assert search.price(made) <= search.price(pair) * (1.0 + 1e-9)  # another scheme was the start
     halves = int(math.log2(400.0 / BODY.inertial_period))
     assert tried == [400.0 * 0.5**turn for turn in range(halves + 1)]
     assert halves > HALVINGS
-
-
-def test_a_dear_schedule_has_three_shorter_horizons_looked_at_or_as_many_as_lead_to_one_that_is_not(
-    search: _Search, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = search.program().solve()
     monkeypatch.setattr(_Search, "others", lambda *_: None)
-    dear = {400.0 * 0.5**turn: dearer(pair(), 3.0 - 0.1 * turn) for turn in range(7)}
+    dear = {400.0 * 0.5**turn: dearer(pair, 3.0 - 0.1 * turn) for turn in range(7)}
     tried = settle(monkeypatch, dear)
     assert search.programmed(first) is dear[50.0]
     assert tried == [400.0, 200.0, 100.0, 50.0]
-    cheap = dearer(pair(), (1.0 + 0.5 * DEARER) * first.cost / search.price(pair()))
+    cheap = dearer(pair, (1.0 + 0.5 * DEARER) * first.cost / search.price(pair))
     tried = settle(monkeypatch, {400.0: dearer(cheap, 2.0), 200.0: cheap})
     assert search.programmed(first) is cheap
     assert tried == [400.0, 200.0]
-
-
-@pytest.mark.parametrize("known", [deep(False), True], ids=["none", "dear"])
-def test_where_the_program_leads_nowhere_or_is_dear_other_schemes_are_starts(
-    search: _Search, monkeypatch: pytest.MonkeyPatch, known: bool
-) -> None:
-    settle(monkeypatch, {400.0: dearer(pair(), 2.0)} if known else {})
-    made = search.programmed(search.program().solve())
-    assert made is not None
-    assert search.price(made) <= search.price(pair()) * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize(("tick", "named"), [(None, False), (0.01, True)])
@@ -108,32 +95,24 @@ def test_ticks_are_among_the_limits_named_where_the_file_sets_them(tick: float |
         assert ("tick" in said) is named
 
 
-# Seconds of end that the schedules of equal cost have to leave: 80 % of the end of what the whole horizon gives.
-@spread(
-    ("name", "latest"), [("lunar-prospector", 19.0), ("magnus-a09", 12.0), ("single-thruster", 68.0)], quick=0, deep=1
+@pytest.mark.parametrize(
+    ("name", "latest"),
+    [deep("lunar-prospector", 19.0), weekly("magnus-a09", 12.0), weekly("single-thruster", 68.0), deep("", math.inf)],
 )
 def test_an_earlier_end_costs_and_leaves_as_much_and_takes_no_more_pulses(name: str, latest: float) -> None:
-    body = nutdamp.load(places.CONFIGS / f"{name}.yaml")
-    made = plan(body, "optimal")
-    with as_found():
-        before = plan(body, "optimal")
-    assert made.flown is not None
-    assert before.flown is not None
-    assert made.end <= min(latest, 0.8 * before.end)
-    assert len(made) <= len(before)
-    assert made.pulses.cost <= before.pulses.cost * (1.0 + SAME_COST)
-    assert made.flown.nutation <= before.flown.nutation + DAMPED_ANGLE
-
-
-@pytest.mark.deep
-def test_the_example_takes_one_more_linear_program_and_no_more_flights() -> None:
-    body = nutdamp.example()
+    """80 % of the end of what the whole horizon gives; the example takes one more linear program and no flights."""
+    body = nutdamp.load(places.CONFIGS / f"{name}.yaml") if name else nutdamp.example()
     with work.budget("with", 1e9) as spent:
         made = plan(body, "optimal")
     with as_found(), work.budget("without", 1e9) as without:
         before = plan(body, "optimal")
-    assert made.end == before.end
-    assert spent.done - without.done < 6.0
+    assert made.flown is not None
+    assert before.flown is not None
+    assert made.end <= min(latest, 0.8 * before.end) if name else made.end == before.end
+    assert name or spent.done - without.done < 6.0
+    assert len(made) <= len(before)
+    assert made.pulses.cost <= before.pulses.cost * (1.0 + SAME_COST)
+    assert made.flown.nutation <= before.flown.nutation + DAMPED_ANGLE
 
 
 @pytest.mark.weekly
@@ -148,40 +127,9 @@ def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
 def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
     body = aimed(spinner(channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)), 60, 10)
     sunny = replace(body, goal=replace(body.goal, sun=np.array([1.0, 0.0, 0.0])))
-    pairs = zip(*(candidates.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True)
-    for one, other in pairs:
+    for one, other in zip(*(candidates.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
         assert [pulse.t for pulse in one] == [pulse.t for pulse in other]
         assert violations(body, one) == []
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize(
-    ("seed", "shift"),
-    [(9, math.inf), *(weekly(seed, math.inf) for seed in (1, *range(10, 40))), weekly(14, 1.0), weekly(0, 0.05)],
-)
-def test_more_freedom_never_costs_more(seed: int, shift: float) -> None:
-    """The search alone was up to 0.7 % dearer with it; of what ends earlier that counts as equal which is."""
-    body = random_layout(seed)
-    freedom = {"free_axis": True} if math.isinf(shift) else {"shift": math.radians(shift)}
-    with as_found():
-        kept, free = flies(body, left=1e-5), flies(body, left=1e-5, **freedom)
-    assert free.pulses.cost <= kept.pulses.cost * (1.0 + 1e-6)
-    earlier = plan(body, "optimal", Options(**freedom))
-    assert earlier.pulses.cost <= kept.pulses.cost * (1.0 + SAME_COST)
-
-
-@pytest.mark.deep
-def test_what_the_gap_forbids_is_not_told_as_rounding() -> None:
-    """Two pulses that left 4.47° of 5° were called feasible, where four-pulse leaves 2.16°."""
-    made = plan(load_spacecraft(case("optimal-tick.yaml")), "optimal")
-    assert made.schedule is None
-    check_text("plan.gap-forbids", infeasibility(made))
-
-
-def pauses(made: Schedule) -> list[float]:
-    """Times in s for which a channel is off between two of its pulses."""
-    each = ([pulse for pulse in made if pulse.channel == name] for name in {pulse.channel for pulse in made})
-    return [after.start - before.end for pulses in each for before, after in itertools.pairwise(pulses)]
 
 
 @pytest.mark.deep
@@ -197,9 +145,10 @@ def pauses(made: Schedule) -> list[float]:
 def test_several_short_pulses_in_each_half_turn_damp(degrees: int, changed: str, most: float) -> None:
     """Pulses of 0.2 s, where 0.4 s are needed in each half turn of 8 deg: one at a time leaves 4 of them."""
     body = read_spacecraft(NOTHING_DAMPS.replace("8 deg", f"{degrees} deg") + changed, "nothing-damps.yaml")
-    made = flies(body, left=1e-4 if body.limits.tick else 1e-8, dearest=most)
-    shortest = max(channel.min_on_time for channel in body.channels)
-    assert min(pauses(made.pulses)) > max(0.9 * shortest, body.limits.gap - 1e-9)
+    made = flies(body, left=1e-4 if body.limits.tick else 1e-8, dearest=most).pulses
+    each = ([one for one in made if one.channel == name] for name in {one.channel for one in made})
+    pauses = [after.start - before.end for pulses in each for before, after in itertools.pairwise(pulses)]
+    assert min(pauses) > max(0.9 * max(one.min_on_time for one in body.channels), body.limits.gap - 1e-9)
     assert plan(body, "four-pulse").severity > math.radians(degrees - 4.2)
 
 
@@ -219,13 +168,6 @@ def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: floa
 
 
 @pytest.mark.deep
-def test_what_no_pulses_can_do_is_said() -> None:
-    """At 25 deg the channels cannot do it at all: divided pulses are no way round the program."""
-    far = read_spacecraft(NOTHING_DAMPS.replace("8 deg", "25 deg"), "nothing-damps.yaml")
-    made = plan(replace(far, limits=Limits(max_pulses=20)), "optimal")
-    check_text("plan.no-pulses-can", infeasibility(made))
-
-
 def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> None:
     body = random_layout(153)
     search = _Search(body, PLAIN)
@@ -262,12 +204,166 @@ def test_the_last_pulses_are_corrected_and_for_a_spin_the_one_that_gives_most_to
     assert chosen == [corrected]
 
 
-def test_a_channel_whose_pulses_are_too_short_is_left_out() -> None:
-    """One of 1 µs at most beside one without a limit: the search goes on with that; alone, its limit is named."""
+@pytest.mark.deep
+def test_what_is_not_to_be_had_is_said() -> None:
+    """What the gap forbids is not told as rounding: two pulses that left 4.47° of 5°, where four-pulse leaves 2.16°.
+
+    At 25 deg channels cannot do it at all: divided pulses are no way round the program. And one of 1 µs at most is left
+    out beside one without a limit; alone, its limit is named.
+    """
+    made = plan(load_spacecraft(case("optimal-tick.yaml")), "optimal")
+    assert made.schedule is None
+    check_text("plan.gap-forbids", infeasibility(made))
+    far = read_spacecraft(NOTHING_DAMPS.replace("8 deg", "25 deg"), "nothing-damps.yaml")
+    check_text("plan.no-pulses-can", infeasibility(plan(replace(far, limits=Limits(max_pulses=20)), "optimal")))
     body = load_spacecraft(case("optimal-longer-than-inf.yaml"))
     made = plan(body, "optimal")
-    assert made.feasible
     assert {pulse.channel for pulse in made.pulses} == {"T1"}
     assert made.pulses.bounds is not None
-    alone = plan(replace(body, channels=body.channels[1:]), "optimal")
-    check_text("optimal.too-short", infeasibility(alone))
+    check_text("optimal.too-short", infeasibility(plan(replace(body, channels=body.channels[1:]), "optimal")))
+
+
+EXACT = 1e-8
+"""Degrees that a schedule of strong thrusters leaves at most."""
+
+
+def strong(degrees: float = 20.0, horizon: float = 2.0, **limits: Any) -> Spacecraft:
+    """Five directions that do all there is to do within milliseconds, in less than one inertial period."""
+    return spinner(degrees=degrees, channels=fan(5, 2e4), limits=Limits(horizon=horizon, **limits))
+
+
+def task_of(spacecraft: Spacecraft, equations: Equations | None = None) -> Task:
+    costs = np.array([np.linalg.norm(one.torque) for one in spacecraft.channels])
+    return Task(spacecraft, equations or Equations(), spacecraft.channels, costs)
+
+
+@pytest.mark.deep
+@spread("name", sorted(path.stem for path in CASES.glob("optimal-beaten-*.csv")), quick=1, deep=0)
+def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
+    check_not_beaten(name, 1.001)
+
+
+@pytest.mark.deep
+def test_pulses_of_two_channels_may_stand_side_by_side() -> None:
+    check_not_beaten("optimal-not-found", 1.0, free_axis=True)
+
+
+def check_not_beaten(name: str, most: float, **options: Any) -> None:
+    """By the schedule beside the file."""
+    with case(f"{name}.csv").open(encoding="utf-8") as stream:
+        impulses = [[float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)] for row in csv.DictReader(stream)]
+    known = math.fsum(math.hypot(*impulse) for impulse in impulses)
+    assert flies(load_spacecraft(case(f"{name}.yaml")), left=EXACT, **options).pulses.total_impulse <= most * known
+
+
+@pytest.mark.deep
+@spread("rpm", [31.0, 31.5, 32.0], quick=1, deep=0)
+def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
+    body = load_spacecraft(case("spin-up.yaml"))
+    flies(replace(body, goal=Goal(spin=rpm * math.pi / 30.0)), left=EXACT, dearest=1.01)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        deep(strong(gap=0.3, earliest=0.2)),
+        weekly(strong(horizon=2.5, blackout=((0.0, 0.3), (0.9, 1.4)))),
+        weekly(strong(horizon=2.5, max_pulses=3)),
+        weekly(strong(horizon=2.5, tick=1e-4)),
+    ],
+    ids=["gap", "blackout", "max_pulses", "tick"],
+)
+def test_every_limit_is_kept(body: Spacecraft) -> None:
+    flies(body, left=EXACT if body.limits.tick is None else 1.1 * math.degrees(0.5 * 1e-4 * 2e4 / (80.0 * 3.0)))
+
+
+@pytest.mark.weekly
+def test_on_times_are_none_or_at_least_the_least() -> None:
+    free = strong(5.0, 1.0)
+    made = plan(free, "optimal").pulses
+    least = 3.0 * min(pulse.on_time for pulse in made)
+    bounded = tuple(channel(one.name, *one.torque, min_on_time=least) for one in free.channels)
+    assert flies(replace(free, channels=bounded), left=EXACT).pulses.cost >= made.cost * (1.0 - 1e-6)
+
+
+@pytest.mark.deep
+def test_the_same_plan_every_time() -> None:
+    one, two = (starting_points.schedules(task_of(strong()))[0] for _ in range(2))
+    assert [(pulse.start, pulse.on_time) for pulse in one] == [(pulse.start, pulse.on_time) for pulse in two]
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize(("horizon", "count"), [(1.0, 2), (400.0, 40)])
+def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long the horizon, however many the channels: flights at a time are counted, not seconds."""
+    calls, flown = list[int](), Task.misses
+
+    def counted(self: Task, which: np.ndarray, x: np.ndarray, kicks: int) -> np.ndarray:
+        calls.append(len(x))
+        return flown(self, which, x, kicks)
+
+    monkeypatch.setattr(Task, "misses", counted)
+    starting_points.schedules(task_of(replace(strong(40.0, horizon), channels=fan(count, 2e4))))
+    assert 0 < len(calls) < 2000
+    assert sum(calls) < 400_000
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_misses_are_those_of_the_reference_integrator(seed: int) -> None:
+    body = replace(strong(30.0, 4.0), channels=cross(3e2))
+    task = task_of(body)
+    sequences, x = starting_points.random_starts(task, 4, 1, np.random.default_rng(seed))
+    which, (starts, on_times) = sequences.which[0].tolist(), np.split(x[0], 2)
+    fired = zip(which, starts, on_times, strict=True)
+    pulses = (channel_pulse(body.channels[one], start + 0.5 * on, on) for one, start, on in fired)
+    flown = Outcome(body, Schedule(tuple(pulses)))
+    momentum = np.asarray(body.inertia.moments) * flown.motion.rates
+    size, after = float(np.linalg.norm(body.momentum)), flown.motion.rotation @ momentum
+    misses = task.misses(sequences.which, x, 0)[0]
+    assert misses[:2] == pytest.approx(momentum[:2] / size, abs=1e-11)
+    assert np.linalg.norm(misses[2:]) == pytest.approx(np.linalg.norm(after[:2]) / size, abs=1e-11)
+    # Kicks close in on it as the square of their number; they end half a kick earlier, which turns ω in the body.
+    sizes = [np.linalg.norm(task.misses(sequences.which, x, kicks)[0].reshape(2, 2), axis=1) for kicks in (0, 4, 8, 16)]
+    away = [float(np.abs(one - sizes[0]).max()) for one in sizes[1:]]
+    assert away[0] / away[1] == pytest.approx(4.0, rel=0.2)
+    assert away[1] / away[2] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("starts", "runs", "looked_at", "tries"), [(24, 16, 2, 5), deep(64, 30, 8, 20)])
+def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
+    starts: int, runs: int, looked_at: int, tries: int
+) -> None:
+    task = task_of(strong(30.0, 3.0))
+    begun = starting_points.random_starts(task, 4, starts, np.random.default_rng(5))
+    rows, levels = task.bounds(begun.sequences)
+    descent = Descent(task, *begun, kicks=1)
+    for _ in range(runs):
+        descent.run(2 * 30 // runs)
+        assert np.all(descent.state.x @ rows.T > levels)
+    met = np.flatnonzero((descent.left < 1e-9) & (descent.state.error == 0.0))
+    assert len(met) >= looked_at
+    rng = np.random.default_rng(6)
+    for row in met[:looked_at]:
+        sequences, x = begun.sequences.of([row]), descent.state.x[[row]]
+        scale = task.scale(sequences.which)
+        for _ in range(tries):  # other sequences near it that leave nothing either cost no less
+            beside = x + 0.02 * scale * rng.normal(size=scale.shape)
+            while not np.all(beside @ rows.T > levels[[row]]):  # drawn back until it keeps its bounds
+                beside = 0.5 * (beside + x)
+            other = Descent(task, sequences, beside, kicks=1)
+            other.close(20)
+            assert other.left[0] >= 1e-9 or float(other.cost[0]) > float(descent.cost[row]) * (1.0 - 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("body", "shift", "near"),
+    [
+        (replace(strong(25.0, 30.0), channels=cross(1e5)), False, 1e-4),
+        deep(replace(strong(15.0, 3.4), channels=fan(36, 1e5)), True, 5e-3),
+    ],
+    ids=["one", "two"],
+)
+def test_it_costs_no_more_than_a_omega_where_that_can_be_had(body: Spacecraft, shift: bool, near: float) -> None:
+    """By one pulse against ω where H is free, by the two exact ones once channels stand in every direction."""
+    made = starting_points.schedules(task_of(body, Equations(shift=shift)))[0]
+    assert made.total_impulse == pytest.approx(body.least_impulse, rel=near)

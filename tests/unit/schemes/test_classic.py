@@ -1,0 +1,407 @@
+"""One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970: torquers and body-fixed thrusters."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from support.builders import Outcome, channel, cross, fan, spinner, transverse
+from support.cases import spread
+from support.checker import violations
+from support.feasible import feasible_by, left
+from support.golden import check_text, refused
+
+from nutdamp import flight, planning
+from nutdamp.errors import SenselessOption
+from nutdamp.physics import damping
+from nutdamp.remarks import infeasibility, remarks
+from nutdamp.schedule import Schedule
+from nutdamp.schemes import Options
+from nutdamp.schemes.options import FourPulseOptions
+from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
+
+NANODEGREE = math.radians(1e-9)
+BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 10.0)]
+SPINS = [3.0, -3.0]
+SPHERE = (100.0, 100.0)
+each_body = spread(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=4, deep=4)
+each_shape = pytest.mark.parametrize(("A", "C", "spin"), [(*body, s) for body in [*BODIES, SPHERE] for s in SPINS])
+
+
+def check_exact(spacecraft: Spacecraft, scheme: str, count: int, *, by_reference: bool = True) -> planning.Plan:
+    """No nutation is left, and of two pulses no shift of H, flown and by the reference integrator."""
+    plan = feasible_by(scheme, spacecraft)
+    assert len(plan.pulses) == count
+    ends = [(left(plan).nutation, left(plan).momentum_shift)]
+    if by_reference:
+        outcome = Outcome(spacecraft, plan.pulses)
+        ends.append((outcome.nutation, outcome.shift))
+    assert max(nutation for nutation, _ in ends) < NANODEGREE
+    assert count != 2 or max(shift for _, shift in ends) < NANODEGREE
+    return plan
+
+
+def check_opposed(spacecraft: Spacecraft, made: Schedule) -> None:
+    """Each effective impulse is straight against ω at its moment."""
+    before, _ = flight.by_impulses(spacecraft, made).around_pulses()
+    for pulse, rates in zip(made, before.rates, strict=True):
+        along = transverse(pulse.impulse) / transverse(rates)
+        assert along.real < 0.0
+        assert abs(along.imag) < 1e-12 * abs(along)
+
+
+def rate_after(plan: planning.Plan) -> float:
+    return abs(plan.flight.settled.omega)
+
+
+def why_not(*cases: tuple[str, Spacecraft] | tuple[str, Spacecraft, Options]) -> str:
+    plans = [planning.plan(spacecraft, scheme, *options) for scheme, spacecraft, *options in cases]
+    assert not any(plan.feasible for plan in plans)
+    return "\n".join(f"{plan.scheme}: {infeasibility(plan)}" for plan in plans)
+
+
+def test_what_cannot_be_has_a_reason() -> None:
+    axial = channel("spin-up", 1.0, 0.0, 5.0)
+    soon, narrow = Limits(horizon=0.5), cross(5.0, min_on_time=0.1, max_on_time=0.5)
+    early: dict[str, Any] = {"channels": cross(20.0), "limits": Limits(earliest=1e6)}
+    first = [spinner(channels=cross(20.0, min_on_time=least)[:1], limits=soon) for least in (0.02, 0.0)]
+    check_text(
+        "classic.why-not",
+        why_not(
+            *((scheme, spinner(*SPHERE, channels=cross(8.0))) for scheme in ("one-pulse", "two-pulse")),
+            *((scheme, spinner(channels=(axial,))) for scheme in ("one-pulse", "two-pulse")),
+            *((scheme, body) for scheme in ("one-pulse", "four-pulse") for body in first),
+            ("one-pulse", spinner(degrees=0.1, channels=cross(20.0, min_on_time=1.0))),
+            *(("one-pulse", spinner(steerable=torquer, **early)) for torquer in (None, Steerable(20.0))),
+            ("two-pulse", spinner(degrees=30.0, steerable=Steerable(1.0))),
+            ("two-pulse", spinner(limits=Limits(max_pulses=1))),
+            ("four-pulse", spinner()),
+            *(("four-pulse", spinner(channels=narrow), Options(on_time=on_time)) for on_time in (0.05, 0.6)),
+        ),
+    )
+    plan = feasible_by("two-pulse", spinner(channels=(*cross(40.0), axial)))
+    assert all(pulse.channel != "spin-up" for pulse in plan.pulses)
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
+def test_the_horizon_that_is_named_is_long_enough(scheme: str) -> None:
+    """What ends there is the pulse that it takes, not the shortest that there is."""
+    for torque, shortest in itertools.product((3.0, 30.0, 300.0), (0.0, 0.02)):
+        jet = (channel("T", torque, 0.0, 0.0, min_on_time=shortest),)
+        why = why_not((scheme, spinner(channels=jet, limits=Limits(horizon=0.3))))
+        named = re.search(r"would end at (\S+) s: set limits.horizon beyond that", why)
+        assert named is not None, why
+        feasible_by(scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5))))
+
+
+@pytest.mark.parametrize(("scheme", "size"), [("one-pulse", 6.0), ("two-pulse", 5.0), ("four-pulse", 1.0)])
+def test_skew_channels_change_the_spin_by_their_axial_impulse_over_c(scheme: str, size: float) -> None:
+    """The on-times count the changing spin, so that one-pulse and four-pulse still leave nothing."""
+    torques = {"a": (6.0, 0.0, 0.5), "b": (-6.0, 1.0, 0.2), "c": (0.0, -5.0, -0.4)}
+    spacecraft = spinner(channels=tuple(channel(name, *(size * one for one in T)) for name, T in torques.items()))
+    plan = feasible_by(scheme, spacecraft)
+    axial, outcome = math.fsum(pulse.impulse[2] for pulse in plan.pulses), Outcome(spacecraft, plan.pulses)
+    assert axial != 0.0
+    assert plan.spin_change == pytest.approx(axial / 80.0, rel=1e-9)
+    assert outcome.spin - 3.0 == pytest.approx(axial / 80.0, abs=1e-11)
+    assert outcome.nutation == pytest.approx(left(plan).nutation if scheme == "two-pulse" else 0.0, abs=1e-10)
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse"])
+def test_on_a_sphere_a_channel_opposite_to_omega_works(scheme: str) -> None:
+    plan = check_exact(spinner(*SPHERE, phase=-0.5 * math.pi, channels=cross(8.0)), scheme, 1 + (scheme == "two-pulse"))
+    assert {pulse.channel for pulse in plan.pulses} == {"+2"}
+
+
+@each_shape
+def test_one_ideal_steerable_impulse_at_once(A: float, C: float, spin: float) -> None:
+    """J = A|ω| against ω at t = 0: no nutation, H moved by θ0."""
+    for degrees in (2.0, 20.0, 60.0):
+        plan = feasible_by("one-pulse", spinner(A, C, spin, degrees))
+        (only,) = plan.pulses
+        assert (only.t, only.on_time) == (0.0, 0.0)
+        assert plan.pulses.total_impulse == pytest.approx(plan.spacecraft.least_impulse, rel=1e-15)
+        assert left(plan).nutation < 1e-14
+        assert left(plan).momentum_shift == pytest.approx(math.radians(degrees), rel=1e-13)
+
+
+@each_shape
+def test_one_steerable_pulse_of_real_width_or_a_train_where_the_torquer_is_too_weak(
+    A: float, C: float, spin: float
+) -> None:
+    """Up to nine tenths of what one pulse can do at all, 2M/|aω3|; the last of a train stands against what is left."""
+    plain = spinner(A, C, spin, 8.0)
+    rate = max(abs(plain.inertia.a * spin), 0.3)
+    for share in (0.1, 0.9):
+        torquer = Steerable(plain.least_impulse * rate / (2 * share))
+        plan = check_exact(spinner(A, C, spin, 8.0, steerable=torquer), "one-pulse", 1)
+        assert plan.pulses.pulses[0].start == pytest.approx(0.0, abs=1e-15)
+        assert left(plan).momentum_shift < math.radians(8.0) * (1 + 1e-12)
+    if A != C:
+        weak = spinner(A, C, spin, 8.0, steerable=Steerable(plain.least_impulse * rate / 11))
+        plan = feasible_by("one-pulse", weak)
+        check_exact(weak, "one-pulse", len(plan.pulses))
+        assert len(plan.pulses) > 5
+        assert max(pulse.on_time for pulse in plan.pulses) <= 0.25 * plain.body_period * (1 + 1e-9)  # 10 % lost
+
+
+def test_a_steerable_pulse_starts_no_sooner_than_it_may() -> None:
+    """Not at -1e-17 s by rounding of impulse over torque; one of 1.06 s fits neither before nor between windows."""
+    for torque in range(5, 105):
+        assert planning.plan(spinner(steerable=Steerable(torque / 0.7)), "one-pulse").pulses.pulses[0].start >= 0.0
+    limits = Limits(earliest=1.0, blackout=((1.2, 4.0), (4.5, 5.0)))
+    (only,) = feasible_by("one-pulse", spinner(steerable=Steerable(20.0), limits=limits)).pulses
+    assert only.start == 5.0
+
+
+@each_body
+def test_a_fixed_pulse_waits_until_it_opposes_omega_and_short_ones_make_a_train(
+    A: float, C: float, spin: float
+) -> None:
+    """Pulses of real width that leave nothing; equal ones come at successive alignments, one body period apart."""
+    for channels in (cross(60.0)[:1], cross(60.0), fan(3, 50.0), fan(6, 80.0)):
+        spacecraft = spinner(A, C, spin, 2.0, channels=channels)
+        check_opposed(spacecraft, check_exact(spacecraft, "one-pulse", 1).pulses)
+    plain = spinner(A, C, spin, 6.0)
+    period, longest = plain.body_period, plain.least_impulse / 30.0 / 5.5
+    jet = (channel("+2", 0.0, 30.0, 0.0, max_on_time=longest),)
+    plan = feasible_by("one-pulse", spinner(A, C, spin, 6.0, channels=jet, limits=Limits(horizon=30 * period)))
+    count = len(plan.pulses)
+    assert count >= 6
+    assert np.diff([one.t for one in plan.pulses]) == pytest.approx([period] * (count - 1), rel=1e-12)
+    assert len({round(one.on_time / longest, 12) for one in plan.pulses}) == 1
+    assert left(plan).nutation < NANODEGREE
+
+
+def test_what_one_pulse_is_chosen_and_what_ticks_and_max_pulses_leave() -> None:
+    """Half a tick of on-time in about a second, half a tick of turning at 1 rad/s, of 5° are left."""
+    channels = (
+        channel("weak", 0.0, 5.0, 0.0, max_on_time=0.2, isp=300.0, thrust=1.0),
+        channel("thirsty", 40.0, 0.0, 0.0, isp=100.0, thrust=20.0),
+        channel("thrifty", -40.0, 0.0, 0.0, isp=300.0, thrust=20.0),
+    )
+    assert [one.channel for one in feasible_by("one-pulse", spinner(channels=channels)).pulses] == ["thrifty"]
+    plan = feasible_by("one-pulse", spinner(channels=cross(20.0), limits=Limits(tick=0.01)))
+    assert NANODEGREE < left(plan).nutation < math.radians(5.0) * 0.02
+    jet = (channel("+2", 0.0, 30.0, 0.0, max_on_time=0.1),)
+    plan = feasible_by("one-pulse", spinner(degrees=6.0, channels=jet, limits=Limits(max_pulses=3)))
+    assert len(plan.pulses) == 3
+    assert 120.0 * rate_after(plan) == pytest.approx(plan.spacecraft.least_impulse - 3 * 30.0 * 0.1, rel=1e-3)
+    check_text("classic.max-pulses", "\n".join(remarks(plan)))
+
+
+def test_one_pulse_allowed_where_more_are_needed_does_what_one_can() -> None:
+    """The longest useful pulse, half a body period, and no error.
+
+    With some torques rounding puts the most a pulse can do beyond itself; the on-time stays finite.
+    """
+    torques = 31.45693363119974, 7.351789651391229, 4.901146515066305, 0.8803215669495988, 22.257278416867518
+    A = 111.32708414993223
+    for torque, ratio, phase, axial in itertools.product(torques, (0.8, 2.0, 1.25, 1 / 3), (0.1, 1.0, 2.0), (0.0, 9.0)):
+        jet = (channel("+1", torque, 0.0, axial if torque > 10 else 0.0),)
+        body = spinner(A, A * ratio, 1.0648047448322029, 50.0, phase, channels=jet, limits=Limits(max_pulses=1))
+        made = planning.plan(body, "one-pulse").pulses
+        assert 0.0 < made.pulses[0].on_time <= 0.5 * body.body_period * (1 + 1e-9)
+        assert len(made) == 1
+
+
+@pytest.mark.parametrize("spin", SPINS)
+@spread("a", [round(0.1 * tenth, 1) for tenth in range(-9, 10)], quick=7, deep=12)
+def test_two_ideal_pulses_are_exact_at_every_angle_for_the_impulse_of_the_floor(a: float, spin: float) -> None:
+    """Nutation and shift of H below 1e-9 deg by (17) for θ0 = 2…60°; Σ|J| = A|ω0| to 1e-12."""
+    for degrees in (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0):
+        by_reference = degrees in (2.0, 60.0) and a in (-0.9, 0.0, 0.3)
+        spacecraft = spinner(100.0, 100.0 * (1 - a), spin, degrees)  # no actuator named: an ideal steerable impulse
+        plan = check_exact(spacecraft, "two-pulse", 2, by_reference=by_reference)
+        assert plan.residual is not None
+        assert max(plan.residual.nutation, plan.residual.momentum_shift) < NANODEGREE
+        assert plan.pulses.total_impulse == pytest.approx(spacecraft.least_impulse, rel=1e-12)
+
+
+@pytest.mark.parametrize("spin", SPINS)
+@pytest.mark.parametrize(("A", "C"), [*BODIES[:2], SPHERE])
+def test_two_pulses_of_real_width_are_exact(A: float, C: float, spin: float) -> None:
+    """Directions, on-times and moments are trimmed: pulses as long as half the wait leave nothing."""
+    for torque in (200.0, 30.0):
+        check_exact(spinner(A, C, spin, degrees=10.0, steerable=Steerable(torque)), "two-pulse", 2)
+
+
+@spread("spin", SPINS, quick=2)
+@spread(("A", "C"), [*BODIES[:3], (100.0, 80.0), (100.0, 133.0), (100.0, 35.0)], quick=1, deep=5)
+def test_two_pulses_of_fixed_channels_are_exact_after_trimming(A: float, C: float, spin: float) -> None:
+    """No nutation and H back where it was, on the real widths, with ±1, ±2 or five directions."""
+    for degrees in (0.5, 5.0, 15.0):
+        check_exact(spinner(A, C, spin, degrees, channels=cross(150.0)), "two-pulse", 2, by_reference=degrees == 5.0)
+    check_exact(spinner(A, C, spin, channels=fan(5, 150.0)), "two-pulse", 2, by_reference=False)
+
+
+@pytest.mark.parametrize("spin", SPINS)
+def test_literal_reproduces_the_printed_scheme(spin: float) -> None:
+    """Equal halves, Δt from the ω before the first: no nutation, but H displaced."""
+    for degrees, displaced, digit in ((2.0, 0.0016, 5e-5), (10.0, 0.19, 5e-3), (30.0, 5.1, 0.05)):
+        plan = feasible_by("two-pulse", spinner(120.0, 80.0, spin, degrees), Options(literal=True))
+        first, second = plan.pulses
+        half, omega = 0.5 * plan.spacecraft.least_impulse, plan.spacecraft.transverse_rate
+        assert (first.magnitude, second.magnitude) == pytest.approx((half, half), rel=1e-15)
+        assert second.t - first.t == pytest.approx(math.pi / math.hypot(omega, 80.0 / 120.0 * spin), rel=1e-14)
+        assert left(plan).nutation < NANODEGREE
+        assert math.degrees(left(plan).momentum_shift) == pytest.approx(displaced, abs=digit)
+
+
+def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_out_the_first() -> None:
+    half = damping.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
+    assert check_exact(spinner(), "two-pulse", 2).pulses.end == pytest.approx(half, rel=1e-12)
+    covered = spinner(limits=Limits(blackout=((0.5 * half, 2.0 * half),), earliest=0.0))
+    assert check_exact(covered, "two-pulse", 2).pulses.end >= 2.0 * half
+    apart = spinner(degrees=3.0, channels=cross(60.0), limits=Limits(gap=20.0, horizon=300.0))
+    for literal in (False, True):
+        first, second = feasible_by("two-pulse", apart, Options(literal=literal)).pulses
+        assert second.start - first.end >= 20.0 - 1e-9
+
+
+@pytest.mark.parametrize("spin", SPINS)
+def test_where_fixed_channels_never_line_up_the_cost_is_that_of_the_physics_sheet(spin: float) -> None:
+    """A/C = 1.25 with ±1, ±2 costs 1/cos 18° = 1.051 × A|ω0| at any horizon: small angle, pulses short."""
+    for horizon in (None, 500.0):
+        body = spinner(100.0, 80.0, spin, 0.1, channels=cross(1000.0), limits=Limits(horizon=horizon))
+        cost = check_exact(body, "two-pulse", 2, by_reference=False).pulses.total_impulse
+        assert cost / body.least_impulse == pytest.approx(1 / math.cos(math.radians(18)), rel=1e-4)
+
+
+def test_channels_at_the_mounting_angle_need_no_more_than_the_floor() -> None:
+    """Two fixed actuators that push both ways: half a turn apart, for A|ω0| and the width."""
+    omega, wait = spinner().transverse_rate, damping.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
+    angle = damping.mounting_angle(120.0, 80.0, omega, 3.0)
+    turns = 2000.0 * np.exp(1j * np.array([0.0, math.pi, angle, angle + math.pi]))
+    pair = tuple(channel(f"T{number}", one.real, one.imag, 0.0) for number, one in enumerate(turns))
+    made = feasible_by("two-pulse", spinner(channels=pair)).pulses
+    assert made.pulses[1].t - made.pulses[0].t == pytest.approx(wait, abs=1e-3)
+    assert made.total_impulse == pytest.approx(spinner().least_impulse, rel=1e-5)
+
+
+def test_on_times_too_short_leave_a_remainder_and_say_so() -> None:
+    """±1, ±2 of 5 N m for at most a second: half of what 21 N m s ask for, at most."""
+    plan = feasible_by("two-pulse", spinner(channels=cross(5.0, max_on_time=1.0)))
+    assert {pulse.on_time for pulse in plan.pulses} == {1.0}
+    assert left(plan).nutation > math.radians(1)
+    check_text("classic.too-short", "\n".join(remarks(plan)))
+
+
+@spread("channels", [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)], deep=2, ids=["3", "5", "±1±2"])
+def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(channels: tuple[Channel, ...]) -> None:
+    """With three channels the cheapest pair saves 0.04 % and ends 2.4 s later than the first exact one."""
+    spacecraft = spinner(channels=channels)
+    weighed, taken = planning.alternatives(spacecraft, "two-pulse"), feasible_by("two-pulse", spacecraft).pulses
+    assert len(weighed) > 2
+    for plan in weighed:
+        assert violations(spacecraft, plan.pulses) == []
+        assert len(plan.pulses) == 2
+        assert left(plan).nutation < spacecraft.nutation
+    assert any(np.allclose([one.t for one in plan.pulses], [one.t for one in taken]) for plan in weighed)
+    if len(channels) % 2:
+        cheapest = min(weighed, key=lambda plan: plan.pulses.total_impulse).pulses
+        ends = [one.end for one in weighed if one.pulses.total_impulse <= 1.01 * cheapest.total_impulse]
+        assert len(ends) > 2
+        assert ends == sorted(ends)
+        assert taken.end == ends[0] != cheapest.end
+    # With a torquer, by another scheme or without nutation there is nothing to weigh.
+    still = spinner(degrees=0.0, channels=channels)
+    for body, scheme in ((spinner(), "two-pulse"), (spacecraft, "one-pulse"), (still, "two-pulse")):
+        assert planning.alternatives(body, scheme) == ()
+
+
+@each_body
+def test_pulses_come_a_quarter_of_the_body_period_apart(A: float, C: float, spin: float) -> None:
+    """To 1e-12 relative, with ±1, ±2 in the order in which ω passes them: mirrored for aω3 < 0."""
+    plain = spinner(A, C, spin, 8.0)
+    spacecraft = spinner(A, C, spin, 8.0, channels=cross(plain.least_impulse / plain.body_period * 4))
+    made = feasible_by("four-pulse", spacecraft, Options(on_time=plain.body_period / 100, coarse=True)).pulses
+    assert len(made) > 10
+    gaps = np.diff([one.t for one in made])
+    assert gaps == pytest.approx([plain.body_period / 4] * len(gaps), rel=1e-12)
+    turn = ["+1", "-2", "-1", "+2"] if (A - C) * spin > 0 else ["+1", "+2", "-1", "-2"]
+    order = [pulse.channel for pulse in made]
+    assert order == list(itertools.islice(itertools.cycle(turn), 4 + len(order)))[turn.index(order[0]) :][: len(order)]
+
+
+@spread(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=1, deep=2)
+def test_coarse_pulses_leave_at_most_half_a_pulse(A: float, C: float, spin: float) -> None:
+    """|ω| <= J/(2A), and each pulse before takes |ω| down by J/A (times its width factor)."""
+    for share in (0.013, 0.03, 0.1, 0.4):
+        plain = spinner(A, C, spin, 8.0)
+        on_time, least = plain.body_period / 50, plain.least_impulse
+        impulse = share * least
+        spacecraft = spinner(A, C, spin, 8.0, channels=cross(impulse / on_time))
+        plan = feasible_by("four-pulse", spacecraft, Options(on_time=on_time, coarse=True))
+        assert {pulse.on_time for pulse in plan.pulses} == {on_time}
+        assert rate_after(plan) <= impulse / (2 * A) * (1 + 1e-12)
+        half = 0.5 * abs(spacecraft.inertia.a * spin) * on_time
+        expected = abs(least - len(plan.pulses) * impulse * math.sin(half) / half)
+        assert A * rate_after(plan) == pytest.approx(expected, abs=1e-10 * least)
+        assert Outcome(spacecraft, plan.pulses).nutation == pytest.approx(left(plan).nutation, abs=1e-9)
+
+
+@each_body
+def test_fine_damping_leaves_nothing(A: float, C: float, spin: float) -> None:
+    """A last, shorter pulse of A|ω|, for any number and direction of transverse channels."""
+    for channels in (cross(3.0), fan(3, 4.0), fan(12, 2.0), cross(5.0)[:1]):
+        plan = feasible_by("four-pulse", spinner(A, C, spin, 4.0, channels=channels))
+        if rate_after(plan) > 1e-12:  # one weak channel may not be done within the horizon
+            assert plan.pulses.end > plan.spacecraft.horizon - 1.1 * plan.spacecraft.body_period
+            assert any("remain" in remark for remark in remarks(plan))
+        else:
+            assert left(plan).nutation < NANODEGREE
+            assert len(plan.pulses) == 1 or plan.pulses.pulses[-1].on_time < plan.pulses.pulses[0].on_time
+
+
+@each_body
+def test_fine_damping_with_a_shortest_pulse_leaves_nothing_or_half_of_it(A: float, C: float, spin: float) -> None:
+    """Zero, or <= J_min/(2A) where the rest is below the smallest pulse."""
+    plain = spinner(A, C, spin, 4.0)
+    shortest, longest = plain.body_period / 40, plain.body_period / 20
+    torque = plain.least_impulse / (7.3 * longest)
+    channels = cross(torque, min_on_time=shortest, max_on_time=longest)
+    for degrees in (3.0, 3.3, 3.7, 4.1):
+        plan = feasible_by("four-pulse", spinner(A, C, spin, degrees, channels=channels))
+        assert left(plan).nutation < NANODEGREE or rate_after(plan) <= torque * shortest / (2 * A) * (1 + 1e-12)
+    assert Outcome(plan.spacecraft, plan.pulses).nutation == pytest.approx(left(plan).nutation, abs=2e-11)
+
+
+def test_on_times_of_four_pulse() -> None:
+    """An eighth of the body period or the longest allowed; |ω| below J/(2A) from the start: no pulse."""
+    for longest, expected in ((math.inf, spinner().body_period / 8), (0.3, 0.3)):
+        made = feasible_by("four-pulse", spinner(channels=cross(1.0, max_on_time=longest))).pulses
+        assert made.pulses[0].on_time == pytest.approx(expected, rel=1e-15)
+    for senseless in (0.0, -1.0, math.inf, math.nan):
+        with refused(SenselessOption, f"classic.senseless{senseless:g}"):
+            FourPulseOptions(on_time=senseless)
+    body = spinner(degrees=1.0, channels=cross(100.0))
+    too_long, useful = (Options(on_time=share * body.least_impulse / 100.0, coarse=True) for share in (2.1, 1.9))
+    assert why_not(("four-pulse", body, too_long))
+    assert len(feasible_by("four-pulse", body, useful).pulses) == 1
+
+
+def test_on_a_sphere_channels_share_the_nutation() -> None:
+    """ω stands still: ±1, ±2 together cost |cos φ| + |sin φ| times A|ω0|, and leave nothing."""
+
+    def on_a_sphere(phase: float, channels: tuple[Channel, ...], **expected: Any) -> planning.Plan:
+        spacecraft = spinner(*SPHERE, 2.0, 5.0, phase, channels=channels)
+        plan = feasible_by("four-pulse", spacecraft)
+        outcome = math.atan(rate_after(plan) / 2.0)
+        assert outcome == pytest.approx(math.atan(expected.get("left", 0.0) / 2.0), rel=1e-12, abs=NANODEGREE)
+        assert Outcome(spacecraft, plan.pulses).nutation == pytest.approx(outcome, abs=NANODEGREE)
+        return plan
+
+    for phase in (0.0, 0.3, 0.25 * math.pi, 2.0, -2.5):
+        plan = on_a_sphere(phase, cross(8.0))
+        cost = plan.pulses.total_impulse / plan.spacecraft.least_impulse
+        assert cost == pytest.approx(abs(math.cos(phase)) + abs(math.sin(phase)), rel=1e-12)
+    # The two next to the opposite of ω are the cheapest: at 171° and 223°, on either side of 220°.
+    assert {pulse.channel for pulse in on_a_sphere(0.7, fan(7, 8.0)).pulses} == {"T3", "T4"}
+    assert max(one.on_time for one in on_a_sphere(0.3, cross(8.0, max_on_time=0.25)).pulses) <= 0.25
+    # One channel alone takes out the component along it.
+    on_a_sphere(math.pi - 0.4, cross(8.0)[:1], left=math.sin(0.4) * spinner(*SPHERE, 2.0, 5.0).transverse_rate)
