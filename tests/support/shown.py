@@ -159,4 +159,5 @@ def sheet(node: Node, title: str) -> list[dict[str, str]]:
 
 def facts(node: Node, title: str) -> dict[str, str]:
     """The table of that title, which says one thing a row."""
-    return {name: value for name, value, *_ in (list(row.values()) for row in sheet(node, title))}
+    (table,) = (one for one in node.all("table") if one.all("caption")[0].text.startswith(title))
+    return {name.text: value.text for name, value, *_ in cells(table)}
