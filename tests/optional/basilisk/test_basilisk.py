@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.cases import spread
+from support.golden import refused
 
 from nutdamp import flight, schemes
 from nutdamp.basilisk import BasiliskFlight, fly
@@ -136,29 +137,18 @@ def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.basilisk
 @pytest.mark.parametrize("name", BODIES)
-def test_ideal_impulses_of_a_steerable_torquer(name: str) -> None:
-    body = spinner(name, thrusters=False)
-    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+def test_ideal_impulses_and_overlapping_pulses_off_the_nanosecond_grid(name: str) -> None:
+    """Of a steerable torquer, and about every axis at any time."""
+    steered, body = spinner(name, thrusters=False), spinner(name)
+    schedule = schemes.schedule("two-pulse", steered, schemes.Options())
     assert [one.on_time for one in schedule] == [0.0, 0.0]
-    until = schedule.end + body.inertial_period
-    assert difference(body, schedule, until, fly(body, schedule, until)) <= FOUND
-
-
-@pytest.mark.basilisk
-@pytest.mark.parametrize("name", BODIES)
-def test_ideal_impulses_about_every_axis_at_any_time(name: str) -> None:
-    body = spinner(name)
+    until = schedule.end + steered.inertial_period
+    assert difference(steered, schedule, until, fly(steered, schedule, until)) <= FOUND
     kicks = [(0.0, (5.0, 0.0, 3.0)), (1.1, (0.0, -4.0, 0.0)), (1.1, (1.0, 2.0, -30.0)), (4.0, (0.0, 7.0, 0.0))]
     schedule = Schedule(tuple(Pulse(t, 0.0, "by hand", np.array(impulse)) for t, impulse in kicks))
     found = fly(body, schedule, 4.0)
     assert difference(body, schedule, 4.0, found) <= FOUND
     assert found.rates[0] == pytest.approx(body.initial.rates + kicks[0][1] / np.array(body.inertia.moments))
-
-
-@pytest.mark.basilisk
-@pytest.mark.parametrize("name", BODIES)
-def test_overlapping_pulses_off_the_nanosecond_grid(name: str) -> None:
-    body = spinner(name)
     assert difference(body, overlapping(), 8.0, fly(body, overlapping(), 8.0)) <= FOUND
 
 
@@ -232,26 +222,16 @@ def test_body_at_rest() -> None:
     assert np.all(found.quaternion == found.quaternion[0])
 
 
-def test_missing_basilisk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "Basilisk", None)
-    with pytest.raises(MissingExtra, match=r"flying with Basilisk needs the extra 'verify'") as missing:
-        fly(spinner("prolate"), Schedule(), 1.0)
-    assert missing.value.extra == "verify"
-
-
-def test_dissipation_is_refused_before_basilisk_is_requested(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "Basilisk", None)
-    with pytest.raises(Infeasible, match="without energy dissipation"):
-        fly(replace(spinner("prolate"), dissipation=600.0), Schedule(), 1.0)
-
-
-@pytest.mark.parametrize(("until", "step"), [(-1.0, None), (math.nan, None), (math.inf, None), (1.0, 0.0), (1.0, -0.1)])
-def test_times_that_cannot_be(until: float, step: float | None) -> None:
-    with pytest.raises(BadRequest):
-        fly(spinner("prolate"), Schedule(), until, step=step)
-
-
-def test_a_flight_too_long_for_basilisk_is_refused_at_once() -> None:
+def test_what_cannot_be_flown_is_refused_before_basilisk_is_requested(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has a fixed step, so the count of steps is known before."""
-    with pytest.raises(Infeasible, match="more than 200000 steps"):
-        fly(spinner("prolate"), Schedule(), 1e7)
+    monkeypatch.setitem(sys.modules, "Basilisk", None)
+    body = spinner("prolate")
+    with refused(MissingExtra, "basilisk.missing"):
+        fly(body, Schedule(), 1.0)
+    with refused(Infeasible, "basilisk.dissipation"):
+        fly(replace(body, dissipation=600.0), Schedule(), 1.0)
+    with refused(Infeasible, "basilisk.too-long"):
+        fly(body, Schedule(), 1e7)
+    for until, step in ((-1.0, None), (math.nan, None), (math.inf, None), (1.0, 0.0), (1.0, -0.1)):
+        with pytest.raises(BadRequest):
+            fly(body, Schedule(), until, step=step)

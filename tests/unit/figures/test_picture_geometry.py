@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 from support import reference
 from support.builders import cross, spinner
+from support.golden import check_text
 
 from nutdamp import flight, planning
 from nutdamp.flight import Flight
@@ -60,20 +61,18 @@ def test_the_cones_touch_along_the_rotation_vector_at_every_moment(body: Spacecr
             assert np.array_equal(rim[0].round(12), rim[-1].round(12))
 
 
-@pytest.mark.parametrize("name", ["prolate", "prolate, reversed", "needle", "tiny"])
-def test_the_body_cone_of_a_prolate_body_rolls_outside_the_space_cone(name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["prolate", "prolate, reversed", "needle", "tiny", "oblate", "oblate, reversed", "disc"]
+)
+def test_a_body_cone_rolls_outside_the_space_cone_of_a_prolate_body_and_about_that_of_an_oblate_one(name: str) -> None:
     made, track = flown(BODIES[name])
-    found = geometry.cones(made, track.rates[0], track.quaternion[0])
-    assert (angle_between(found.body, found.momentum) >= track.space_cone[0] - 1e-12).all()
-    assert angle_between(found.axis, found.momentum) > abs(track.space_cone[0])
-
-
-@pytest.mark.parametrize("name", ["oblate", "oblate, reversed", "disc"])
-def test_the_space_cone_of_an_oblate_body_lies_inside_the_body_cone(name: str) -> None:
-    made, track = flown(BODIES[name])
-    found = geometry.cones(made, track.rates[0], track.quaternion[0])
-    assert (angle_between(found.space, found.axis) <= track.body_cone[0] + 1e-12).all()
-    assert track.body_cone[0] > track.nutation[0]
+    cones = geometry.cones(made, track.rates[0], track.quaternion[0])
+    if made.spacecraft.inertia.A > made.spacecraft.inertia.C:
+        assert (angle_between(cones.body, cones.momentum) >= track.space_cone[0] - 1e-12).all()
+        assert angle_between(cones.axis, cones.momentum) > abs(track.space_cone[0])
+    else:
+        assert (angle_between(cones.space, cones.axis) <= track.body_cone[0] + 1e-12).all()
+        assert track.body_cone[0] > track.nutation[0]
 
 
 @pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (120.0, 100.0, 80.0), (80.0, 90.0, 120.0)])
@@ -133,8 +132,7 @@ def test_in_a_celestial_frame_east_is_right_and_north_is_up() -> None:
     plane = geometry.sky_plane(made, np.array([240.0, 0.0, 0.0]))
     seen = geometry.on_sky(plane, np.array([[1.0, math.tan(0.1), 0.0], [1.0, 0.0, math.tan(0.2)]]))
     assert seen == pytest.approx(np.degrees([[0.1, 0.0], [0.0, 0.2]]))
-    view = "H towards you, east to the right"
-    assert tuple(geometry.sky_names(made)) == ("east of H(0), deg", "north of H(0), deg", view)
+    check_text("pictures.sky", "\n".join(geometry.sky_names(made)))
 
 
 @pytest.mark.parametrize("momentum", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.2)])
@@ -170,9 +168,7 @@ def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
 
 
 def test_of_a_very_long_time_the_first_part_is_drawn_and_all_pulses() -> None:
-    body = spinner()
-    pulses = Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),))
-    made = flight.flown(body, pulses, 1e6)
+    made = flight.flown(spinner(), Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),)), 1e6)
     fine = geometry.drawn(made, made.sampled(1000, 1e6))
     assert len(fine.t) < geometry.MOST_ROWS + 10
     assert 5000.0 <= fine.t[-1] < 1e6
@@ -203,8 +199,7 @@ def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse
 
 def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
     made = flight.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
-    found = list(geometry.stretches(made, made.sampled(20, 1.0)))
-    assert [one.pulse for one in found] == [0, None]
+    assert [one.pulse for one in geometry.stretches(made, made.sampled(20, 1.0))] == [0, None]
 
 
 def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
@@ -216,16 +211,11 @@ def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
     assert np.ptp(away) < 1e-9
     assert angle_between(found.space, found.momentum).max() == pytest.approx(away[0])
     motion = reference.fly((120.0, 100.0, 80.0), body.omega0, [], 97.3, attitude.matrix(body.initial.quaternion))
-    assert (
-        angle_between(motion.rotation @ (motion.rates / np.linalg.norm(motion.rates)), found.momentum) <= away[0] + 1e-9
-    )
-    assert np.array_equal(
-        geometry.cones(*_still(BODIES["oblate"])).swept, geometry.cones(*_still(BODIES["oblate"])).space
-    )
-
-
-def _still(body: Spacecraft) -> tuple[Flight, Vector, Vector]:
-    return flight.flown(body, Schedule(), 1.0), body.initial.rates, body.initial.quaternion
+    unit = motion.rotation @ (motion.rates / np.linalg.norm(motion.rates))
+    assert angle_between(unit, found.momentum) <= away[0] + 1e-9
+    still = BODIES["oblate"]
+    cones = geometry.cones(flight.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion)
+    assert np.array_equal(cones.swept, cones.space)
 
 
 def test_a_hull_is_that_of_scipy() -> None:

@@ -1,0 +1,280 @@
+"""Pictures as files, inline SVG and films: formats, the same bytes each time, what a frame shows, what is refused."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import itertools
+import os
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib import style as matplotlib_style
+from PIL import Image
+from support import places
+from support.builders import spinner
+from support.cases import deep
+from support.golden import check_text
+from support.shown import BODY, WIDE, drawn, flight_picture, flown, kicks
+
+from nutdamp import flight, planning
+from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
+from nutdamp.flight import Flight
+from nutdamp.physics.attitude import angle_between
+from nutdamp.presentation import figures, geometry
+from nutdamp.presentation.figures import animation, style
+from nutdamp.presentation.figures.animation import Scene, Timing, film_format, timing
+from nutdamp.presentation.figures.export import _brief
+from nutdamp.schedule import Pulse, Schedule
+
+pytestmark = pytest.mark.usefixtures("plans_shared")
+
+
+@pytest.mark.parametrize(
+    ("path", "magic"), [("a.png", b"\x89PNG"), ("b.SVG", b"<?xml"), deep("c.d.pdf", b"%PDF"), ("-", b"\x89PNG")]
+)
+def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(path: str, magic: bytes) -> None:
+    figure = drawn("timeline", "no pulses")
+    content = figures.rendered(figure, path)
+    assert content.startswith(magic)
+    assert figures.rendered(figure, path) == content
+
+
+def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
+    figure, said = drawn("timeline", "no pulses"), []
+    for ending, paths in (
+        (figures.ending, ("a.bmp", "a", "png", "a.png.gz", ".png")),
+        (film_format, ("a.webm", "gif")),
+    ):
+        for path in paths:
+            with pytest.raises(BadRequest) as refused:
+                ending(path)
+            said.append(str(refused.value))
+    with pytest.raises(BadRequest):
+        figures.rendered(figure, "a.bmp")
+    assert film_format("-") == film_format("b.GIF") == "gif"
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(CannotWrite) as without:
+        film_format("a.mp4")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for call in (
+        lambda: figures.rendered(figure, "a.png"),
+        lambda: figures.flight_figure("motion", *flown("no pulses")),
+        lambda: figures.ending("a.png"),
+        lambda: film_format("a.gif"),
+    ):
+        with pytest.raises(MissingExtra, match=re.escape("pip install 'nutdamp[plot]'")):
+            call()
+    check_text("pictures.refused", "\n".join([*said, str(without.value)]))
+
+
+def test_settings_of_the_user_change_nothing() -> None:
+    plain = figures.rendered(drawn("timeline", "no pulses"), "a.png")
+    with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
+        assert figures.rendered(drawn("timeline", "no pulses"), "a.png") == plain
+        assert mpl.rcParams["font.size"] == 20
+
+
+# --- SVG -------------------------------------------------------------------------------------------------------------
+
+
+def test_inline_svg_stands_in_any_page() -> None:
+    """As wide as what holds it, in the colour of the text around, and no rule or id of it meets another's."""
+    shown = [figures.svg(drawn("timeline", case)) for case in ("wide pulses", "no pulses")]
+    ids = []
+    for text in shown:
+        root = ET.fromstring(text)
+        assert text.startswith("<svg ")
+        assert root.get("viewBox")
+        assert (root.get("width"), root.get("height")) == ("100%", None)
+        assert "currentColor" in text
+        assert not re.search(r"<style|<metadata|#1a1a1a", text)
+        ids.append([element.get("id", "") for element in root.iter() if element.get("id")])
+        assert len(ids[-1]) == len(set(ids[-1]))
+        assert set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text)) <= set(ids[-1])
+    assert not set(ids[0]) & set(ids[1])
+    assert not re.search(r'\sd="[^"]*\.\d{3}', shown[0])
+    for content in (shown[0], figures.rendered(drawn("timeline", "wide pulses"), "a.svg").decode()):
+        words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
+        assert "Firings" in words
+        assert any(word.startswith("1: ") for word in words)
+        assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
+
+
+def test_long_lines_are_short_in_a_page_and_stay_in_place() -> None:
+    spots = np.cumsum(np.random.default_rng(3).normal(scale=4.0, size=(900, 2)), axis=0)
+    commands = ["M" if row in (0, 300) else "L" for row in range(len(spots))]
+    path = " \n".join(f"{name} {x:.6f} {y:.6f}" for name, (x, y) in zip(commands, spots, strict=True))
+    brief = _brief(path)
+    assert len(brief) < 0.45 * len(path)
+    here, read = np.zeros(2), []
+    for name, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", brief):
+        for pair in np.reshape([float(one) for one in re.findall(r"-?[\d.]+", numbers)], (-1, 2)):
+            here = pair if name == "M" else here + pair
+            read.append(here)
+    assert np.abs(np.array(read) - spots).max() <= 0.0501
+    assert [name for name in brief if name.isalpha()] == ["M", "l", "M", "l"]
+    assert _brief("M 0 0 \nL 1.23456 3.5 \nz") == "M 0 0L 1.23 3.5z"
+
+
+def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
+    """Out, back, and aside: dashes both ways would look like a solid line."""
+    out = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    np.testing.assert_array_equal(geometry.once(out), [[0, 0], [0, 0], [1, 0], [np.nan, np.nan], [0, 0], [0, 1]])
+    turn = np.linspace(0.0, 2 * np.pi, 50)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    np.testing.assert_array_equal(geometry.once(circle), circle)
+
+
+@pytest.mark.deep
+def test_a_page_has_the_bands_of_all_pulses_of_a_panel_as_one_path() -> None:
+    content = figures.svg(flight_picture("history", WIDE, kicks(WIDE, 30, 0.7, 0.1)))
+    outlines = re.findall(r'<path d="([^"]*)"[^>]*fill-opacity: 0\.25', content)
+    assert sorted(outline.count("M") for outline in outlines) == [1, 30, 30, 30, 30]  # the first is in the legend
+
+
+def digest() -> str:
+    """Of the overview, which holds every panel, as a file and in a page."""
+    file = figures.rendered(flight_picture("overview", WIDE, "four-pulse"), "a.svg")
+    return hashlib.sha256(file + figures.svg(flight_picture("overview", WIDE, "four-pulse")).encode()).hexdigest()
+
+
+@pytest.mark.weekly
+def test_another_process_makes_the_same_bytes() -> None:
+    """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
+    folders = [str(places.TESTS), str(Path(__file__).parent)]
+    code = f"import sys; sys.path[:0] = {folders}; import {__name__}; print({__name__}.digest())"
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    other = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert other.stdout == f"{digest()}\n"
+
+
+# --- films -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plain() -> Iterator[None]:
+    """Scenes are made in the style of matplotlib."""
+    with matplotlib_style.context("default"):
+        yield
+
+
+@pytest.fixture
+def damped(plans_shared: None) -> tuple[Flight, float]:
+    """The flight of two pulses of the example of the physics sheet, and its end."""
+    pulses = planning.plan(WIDE, "two-pulse").pulses
+    end = pulses.end + WIDE.inertial_period
+    return flight.flown(WIDE, pulses, end), end
+
+
+@pytest.mark.deep
+def test_a_gif_has_its_frames_its_size_and_its_pace_and_each_is_written_before_the_next(
+    damped: tuple[Flight, float],
+) -> None:
+    """So that a film of any length takes the memory of a frame; and the frames are the scene to the pixel."""
+    made, end = damped
+    timed = timing(WIDE, end, 20, 0.4)
+    stream, progress = io.BytesIO(), list[tuple[int, int]]()
+    animation.film(stream, made, timed, "a.gif", 401, lambda frame: progress.append((frame, stream.tell())))
+    assert [frame for frame, _ in progress] == list(range(1, 9))
+    assert all(one < other for (_, one), (_, other) in itertools.pairwise(progress))
+    assert progress[-1][1] == len(stream.getvalue()) - 1
+    picture = Image.open(stream)
+    assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
+    assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
+    scene, frames = style.styled(Scene)(made, timed, 401), []
+    for number in range(timed.frames):
+        picture.seek(number)
+        frames.append(np.asarray(picture.convert("RGB")).astype(int))
+        style.styled(scene.show)(number)
+        off = np.abs(frames[-1] - animation.LEVELS[style.styled(scene.pixels)()].astype(int)).max(axis=2)
+        assert np.count_nonzero(off > 40) < 0.002 * off.size  # colours that the palette has not
+    assert frames[0][0, 0].tolist() == [255, 255, 255]
+    assert np.ptp(frames[0]) > 150  # nothing blank
+    for one, other in ((0, 3), (3, 7)):
+        assert np.count_nonzero(np.abs(frames[one] - frames[other]).max(axis=2) > 50) > 40
+
+
+@pytest.mark.deep
+def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
+    made, stream = flight.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
+    animation.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320, lambda _: None)
+    assert getattr(Image.open(stream), "n_frames", 1) == 4
+
+
+@pytest.mark.usefixtures("plain")
+def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> None:
+    body = spinner(degrees=20.0)
+    kick = Schedule((Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),))
+    scene = Scene(flight.flown(body, kick, body.inertial_period), Timing(body.inertial_period, 8, 10, 1.0), 400)
+    seen = [np.degrees(angle_between(scene.cones(frame).axis, scene.cones(frame).momentum)) for frame in (0, 1)]
+    assert seen == pytest.approx([20.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain")
+def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(damped: tuple[Flight, float]) -> None:
+    """Marks of H, ω and the spin axis stand where the flight has them, and only once, whatever was shown before."""
+    made, end = damped
+    timed = Timing(end, 10, 10, 1.0)
+    scene, scales = Scene(made, timed, 400), []
+    for number in (0, 3, 7):
+        scene.show(number)
+        scene.pixels()
+        scales.append([(axes.get_xlim(), axes.get_ylim(), axes.get_position().bounds) for axes in scene.figure.axes])
+        track = made.sampled(2, float(timed.times[number]) or 1e-9)
+        squares = [line for line in scene.sky.lines if line.get_marker() == "s" and np.size(line.get_xdata())]
+        (place,) = (np.asarray(square.get_xydata(), dtype=float)[0] for square in squares)
+        away = np.degrees(angle_between(track.axis[-1], track.momentum[0]))
+        assert np.hypot(*place) == pytest.approx(away, abs=1e-6)
+    assert scales[0] == scales[1] == scales[2]
+    assert scene.sky.get_aspect() == scene.space.get_aspect() == 1.0
+
+
+@pytest.mark.usefixtures("plain")
+def test_a_firing_is_announced(damped: tuple[Flight, float]) -> None:
+    made, end = damped
+    first = made.schedule.pulses[0]
+    scene = Scene(made, Timing(end, 100, 20, 1.0), 400)
+    assert "firing" not in scene.caption(first.start - 0.01)
+    assert f"firing 1: {first.channel}" in scene.caption(first.t)
+    over = scene.caption(first.end + 0.01)  # a short one would else be missed between two frames
+    assert f"fired 1: {first.channel}" in over
+    assert "firing" not in over
+    assert "fire" not in scene.caption(first.end + 2.0 * animation.HELD * scene.timed.pace)
+
+
+@pytest.mark.parametrize(("turns", "seconds"), [(1.0, 6.0), (20.0, 12.0), (1000.0, 30.0)])
+def test_the_length_follows_the_turns(turns: float, seconds: float) -> None:
+    timed = timing(BODY, turns * BODY.inertial_period, 20, None)
+    assert timed.frames == pytest.approx(20 * seconds, abs=1)
+    assert timed.smooth == (turns < 100)
+    assert timed.pace == pytest.approx(timed.until / seconds, rel=0.02)
+    assert timing(BODY, 100.0, 10, 3.0).frames == 30
+
+
+@pytest.mark.deep
+def test_an_ffmpeg_that_fails_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, damped: tuple[Flight, float]
+) -> None:
+    (tmp_path / "ffmpeg").write_text("#!/bin/sh\ncat > /dev/null\nexit 3\n")
+    (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    with pytest.raises(CannotWrite, match="failed with status 3"):
+        animation.film(io.BytesIO(), damped[0], Timing(damped[1], 2, 10, 1.0), "a.mp4", 320, lambda _: None)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
+def test_an_mp4_is_one(damped: tuple[Flight, float]) -> None:
+    stream = io.BytesIO()
+    animation.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400, lambda _: None)
+    assert stream.getvalue()[4:8] == b"ftyp"
+    assert film_format("a.mp4") == "mp4"
