@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.builders import pulse, spinner
 from support.cases import deep
 from support.places import CASES
-from test_flight import schedules, symmetric_spinners, triaxial_spinners
+from support.strategies import schedules, symmetric_spinners, triaxial_spinners
 
 from nutdamp import dynamics, flight, planning, work
 from nutdamp.dynamics import Dynamics, make_dynamics
