@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp import compliance, schemes, views, work
 from nutdamp.errors import NutdampError
-from nutdamp.planning import Plan, plan, reaches_spin
+from nutdamp.planning import Plan, plan, reaches_spin, spinning
 from nutdamp.recommendation import Recommendation, Share, Standing, recommend
 from nutdamp.spacecraft import Spacecraft
 
@@ -150,7 +150,7 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     if spacecraft.commands is not None:  # before those that may take all the work
         slow = [name for name in names if schemes.SCHEMES[name].slow]
         names = (*(name for name in names if name not in slow), *schemes.COMMANDED, *slow)
-    return names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *schemes.SPINNING)))
+    return names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *spinning(spacecraft))))
 
 
 def compare(

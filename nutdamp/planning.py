@@ -234,7 +234,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) ->
     if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
         return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
     if not spun and scheme in schemes.PLANNED and scheme not in schemes.SPINNING:
-        able = " and ".join(schemes.SPINNING)
+        able = " and ".join(spinning(spacecraft))
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
     forbidden = aspect.at_target(spacecraft) if scheme in schemes.PLANNED else None
@@ -268,6 +268,12 @@ def reaches_spin(spacecraft: Spacecraft) -> bool:
     """Whether the spin is that of the goal from the beginning."""
     goal = spacecraft.goal.spin
     return goal is None or abs(spacecraft.spin - goal) <= compliance.SPIN_TOLERANCE * abs(goal)
+
+
+def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
+    """The schemes that can set the spin: by command blocks only where there are commands."""
+    commanded = spacecraft.commands is not None
+    return tuple(one for one in schemes.SPINNING if commanded or not schemes.SCHEMES[one].reads_commands)
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: schemes.Choice = None) -> tuple[Plan, ...]:

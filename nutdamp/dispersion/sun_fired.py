@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nutdamp.dispersion.cases import DispersedCases, Model, Thrusting
 from nutdamp.dispersion.watched import in_body
+from nutdamp.errors import Infeasible
 from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid_cases import Bodies, Stretch
@@ -53,7 +54,7 @@ def fly(
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     over = np.zeros(count)
     rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    pulses, shifts, nominal = model.schedule.pulses, [], fire(body, model.schedule.blocks)[1]
+    pulses, shifts, nominal = model.schedule.pulses, [], _seen_nominally(model)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     for pulse, start, lead in zip(pulses, cases.starts, cases.leads, strict=True):
         shifts.append(start - lead - pulse.loaded[0])
@@ -69,7 +70,8 @@ def fly(
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
         sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
-            passage = int(passages[number - 1])
+            alike &= number <= len(passages)
+            passage = int(passages[number - 1]) if number <= len(passages) else before + 1
             for between in () if sees_all else range(before + 1, passage):
                 alike &= body.sun_sensor.sees(clock.angle(clock.sun_pulse(between))) == nominal[between - 1]
             found, before = clock.sun_pulse(passage), passage
@@ -90,6 +92,14 @@ def fly(
                     watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
     return Fired(rates, quaternion, starts, seen, over)
+
+
+def _seen_nominally(model: Model) -> list[bool]:
+    """Whether the sensor sees each passage of the Sun in the nominal flight; none, where that cannot be fired."""
+    try:
+        return fire(model.spacecraft, model.schedule.blocks)[1]
+    except Infeasible:
+        return [False]
 
 
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:

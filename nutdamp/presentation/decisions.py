@@ -134,7 +134,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
             table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
-        margin = f"{100.0 * (cases.complying - cases.probability):.3g} percentage points"
+        margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
         said = coloured(verdicts.VERDICT[cases.met], cases.met)
         table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
     return table

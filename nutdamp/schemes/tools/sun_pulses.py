@@ -29,7 +29,7 @@ ITERATIONS = 60
 EXACT = 1e-13
 """Share of a spin turn to which it is found."""
 
-BLIND = 100
+BLIND = 32
 """Spin turns in a row without a Sun pulse, after which none is waited for."""
 
 FIRED, INTEGRATED = 1.0, 40.0
@@ -117,16 +117,17 @@ class SunPulses:
             found = self.clock.sun_pulse(number)
             self._expect_found(before)
             return found
-        blind = 0
+        unseen: list[tuple[float, float]] = []
         while self._count < number:
             before = float(self.clock.time[0])
             found = self.clock.sun_pulse(len(self.seen) + 1)
             self._expect_found(before)
             angle = float(self.clock.angle(found)[0])
             self.seen.append(bool(sensor.sees(angle)))
-            self._count, blind = self._count + self.seen[-1], 0 if self.seen[-1] else blind + 1
-            if blind > BLIND:
-                _expect_seen(sensor, float(found.since[0]), angle)
+            self._count += self.seen[-1]
+            unseen = [] if self.seen[-1] else [*unseen, (float(found.since[0]), angle)]
+            if len(unseen) > BLIND:
+                _expect_seen(sensor, *unseen[0])
         return found
 
     def _expect_found(self, before: float) -> None:
