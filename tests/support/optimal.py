@@ -20,12 +20,12 @@ from nutdamp.spacecraft import Channel, Limits, Spacecraft, Thruster
 
 
 def flies(spacecraft: Spacecraft, *, left: float = 1e-6, dearest: float = math.inf, **options: Any) -> Plan:
-    """The plan of optimal with these options: it keeps all limits, and costs no less than its rigorous bound.
+    """The plan of optimal with these options, H kept unless they free it: it keeps all limits, and its rigorous bound.
 
     By the reference integrator it leaves less than ``left`` degrees, and the spin of the goal. It costs at most
     ``dearest`` times the first-order bound, which knows neither large angles nor on-times.
     """
-    chosen = OptimalOptions(**options)
+    chosen = OptimalOptions(**({"free_axis": False} | options))
     made = plan(spacecraft, "optimal", chosen)
     assert made.schedule is not None, infeasibility(made)
     assert violations(spacecraft, made.pulses) == []

@@ -258,11 +258,12 @@ def test_a_channel_without_a_commandable_width_is_left_out() -> None:
 
 
 def test_where_there_are_no_blocks_the_reason_is_said() -> None:
-    """Of a sensor that loses the Sun on the way a longer horizon would be no cure."""
+    """Of a sensor that never sees the Sun a longer horizon would be no cure."""
     body = a_turn()
     assert body.sun is not None
     ends = [float(attitude.angle_between(body.sun, axis)) for axis in (body.momentum, body.target_axis)]
     sensor = SunSensor(0.4, elevation=0.5 * math.pi - ends[0], half_width=0.3 * abs(ends[1] - ends[0]))
+    sensor = replace(sensor, elevation=sensor.elevation + 3.0 * sensor.half_width)
     cases = {
         "no keys": aimed(spinner(channels=cross(8.0)), 5.0, 0.0),
         "out of view": replace(body, sun_sensor=sensor),
