@@ -43,11 +43,11 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
         return []
     step = 2.0 * math.pi / (abs(_spin(model, values)) * interval(model))
     # a -> a + k step; of one transverse signal also a -> -a + k step.
-    begins = [values[at]] if len(_transverse(model)) > 1 or "axis" in model.signals else [values[at], 2.0 - values[at]]
+    one_sided = len(_transverse(model)) == 1 and "axis" not in model.signals
     ratios = []
-    for begin in begins:
+    for begin, itself in ((values[at], True), *[(2.0 - values[at], False)] * one_sided):
         nearest = round((model.parameters[at].file - begin) / step)
-        ratios += [begin + k * step for k in range(nearest - MOST, nearest + MOST + 1) if k != 0]
+        ratios += [begin + k * step for k in range(nearest - MOST, nearest + MOST + 1) if k != 0 or not itself]
     ratios = sorted((one for one in ratios if low < one < high), key=lambda one: abs(one - model.parameters[at].file))
     made = []
     for ratio in ratios[:MOST]:
