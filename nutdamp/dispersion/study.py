@@ -24,7 +24,7 @@ from nutdamp.dispersion.flown import RealWidths
 from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.outputs import OUTPUTS, ROWS, measure
 from nutdamp.dispersion.rounds import Round
-from nutdamp.dispersion.sensitivity import FirstOrder, by_differences, first_order, sampled_shares
+from nutdamp.dispersion.sensitivity import FirstOrder, as_flown, sampled_shares
 from nutdamp.dispersion.statistics import EXACT_CASES, Distribution, Exact, Sketch, Worst
 from nutdamp.dispersion.watched import cones_used
 from nutdamp.flight import Flight
@@ -73,8 +73,8 @@ class Study:
 
     @cached_property
     def first_order(self) -> FirstOrder:
-        """Sensitivities by the closed form; those of blocks fired by Sun pulses by what flies them."""
-        return by_differences(self.model, self.flies) if self.model.schedule.blocks else first_order(self.model)
+        """Sensitivities of what is flown."""
+        return as_flown(self.model, self.flies)
 
     def source(self) -> Source:
         """Draws for one thread."""
