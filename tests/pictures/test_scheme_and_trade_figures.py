@@ -14,15 +14,15 @@ from matplotlib.text import Annotation
 from support.builders import cross, spinner
 from support.cases import deep
 from support.colours import check_colours
-from support.compared_body import BODY, compared, line
+from support.compared_body import BODY, line
+from support.dispersed import normal
 from support.golden import check_text
 from support.layout import check_layout, texts
-from support.shown import WIDE, check_star, flight_picture, heading, legend_words, studied
+from support.shown import WIDE, check_star, flight_picture, heading, legend_words
 
 from nutdamp import fronts, planning
 from nutdamp.certificate import certificate
 from nutdamp.comparison import Comparison, compare
-from nutdamp.decision import cases_of, decide
 from nutdamp.demands import Keep
 from nutdamp.fronts import Front, Point
 from nutdamp.planning import Plan
@@ -36,10 +36,16 @@ from nutdamp.remarks import down
 from nutdamp.schedule import Bounds, Schedule
 from nutdamp.schemes.options import OptimalOptions
 from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable
+from nutdamp.tolerances import Dispersions
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 # --- schemes ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def compared() -> Comparison:
+    return compare(BODY, ("one-pulse", "two-pulse", "four-pulse", "optimal"), samples=0)
 
 
 def column(figure: Figure, name: str) -> Axes:
@@ -136,21 +142,27 @@ def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], uni
 
 @pytest.mark.deep
 def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
-    both = compare(BODY, ("two-pulse", "four-pulse"))
-    cases = dict.fromkeys(("two-pulse", "four-pulse"), cases_of(studied(BODY, 3000)))
-    figure = figures.schemes_figure(both, decide(both, cases))
-    check_layout(figure)
-    axes = column(figure, "complying cases")
-    share = cases["two-pulse"].complying
-    assert share is not None
-    assert share < 0.997
-    assert set(dots(axes)) == set(cases)
-    assert all(place == pytest.approx(100.0 * share) and mark in "xX" for place, mark, _ in dots(axes).values())
-    met = {plan.scheme for plan in both.plans if plan.meets_requirement}
-    rows = [text.get_text() for text in column(figure, "nutation").get_yticklabels()]
-    assert {row.partition("\n")[0] for row in rows if "too few cases comply" in row} == met
-    assert axes.get_xlim()[1] < 105.0
-    assert line(axes, "required")[0, 0] == pytest.approx(99.7)
+    """Of the schemes of which all have flown; those with which too few comply fall short."""
+    sure = replace(BODY, dispersions=Dispersions(thrust_per_pulse=normal(0.001, relative=True)))
+    for body, samples, count in ((BODY, 2_000, 3), (BODY, 3_000, 1), (sure, 2_000, 3)):
+        three = compare(body, ("one-pulse", "two-pulse", "four-pulse"), samples=samples)
+        figure = figures.schemes_figure(three)
+        check_layout(figure)
+        axes = column(figure, "complying cases")
+        shares = {plan.scheme: 100.0 * share.exact for plan, share in three.shares.items() if share.exact is not None}
+        assert {name: place for name, (place, _, _) in dots(axes).items()} == pytest.approx(shares)
+        assert len(shares) == count
+        meet = {plan.scheme for plan in three.plans if three.meets(plan)}
+        assert ({name for name, (_, mark, _) in dots(axes).items() if mark == "o"}) == meet & set(shares)
+        assert meet == (set() if body is BODY else {"two-pulse"})
+        chosen = [name for name, (_, mark, filled) in dots(axes).items() if filled and mark == "o"]
+        assert chosen == [name for name in sorted(meet) if three[name] is three.recommended]
+        few = {plan.scheme for plan in three.plans if plan.meets_requirement} - meet
+        assert bool(few) == (body is BODY)
+        rows = [text.get_text() for text in column(figure, "nutation").get_yticklabels()]
+        assert {row.partition("\n")[0] for row in rows if "too few cases comply" in row} == few
+        assert axes.get_xlim()[1] < 105.0
+        assert line(axes, "required")[0, 0] == pytest.approx(99.7)
 
 
 @pytest.mark.deep

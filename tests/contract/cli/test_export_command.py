@@ -45,10 +45,16 @@ def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> N
 
 
 def test_the_plan_as_json_is_that_of_plan(run: Run) -> None:
-    for scheme in ("--scheme four-pulse", ""):
-        data, planned = (result(run, f"{command} {scheme}") for command in ("export --format json -o -", "plan"))
+    """The recommended one by its dispersed cases, which are not exported; of a scheme named none are flown."""
+    for scheme, nominal in (("--scheme four-pulse", "--nominal"), ("", "")):
+        data, planned = (
+            result(run, f"{command} {scheme}") for command in ("export --format json -o -", f"plan {nominal}")
+        )
         assert data["recommended"] == planned["recommended"]
-        assert data["plans"] == [plan for plan in planned["plans"] if plan["scheme"] == data["recommended"]]
+        (plan,) = (plan for plan in planned["plans"] if plan["scheme"] == data["recommended"])
+        assert (plan.pop("cases", {"met": None})["met"], plan["meets_requirement"]) == (None if nominal else True, True)
+        assert data["plans"] == [plan]
+    assert data["recommended"] == "two-pulse"
 
 
 def test_a_schedule_file_is_exported_as_it_is(run: Run) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.commands import WIDE
 from support.golden import check_text
 from support.process import Run
 from support.synthetic import Array, motion
@@ -31,11 +32,13 @@ def write_rows(path: Path, header: str, rows: Array, digits: int = 5) -> None:
     path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
 
 
-def flight(folder: Path, seed: int, *, every: int = 1, bias: float = 0.0) -> tuple[float, float, Array]:
-    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example with A and C 0.5 % off: A, C, rates."""
-    draw = np.random.default_rng(seed)
-    A, C = 120.0 * (1.0 + 0.005 * draw.normal()), 80.0 * (1.0 + 0.005 * draw.normal())
-    rates = nutdamp.example().omega0 + math.radians(0.1) * draw.normal(size=3)
+def flight(
+    folder: Path, seed: int, *, every: int = 1, bias: float = 0.0, wide: bool = False
+) -> tuple[float, float, Array]:
+    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example or, ``wide``, of `WIDE`: A, C, rates."""
+    draw, (moments, degrees) = np.random.default_rng(seed), (0.005, 0.1) if wide else (0.002, 0.05)
+    A, C = 120.0 * (1.0 + moments * draw.normal()), 80.0 * (1.0 + moments * draw.normal())
+    rates = nutdamp.example().omega0 + math.radians(degrees) * draw.normal(size=3)
     rates = np.array([*rates[:2], rates[2]])
     times = np.arange(601) / 10.0
     shown = np.degrees(motion((A, A, C), rates, times)) + 0.01 * draw.normal(size=(601, 3)) + [bias, 0.0, 0.0]
@@ -75,7 +78,7 @@ def test_estimates_are_shown_and_become_a_file_with_comments_and_settings_at_an_
     A, C, rates = flight(tmp_path, 2, every=3)
     changed = ("--set", "thrusters.+M1.force=12N", "--set", "limits.horizon=90s")
     shown = fit(run, "flight.csv", "-o", "now.yaml", "--at", "90s", "--json", "f.json", *changed)
-    for text in ("C/A only, never A and C apart", "bias of omega_3: kept as the file has it", "A and C +0.9999"):
+    for text in ("C/A only, never A and C apart", "bias of omega_3: kept as the file has it", "A and C +0.9992"):
         assert text in shown
     rows, ratio = estimates(tmp_path), estimates(tmp_path)["C/A"]
     assert abs(ratio["value"] - C / A) < 4.0 * ratio["sigma"]
@@ -174,7 +177,7 @@ def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path)
     now = nutdamp.load(tmp_path / "now.yaml")
     assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -10.0, 0.0])
     assert now.dispersions is not None
-    assert now.dispersions.thrust["+M1"].size == 0.02
+    assert now.dispersions.thrust["+M1"].size == 0.01
 
 
 @pytest.mark.weekly
@@ -199,7 +202,7 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
     assert "thrust factor of +M1" not in shown["after"]
     known = nutdamp.load(tmp_path / "after.yaml").dispersions
     assert known is not None
-    assert known.thrust["+M1"].size == 0.02
+    assert known.thrust["+M1"].size == 0.01
 
 
 @pytest.mark.deep
@@ -218,8 +221,8 @@ def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Pa
     assert [each["coast_s"] for each in coasts] == pytest.approx([15.0, 30.0, 60.0, 120.0, 240.0])
     assert all(each["propellant_kg"] is None for each in coasts)
     assert all(0.0 < each["propellant_kg"] < ahead["propellant_kg"] for each in probes)
-    # 2 % of thrust becomes what is left of it beside A, whose scale no record tells.
-    assert all(0.0034 < each["sigma_thrust"] < 0.006 for each in probes)
+    # 1 % of thrust becomes what is left of it beside A, whose scale no record tells.
+    assert all(0.0014 < each["sigma_thrust"] < 0.0024 for each in probes)
     if ahead["probe"] is not None:
         assert "The probe pulse takes" in shown
     if probability == 99.7:
@@ -258,7 +261,7 @@ def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(r
         nutdamp.fit(tmp_path / "flight.csv", nutdamp.example().replace(mass=200.0)).text()
     again = nutdamp.fit(tmp_path / "flight.csv", first.spacecraft(0.0))
     before, after = ({row.key: row for row in each.estimates()} for each in (first, again))
-    assert before["A"].sigma == pytest.approx(0.005 * 120.0 / math.sqrt(2.0), rel=0.02)
+    assert before["A"].sigma == pytest.approx(0.002 * 120.0 / math.sqrt(2.0), rel=0.02)
     assert after["A"].sigma == pytest.approx(before["A"].sigma, rel=0.01)
     assert after["A"].value == pytest.approx(before["A"].value, abs=0.05 * before["A"].sigma)
     assert after["C/A"].sigma == pytest.approx(before["C/A"].sigma / math.sqrt(2.0), rel=0.05)
@@ -269,11 +272,11 @@ def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(r
 @pytest.mark.weekly
 def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_path: Path) -> None:
     surely = ("-q", "--set", "requirement.probability=99.7%", "--json", "f.json")
-    assert run("disperse", *surely).returncode == 4
+    assert run("disperse", *surely, *WIDE).returncode == 4
     assert results(tmp_path)["requirement"]["met_fraction"] < 0.88
     for seed in (3, 4):
-        flight(tmp_path, seed)
-        fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "90s")
+        flight(tmp_path, seed, wide=True)
+        fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "90s", *WIDE)
         screen = run("disperse", "now.yaml", *surely)
         assert screen.returncode == 0, screen.stdout
         assert results(tmp_path)["requirement"]["met_fraction"] >= 0.997
@@ -309,7 +312,7 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     assert force == pytest.approx([0.0, -10.0 * values["thrust +M1"], 0.0])
     assert known is not None
     assert known.thrust["+M1"].size < 0.006
-    assert known.thrust["-M1"].size == 0.02  # did not fire: stays as it was
+    assert known.thrust["-M1"].size == 0.01  # did not fire: stays as it was
     pairs = {frozenset(pair[:2]): pair[2] for pair in known.correlation}
     assert pairs[frozenset(("thrust +M1", "A"))] > 0.99
 

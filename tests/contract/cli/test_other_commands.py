@@ -140,7 +140,7 @@ def test_a_misspelt_inertia_stops_every_command(run: Run, tmp_path: Path) -> Non
 
 
 def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Path) -> None:
-    planned = result(run, "plan -q --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s")
+    planned = result(run, "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s")
     assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
     for name in ("a.yaml", "b.yaml"):
         run("init", name)
@@ -203,7 +203,7 @@ def test_what_is_no_text_is_refused(run: Run, tmp_path: Path) -> None:
 
 def test_a_file_of_another_kind_is_called_what_it_is(run: Run, tmp_path: Path) -> None:
     """Their faults, such as a text where a mapping is expected, named no cure."""
-    for command in ("plan --csv pulses", "simulate --csv track", "plan --json plan"):
+    for command in ("plan --nominal --csv pulses", "simulate --csv track", "plan --nominal --json plan"):
         assert call(run, f"{command} --scheme four-pulse").returncode == 0
     (tmp_path / "apm").write_text("COMMENT a\nCCSDS_APM_VERS = 2.0\n")
     (tmp_path / "xml").write_text('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n')

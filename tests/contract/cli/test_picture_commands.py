@@ -30,7 +30,7 @@ def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic
     pytest.importorskip("matplotlib")
     assert call(run, f"simulate --scheme four-pulse --figure motion --plot a.{ending}").returncode == 0
     assert call(run, f"plan --figure timeline --plot b.{ending}").returncode == 0
-    disperse = "disperse --scheme two-pulse --samples 200 --figure cases"
+    disperse = "disperse --scheme four-pulse --samples 200 --figure cases"
     assert call(run, f"{disperse} --plot c.{ending}").returncode == 4
     assert names(tmp_path) == [f"{name}.{ending}" for name in "abc"]
     assert all(content.startswith(magic) for content in contents(tmp_path).values())
@@ -38,14 +38,20 @@ def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic
 
 @pytest.mark.deep
 def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(run: Run, tmp_path: Path) -> None:
-    """optimal for the built-in example: the same picture as that scheme alone, and not that of another."""
+    """two-pulse for the built-in example: the same picture as that scheme alone, and not that of another.
+
+    By nominal values it is optimal.
+    """
     draw = ("--figure", "timeline", "--plot")
-    for name, scheme in (("recommended", ()), ("optimal", ("--scheme", "optimal")), ("two", ("--scheme", "two-pulse"))):
-        run("plan", *scheme, *draw, f"{name}.png")
+    for name, options in {
+        "recommended": "", "two": "--scheme two-pulse", "cheapest": "--nominal", "optimal": "--nominal --scheme optimal"
+    }.items():
+        run("plan", *options.split(), *draw, f"{name}.png")
     for figure in ("sphere", "timeline"):
         assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 4
     drawn = contents(tmp_path)
-    assert drawn["recommended.png"] == drawn["optimal.png"]
+    assert drawn["recommended.png"] == drawn["two.png"]
+    assert drawn["cheapest.png"] == drawn["optimal.png"]
     assert len(set(drawn.values())) == 4
 
 
@@ -266,7 +272,7 @@ def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain_pages")
 def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
-    assert run("report", "--scheme", "half-cone", "--target", "10deg,45deg").returncode == 0
+    assert run("report", "--nominal", "--scheme", "half-cone", "--target", "10deg,45deg").returncode == 0
     for text in ("H ends attilt 10.0000 deg, azimuth 45.0000 deg", "error of H≤ 0.2 deg", "off the target"):
         assert text in page_of(tmp_path)
 

@@ -41,6 +41,7 @@ USAGE = {
                        "simulate --scheme one-pulse --schedule x.csv", "disperse --scheme two-pulse --schedule x.csv",
                        "animate -o a.gif --scheme none --schedule a.csv",
                        "export dated.yaml --format apm --scheme two-pulse --schedule p.csv",
+                       "plan --robust --nominal", "report --nominal --disperse 100", "report --disperse --nominal",
                        "disperse --case 3 --csv x.csv", "export dated.yaml --format stk --xml",
                        "export --format spin-table --scheme none --xml",
                        "export dated.yaml --format apm --until '3 s'"],

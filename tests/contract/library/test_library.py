@@ -72,12 +72,12 @@ def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
         python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py")) for name in ("example", "sweep")
     )
     assert example.returncode == sweep.returncode == 0, example.stderr + sweep.stderr
-    assert "<Plan optimal: 10 pulses" in example.stdout
+    assert "<Plan two-pulse: 2 pulses until 7.434 s" in example.stdout
     assert (tmp_path / "track.csv").stat().st_size > 100_000
     lines = []
     for angle in (1, 3, 5):
         changed = ("--set", f"state.nutation={angle} deg", "--set", "limits.horizon=300 s")
-        run("plan", "--scheme", "two-pulse", *changed, "--json", "plan.json")
+        run("plan", "--nominal", "--scheme", "two-pulse", *changed, "--json", "plan.json")
         (plan,) = json.loads((tmp_path / "plan.json").read_text())["plans"]
         assert plan["flown"]["nutation_deg"] < 1e-6
         lines.append(f"{angle} deg: {plan['propellant_kg']:.5f} kg of propellant")
@@ -86,7 +86,7 @@ def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
 
 def test_there_is_one_type_of_each_name() -> None:
     """What the library gives is what the modules below make, not something around it."""
-    compared = nutdamp.compare(CRAFT, ["two-pulse"])
+    compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0)
     (plan,) = compared.plans
     kinds = (spacecraft.Spacecraft, planning.Plan, Comparison, flight.Flight)
     for made, kind in zip((CRAFT, plan, compared, plan.fly()), kinds, strict=True):
@@ -174,6 +174,9 @@ WRONG: list[Call] = [
     lambda: LIB.compare(CRAFT, "two-pulse"),
     lambda: LIB.plan("spacecraft.yaml", "two-pulse"),
     lambda: LIB.compare(planned()),
+    lambda: LIB.compare(CRAFT, samples=-1),
+    lambda: LIB.compare(CRAFT, samples=2.5),
+    lambda: LIB.compare(CRAFT, samples="all"),
     lambda: LIB.read({"name": "X"}),
     lambda: LIB.load(3),
     lambda: LIB.load(b"x"),
@@ -189,6 +192,7 @@ WRONG: list[Call] = [
     lambda: CRAFT.replace(weight=3),
     lambda: LIB.report(planned()),
     lambda: LIB.report(CRAFT, "page.txt"),
+    lambda: LIB.report(CRAFT, "page.html", disperse=-1),
     lambda: LIB.trade(CRAFT, 0),
     lambda: LIB.trade(CRAFT, allow=0.1),
     lambda: LIB.trade(CRAFT, allow=[-0.1]),

@@ -38,7 +38,7 @@ def written(data: object) -> object:
 
 
 def test_files_are_those_of_the_command_line(run: Run, tmp_path: Path) -> None:
-    run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json")
+    run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json")
     run("simulate", "--scheme", "two-pulse", "--flown", "--csv", "flown.csv")
     run("simulate", "--scheme", "two-pulse", "--csv", "impulses.csv")
     plan = nutdamp.plan(CRAFT, "two-pulse")
@@ -46,7 +46,19 @@ def test_files_are_those_of_the_command_line(run: Run, tmp_path: Path) -> None:
     for name, each in made.items():
         each.to_csv(tmp_path / "own.csv")
         assert (tmp_path / "own.csv").read_bytes() == (tmp_path / f"{name}.csv").read_bytes()
-    assert nutdamp.compare(CRAFT, ["two-pulse"]).to_dict() == json.loads((tmp_path / "plan.json").read_text())
+    assert nutdamp.compare(CRAFT, ["two-pulse"], samples=0).to_dict() == json.loads(
+        (tmp_path / "plan.json").read_text()
+    )
+
+
+@pytest.mark.deep
+def test_a_comparison_has_the_numbers_of_the_command(run: Run) -> None:
+    """With dispersed cases, too."""
+    schemes = ("two-pulse", "four-pulse")
+    shown = json.loads(run("plan", *(part for each in schemes for part in ("--scheme", each)), "--json", "-").stdout)
+    assert written(nutdamp.compare(CRAFT, schemes).to_dict()) == shown
+    assert [plan["cases"]["met"] for plan in shown["plans"]] == [True, False]
+    assert shown["decision"]["cases"]["samples"] == 20_000
 
 
 def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +107,7 @@ def test_a_written_schedule_is_read_as_a_plan(tmp_path: Path) -> None:
 
 
 def test_the_recommended_plan_is_one_of_those_compared() -> None:
-    compared = nutdamp.compare(CRAFT)
+    compared = nutdamp.compare(CRAFT, samples=0)
     assert [plan.scheme for plan in compared] == ["one-pulse", "two-pulse", "four-pulse", "optimal"]
     assert compared.recommended is not None
     chosen = compared[compared.recommended.scheme]
@@ -104,6 +116,26 @@ def test_the_recommended_plan_is_one_of_those_compared() -> None:
     assert chosen.total_impulse >= CRAFT.least_impulse * (1 - 1e-12)
     with pytest.raises(KeyError):
         compared["half-cone"]
+
+
+def test_so_many_dispersed_cases_as_are_requested_decide() -> None:
+    """Those of `disperse`; with the plans that it is not about so few of them as it takes."""
+    nominal, compared = (nutdamp.compare(CRAFT, ["four-pulse", "two-pulse"], samples=count) for count in (0, 2_100))
+    assert nominal.recommended is nominal["four-pulse"]
+    assert (nominal.flown, nominal.shares, nominal.results(nominal["four-pulse"])) == (None, {}, None)
+    assert [nominal.meets(plan) for plan in nominal] == [True, True]
+    chosen, other = compared["two-pulse"], compared["four-pulse"]
+    assert compared.recommended is chosen
+    assert [plan.meets_requirement for plan in compared] == [True, True]
+    assert (compared.meets(chosen), compared.meets(other)) == (True, False)
+    cases, share = compared.results(chosen), compared.shares[chosen]
+    assert cases is not None
+    assert (cases.done, cases.requested) == (2_100, 2_100)
+    assert share.low == share.high == cases.met_fraction == nutdamp.disperse(chosen, 2_100).met_fraction
+    few = compared.cases(other)
+    assert few is not None
+    assert (few.samples, few.decided, few.met, compared.results(other)) == (2_048, False, False, None)
+    assert compared.shares[other].high < 0.997
 
 
 def test_dictionaries_hold_no_number_that_json_has_not() -> None:
@@ -190,19 +222,19 @@ def test_a_report_of_replaced_fields_names_no_file(tmp_path: Path) -> None:
 @pytest.mark.weekly
 def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
     craft, options = nutdamp.load(dispersed / "spacecraft.yaml"), nutdamp.Options(on_time=0.2)
-    made = nutdamp.report(craft, dispersed / "own.html", options=options, disperse=200, seed=3)
+    made = nutdamp.report(craft, dispersed / "own.html", options=options, disperse=200)
     text = (dispersed / "own.html").read_text()
-    assert ", options=nutdamp.Options(on_time=0.2), disperse=200, seed=3)" in text
+    assert ", options=nutdamp.Options(on_time=0.2), disperse=200)" in text
     assert made.dispersed is not None
     assert made.comparison.recommended is not None
-    assert made.dispersed.met_fraction == nutdamp.disperse(made.comparison.recommended, 200, seed=3).met_fraction
+    assert made.dispersed.met_fraction == nutdamp.disperse(made.comparison.recommended, 200).met_fraction
     assert made.verdict.startswith(f"Requirement {'met' if made.good else 'NOT met'}: ")
     assert "and in 200 dispersed cases" in text
 
 
 @pytest.mark.deep
 def test_flights_comparisons_and_plans_draw_themselves() -> None:
-    compared = nutdamp.compare(CRAFT, ["two-pulse", "four-pulse"])
+    compared = nutdamp.compare(CRAFT, ["two-pulse", "four-pulse"], samples=500)
     plan = compared["two-pulse"]
     assert [len(plan.fly().figure(name).axes) for name in ("motion", "timeline")] == [2, 1]
     assert len(plan.figure("motion").axes) >= 2

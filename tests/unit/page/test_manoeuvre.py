@@ -43,9 +43,7 @@ def turning(text: str, degrees: float, azimuth: float = math.radians(82.0)) -> S
 
 def manoeuvre(text: str, scheme: str, degrees: float, cases: int = 0) -> Node:
     """The section of the page of a turn by some degrees, without pictures."""
-    compared = compare(turning(text, degrees), [scheme])
-    studied = {scheme: run(Results(study_of(compared.spacecraft, compared[scheme].pulses), cases))} if cases else {}
-    return section(tree(plain_page(compared, dispersed=studied)), "manoeuvre")
+    return section(tree(plain_page(compare(turning(text, degrees), [scheme], samples=cases))), "manoeuvre")
 
 
 @pytest.mark.weekly

@@ -16,8 +16,9 @@ from support.cases import deep, weekly
 from support.markup import Node
 from support.pages import plain_page
 from support.process import Run
-from support.shown import cells, compared_text, section, sheet, tree
+from support.shown import cells, section, sheet, tree
 
+from nutdamp.comparison import Comparison, compare
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
@@ -53,10 +54,16 @@ requirement: {nutation: 0.5 deg}
 
 
 @cache
-def page(text: str, *schemes: str, pictured: bool = False) -> str:
+def compared_text(text: str, schemes: tuple[str, ...] = CLASSIC, samples: int | None = 0) -> Comparison:
+    """The comparison of schemes for the text of a spacecraft file, with nominal values if not told otherwise."""
+    return compare(read_spacecraft(text, "craft.yaml"), schemes, samples=samples)
+
+
+@cache
+def page(text: str, *schemes: str, pictured: bool = False, samples: int | None = 0) -> str:
     make = report_page if pictured else plain_page
     repeat = Repeat("nutdamp report 'a <b>.yaml'", "a <b>.yaml", text)
-    return page_html(make(compared_text(text, schemes or CLASSIC), repeat))
+    return page_html(make(compared_text(text, schemes or CLASSIC, samples), repeat))
 
 
 @pytest.fixture
@@ -141,7 +148,7 @@ def test_cells_that_stand_alone_on_narrow_screens_say_column_and_unit(nasty: Nod
 def test_the_same_input_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     contents = []
     for _ in range(2):
-        assert run("report", "--disperse", "1e3", "--scheme", "two-pulse", "-o", "page.html").returncode == 4
+        assert run("report", "--disperse", "1e3", "--scheme", "two-pulse", "-o", "page.html").returncode == 0
         contents.append((tmp_path / "page.html").read_bytes())
     assert contents[0] == contents[1]
 
@@ -175,9 +182,10 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
 
 
 @pytest.mark.deep
-def test_comparison_and_schedule_say_what_the_json_says() -> None:
-    both = compared_text(example_text())
-    shown, data = tree(page(example_text())), comparison_json(both, {})
+@pytest.mark.parametrize(("samples", "recommended"), [(0, "four-pulse"), (None, "two-pulse")])
+def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, recommended: str) -> None:
+    both = compared_text(example_text(), CLASSIC, samples)
+    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both, {})
     (heads, *rows), *_ = (cells(table) for table in section(shown, "schemes").all("table"))
     names = [head.text for head in heads]
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
@@ -193,9 +201,15 @@ def test_comparison_and_schedule_say_what_the_json_says() -> None:
             cell = row[names.index(head)]
             value = float(cell.attributes.get("data-value", cell.text))
             assert value == pytest.approx(expected, rel=1e-3, abs=1e-9)
-        assert row[names.index("nominal requirement")].text == ("met" if plan["meets_requirement"] else "NOT met")
-    assert [row.attributes.get("class") for row in shown.all("tr")].count("mark") == 1
+        assert row[names.index("requirement")].text == ("met" if plan["meets_requirement"] else "NOT met")
+        assert ("cases that comply %" in names) == (samples is None) == ("cases" in plan)
+        if samples is None:
+            share = plan["cases"]["met_fraction"]
+            told = f"{100.0 * share:.3f}" if share is not None else "≥ 99.7" if plan["cases"]["met"] else "< 99.7"
+            assert row[names.index("cases that comply %")].text == told
+    (marked,) = (row for row in shown.all("tr") if row.attributes.get("class") == "mark")
     assert both.recommended is not None
+    assert marked.all("th")[0].text == both.recommended.scheme == recommended
     fired = sheet(section(shown, "schedule"), "Pulses of")
     for row, pulse in zip(fired, both.recommended.pulses, strict=True):
         assert row["channel"] == pulse.channel
@@ -268,12 +282,13 @@ dispersions: {A: {normal: SIGMA}}
 
 @pytest.mark.parametrize(("sigma", "good"), [deep("5 %", False), weekly("0.1 %", True)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
-    both = compared_text(DISPERSED.replace("SIGMA", sigma), ("two-pulse",))
+    both = compared_text(DISPERSED.replace("SIGMA", sigma), ("two-pulse",), 1000)
     assert both.recommended is not None
     assert both.recommended.meets_requirement
+    assert both.meets(both.recommended) is good
     results = run(Results(study_of(both.spacecraft, both.recommended.pulses), 1000), threads=1)
     make = report_page if good else plain_page
-    made = make(both, Repeat("", "", ""), dispersed={"two-pulse": results})
+    made = make(both, Repeat("", "", ""))
     assert made.good == good
     assert results.met_fraction is not None
     said = f"{'met' if good else 'NOT met'}: {100 * results.met_fraction:.1f} % of cases comply (90 % required)"

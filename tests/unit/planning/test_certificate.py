@@ -132,7 +132,7 @@ def test_what_has_no_certificate_says_why_and_the_command_what_to_name(run: Run,
 
 
 def test_the_command_writes_the_file_and_says_what_it_proves(run: Run, tmp_path: Path) -> None:
-    limits = ("--set", "limits.horizon=30 s")
+    limits = ("--nominal", "--set", "limits.horizon=30 s")
     result = run("plan", "--quiet", "--scheme", "optimal", "--certificate", "proof.json", *limits, columns=200)
     assert result.returncode == 0
     text = (tmp_path / "proof.json").read_text()
@@ -151,7 +151,8 @@ def test_the_curve_is_drawn_with_the_bound(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.deep
 def test_where_another_plan_is_recommended_the_command_says_whose_certificate_it_writes(run: Run) -> None:
-    command = ["plan", "--certificate", "proof.json", "--scheme", "optimal", "--scheme", "four-pulse", "--json", "-"]
+    command = ["plan", "--nominal", "--scheme", "optimal", "--scheme", "four-pulse"]
+    command += ["--certificate", "proof.json", "--json", "-"]
     impulse, pulses = (run(*command, "--least", least, columns=200) for least in ("impulse", "pulses"))
     schemes = [json.loads(one.stdout)["decision"]["scheme"] for one in (impulse, pulses)]
     assert schemes == ["optimal", "four-pulse"]

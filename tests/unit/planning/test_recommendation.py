@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from support.builders import BOTH, HALF_A_DEGREE, INFEASIBLE, POINTING, Judged, cross, judged, said, spinner, warned
 from support.cases import deep, weekly
@@ -16,12 +17,14 @@ import nutdamp
 from nutdamp import planning, schemes
 from nutdamp.commands import Block
 from nutdamp.comparison import Comparison, compare, usual
+from nutdamp.decision import decide
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Plan
 from nutdamp.presentation import verdicts
 from nutdamp.recommendation import Gain, Ground, Standing, cheapest, recommend
 from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Goal, Requirement
+from nutdamp.screening import Candidate, Cases
+from nutdamp.spacecraft import Goal, Requirement, Vector
 
 SPIN = Goal(spin=3.0)
 PERIOD = spinner().inertial_period
@@ -39,7 +42,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 }
 
 # What is tested | what is given: the requirement or goal | the best, what decided | plans: name, nutation left in deg,
-# propellant, shift of H in deg, end, spin; ! breaks a cone, ? is infeasible.
+# propellant, shift of H in deg, end, spin, pulses, ΔV; ! breaks a cone, ? is infeasible.
 RULE = """
 infeasible plans are passed over                |        | a ONLY        | ? 0; a 3
 one per cent of the 5° is as good as nothing    |        | thrifty COST  | thrifty 0.0495 0.1; clean 1e-12 0.2
@@ -68,7 +71,13 @@ of what leaves but rounding the cheapest        | tiny   | noisy COST    | quiet
 also where another part is missed               | still  | cheap COST    | dear 1e-13 0.2 0.3; cheap 0 0.1 0.3
 equal costs: the earlier end                    |        | early END     | late 0 12.6312 1 28; early 0 12.6323 1 15
 less shift first                                |        | b SHIFT       | late 0 12.6312 1 28; early 0 12.6323 1 15; b 0 12.633 0.5 90
-then the end                                    |        | c SHIFT_END   | a 0 12.6312 1 28; d 0 12.6323 1 15; b 0 12.633 0.5 90; c 0 12.633 0.5 80
+then the end                                    |        | c END         | a 0 12.6312 1 28; d 0 12.6323 1 15; b 0 12.633 0.5 90; c 0 12.633 0.5 80
+fewer pulses before all of these                |        | few PULSES    | many 0 1 0 1 - 4 0; few 0 1.0005 1 9 - 3 5
+then less ΔV                                    |        | slow DELTA_V  | fast 0 1 0 1 - 2 0.3; slow 0 1.0005 1 9 - 2 0.2; many 0 1 0 1 - 3 0
+speeds within 0.01 mm/s                         |        | still SHIFT   | shifting 0 1 1 1 - 2 0.2; still 0 1 0 9 - 2 0.200009
+no further                                      |        | slow DELTA_V  | slow 0 1 1 9 - 2 0.2; still 0 1 0 1 - 2 0.200011
+where one is not known the shift                |        | still SHIFT   | slow 0 1 1 1 - 2 0.2; still 0 1 0 9 - 2 -
+however few pulses a dearer plan takes          |        | many COST     | many 0 1 0 1 - 9; few 0 1.002 0 1 - 1
 half a thousandth is equal                      |        | early END     | late 0 1 0 9; early 0 1.0005
 two are not                                     |        | late COST     | late 0 1 0 9; early 0 1.002
 shifts within half a nanoradian                 |        | early END     | late 0 1 0 9; early 0 1 2.9e-8
@@ -80,24 +89,33 @@ a missed spin                                   | spin   | cheap ONLY    | cheap
 CASES = [[cell.strip() for cell in line.split("|")] for line in RULE.strip().splitlines()]
 
 
-class Straying(Judged):
-    """A plan with which the spin axis breaks a cone."""
+@dataclass(frozen=True, eq=False)
+class Given(Judged):
+    """A plan that perhaps breaks a cone, and whose ΔV is given."""
+
+    strays: bool = False
+    speed: float | None = None
 
     @property
     def kept(self) -> bool | None:
-        return False
+        return False if self.strays else None
+
+    @property
+    def delta_v(self) -> Vector | None:
+        return None if self.speed is None else self.speed * np.array([0.6, 0.0, -0.8])
 
 
 def made(
     name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: Any
 ) -> Plan:
-    degrees = more.pop("degrees", 5.0)
+    degrees, speed = more.pop("degrees", 5.0), more.pop("speed", None)
     one = judged(name, nutation, propellant=cost, shift=shift, end=end, **more)
     if degrees != 5.0:
         one = replace(one, spacecraft=spinner(degrees=degrees))
-    if name.startswith("!"):
+    if name.startswith("!") or speed is not None:
         assert isinstance(one, Judged)
-        return Straying(one.spacecraft, name, one.schedule, ended=one.ended)
+        strays = name.startswith("!")
+        return Given(one.spacecraft, name, one.schedule, ended=one.ended, strays=strays, speed=speed)
     return INFEASIBLE if name == "?" else one
 
 
@@ -105,7 +123,9 @@ def plans_of(given: str, text: str) -> list[Plan]:
     plans = []
     for name, *rest in (one.split() for one in text.split(";")):
         numbers = [None if one == "-" else float(one) for one in rest]
-        plans.append(made(name, *numbers[:4], **GIVEN[given], spin=dict(enumerate(numbers)).get(4)))  # type: ignore[arg-type]
+        more = dict(zip(("spin", "pulses", "speed"), numbers[4:], strict=False))
+        more["pulses"] = int(more.get("pulses") or 1)
+        plans.append(made(name, *numbers[:4], **GIVEN[given], **more))  # type: ignore[arg-type]
     return plans
 
 
@@ -135,6 +155,65 @@ def test_the_plan_to_fly_what_decided_and_the_words_for_it_and_for_what_is_misse
     ):
         late, early = made("late", 0.0, share, end=9.0), made("early", 0.0, 1.0)
         assert cheapest([early, late], late) == ({"late": late, "early": early}[name], why)
+
+
+# What is tested | what is given | the best, what decided, its standing, of how many | plans | of the cases those that
+# comply with each; of 0.997 that must. What lies between two is not known more closely.
+BY_CASES = """
+enough must comply               | half | dear ONLY COMPLIES 1    | cheap 0.4 0.1; dear 0 0.2         | 0.996; 0.998
+then the cheapest                | half | cheap COST COMPLIES 2   | cheap 0.4 0.1; dear 0 0.2         | 0.997; 1
+few may do to know               | half | cheap COST COMPLIES 2   | cheap 0.4 0.1; dear 0 0.2         | 0.997-1; 0.998
+what is not known does not count | half | dear ONLY COMPLIES 1    | cheap 0.4 0.1; dear 0 0.2         | 0.996-1; 0.997
+too few with each: most          | half | dear CASES MISSES 2     | cheap 0.4 0.1; dear 0 0.2         | 0.8; 0.9
+whatever nominal values say      | half | off CASES MISSES 2      | off 0.6 0.2; fine 0 0.1           | 0.8; 0.7
+surely most                      | half | b CASES MISSES 2        | a 0 0.1; b 0 0.2                  | 0.7-1; 0.75-0.8
+of as many the cheapest          | half | cheap CASES MISSES 3    | dear 0 0.2; cheap 0 0.1; c 0 0.05 | 0.8; 0.8; 0.7
+none at all: least nutation      | half | two LEFT MISSES 2       | one 0.7 0.1; two 0.6 9            | 0; 0
+a plan alone                     | half | a ONLY MISSES 1         | a 0 0.1                           | 0.5
+not known of a plan alone        | half | a ONLY MISSES 1         | a 0 0.1                           | 0-1
+cones are kept                   | half | kept ONLY COMPLIES 1    | !cheap 0 0.1; kept 0 0.2          | 1; 0.998
+also with too few                | half | kept CASES MISSES 2     | !a 0 0.1; kept 0 0.2; b 0 0.3     | 0.9; 0.8; 0.7
+what is not bounded is damped    | keep | damping ONLY COMPLIES 1 | idle 4.9 0; damping 0.01 0.5 0.1  | 1; 0.998
+or else enough comply            | keep | idle ONLY MEETS 1       | idle 4.9 0; damping 0.01 0.5 0.1  | 0.998; 0.9
+"""
+
+
+def with_shares(plans: list[Plan], text: str) -> Comparison:
+    """The comparison of plans that flew so many of 20,000 cases that the share that complies is known so closely."""
+    flown: dict[Plan, Candidate] = {}
+    for plan, bounds in zip(plans, text.split(";"), strict=True):
+        low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
+        one = Candidate(plan, "", Cases(20_000 if low == high else 2_048, 20_000, 1, low, 0.997, {}))
+        one.low, one.high = low, high
+        flown[plan] = one
+    return Comparison(plans[0].spacecraft, tuple(plans), flown)
+
+
+def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() -> None:
+    lines = []
+    for what, given, decided, text, shares in (
+        [cell.strip() for cell in line.split("|")] for line in BY_CASES.strip().splitlines()
+    ):
+        best, ground, standing, count = decided.split()
+        compared = with_shares(plans_of(given, text), shares)
+        for found in (compared.recommendation, recommend(compared.plans, compared.shares)):
+            assert found.plan is compared.recommended is compared[best], what
+            told = found.ground, found.standing, found.count
+            assert told == (Ground[ground], Standing[standing], int(count)), what
+        assert [compared.meets(one) for one in compared] == [
+            one.meets_requirement and compared.shares[one].low >= 0.997 for one in compared
+        ]
+        decision = decide(compared)
+        assert decision is not None
+        unknown = compared.shares[compared[best]].exact is None  # the budget of work ended before all cases had flown
+        assert (decision.unknown, decision.met) == (unknown, compared.meets(compared[best]) and not unknown), what
+        lines.append(" ".join((f"{what}: {verdicts.reason(compared)}.", *verdicts.warnings(compared))))
+        lines.append("; ".join(verdicts.share_text(compared.shares[one]) for one in compared))
+    check_text("plan.reasons-by-cases", "\n".join(lines))
+    # Nothing is required: no cases decide.
+    free = with_shares(plans_of("", "a 0 0.1; b 0 0.2"), "0.1; 0.2")
+    assert (free.shares, free.recommendation.ground) == ({}, Ground.COST)
+    assert free.meets(free["a"]) is None
 
 
 @pytest.mark.parametrize("degrees", [8, 60])
@@ -214,21 +293,73 @@ def test_the_cheapest_plan_that_gains_much_for_little_more_is_an_alternative() -
             assert found.plan is best or len(best.pulses) == 0
 
 
+def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed() -> None:
+    """Where it takes commands: command blocks, and no pulse at all."""
+    commands = nutdamp.load(case("cbp1004.yaml")).commands
+    assert commands is not None
+    given = fired(0.1), fired(0.2, BLOCK), made("none", 0.1, 0.0, pulses=0, required=BOTH)
+    bodies = [replace(given[0].spacecraft, commands=one) for one in (None, commands)]
+    for_free, commanded = ([replace(one, spacecraft=body) for one in given] for body in bodies)
+    assert [one.commandable for one in for_free] == [True] * 3
+    assert [one.commandable for one in commanded] == [False, True, True]
+    timed, block, none = commanded
+    assert Comparison(bodies[0], (for_free[1], for_free[0])).recommended is for_free[0]
+    for plans, named, free, eligible in (
+        ((timed, block), False, False, (block,)),
+        ((timed, block, none), False, False, (block, none)),
+        ((timed, block), True, False, (block,)),  # one of those named can be commanded
+        ((timed,), True, False, (timed,)),
+        ((timed,), False, False, ()),
+        ((timed, block), False, True, (timed, block)),
+        ((INFEASIBLE, block), False, True, (block,)),
+        ((INFEASIBLE,), True, False, ()),
+    ):
+        compared = Comparison(bodies[1], plans, named=named, timed=free)
+        assert compared.eligible == eligible
+        assert compared.recommended is (min(eligible, key=lambda one: one.pulses.cost) if eligible else None)
+    alone = Comparison(bodies[1], (timed,))
+    assert (decide(alone), alone.reason == Comparison(bodies[1], (INFEASIBLE,)).reason) == (None, False)
+    check_text("decision.none-commanded", alone.reason)
+
+
+def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
+    """Unless schemes are named, it is of use to nothing else."""
+    for degrees, needless in ((0.4, True), (0.6, False)):
+        body = spinner(degrees=degrees, channels=cross(20.0), requirement=HALF_A_DEGREE)
+        assert usual(body) == ("none",) * needless + (*schemes.CLASSIC, "optimal")
+        names = [name for name in usual(body) if name != "optimal"]
+        plans = tuple(planning.plan(body, name) for name in names)
+        for named, those, idle in (
+            (False, plans, needless),
+            (False, plans[-1:], False),
+            (True, plans[-1:], needless),
+            (False, (), needless),
+        ):
+            compared = Comparison(body, those, named=named)
+            assert compared.needless is idle
+            assert (verdicts.needless(compared) is not None) is idle is verdicts.spoken(compared)["no_pulse_needed"]
+        chosen = Comparison(body, plans).recommended
+        assert chosen is not None
+        assert ((chosen.scheme == "none"), len(chosen.pulses) == 0) == (needless, needless)
+    for goal, able in ((Goal(), ()), (SPIN, ()), (Goal(spin=3.3), ("optimal",))):
+        body = replace(spinner(channels=cross(20.0)), goal=goal)
+        assert all(name in usual(body) for name in able)
+        assert ("command-block" in usual(body)) is False
+
+
 def test_the_words_for_what_a_plan_gains_and_for_what_it_is_worse_in() -> None:
     lines = []
-    for best, other, shares in (
-        (SHIFTED, made("still", 0.0, 12.8, 0.01), None),
-        (MANY, FEW, None),
-        (MANY, FEW, {"many": 0.352, "few": 0.67}),
-        (MANY, FEW, {"many": 1.0, "few": 1.0}),  # what is equal is no reason
-        (made("many", 0.0, 0.1, 1.0, pulses=2), made("both", 0.0, 0.104, 0.01, pulses=1), None),
-        (MANY, made("few", 0.0, 0.104, 0.65, pulses=2), None),
-        (MANY, made("few", 0.0, 0.104, 0.65, 1.0 + 1.01 * PERIOD, pulses=2), None),
-        (SLOW, made("soon", 0.0, 0.1045, 0.2, 50.0), None),
-        (BOUND, fired(0.109), None),
-        (BOUND, fired(9.0, BLOCK), None),
+    for best, other in (
+        (SHIFTED, made("still", 0.0, 12.8, 0.01)),
+        (MANY, FEW),
+        (made("many", 0.0, 0.1, 1.0, pulses=2), made("both", 0.0, 0.104, 0.01, pulses=1)),
+        (MANY, made("few", 0.0, 0.104, 0.65, pulses=2)),
+        (MANY, made("few", 0.0, 0.104, 0.65, 1.0 + 1.01 * PERIOD, pulses=2)),
+        (SLOW, made("soon", 0.0, 0.1045, 0.2, 50.0)),
+        (BOUND, fired(0.109)),
+        (BOUND, fired(9.0, BLOCK)),
     ):
-        lines.append(" ".join(verdicts.hints(Comparison(best.spacecraft, (best, other)), shares)))
+        lines.append(" ".join(verdicts.hints(Comparison(best.spacecraft, (best, other)))))
     check_text("plan.hints", "\n".join(lines))
 
 

@@ -14,25 +14,29 @@ from support.cases import deep, weekly
 from support.checker import violations
 from support.dispersed import normal
 from support.golden import refused
+from support.places import case
 from support.single_case import flown_outputs
 
 import nutdamp
-from nutdamp import planning, robust, screening
+from nutdamp import planning, robust, screening, trimming, work
+from nutdamp.commands import Block
 from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
-from nutdamp.decision import Cases
+from nutdamp.decision import decide
 from nutdamp.dispersion import SEED, study_of
 from nutdamp.dispersion.cases import DispersedCases
 from nutdamp.dispersion.inputs import Input
 from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.study import Results, run
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.files.robust_json import robust_json
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Plan
+from nutdamp.recommendation import Ground, Share, recommend
+from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC, Options, four_pulse
-from nutdamp.screening import Candidate
-from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft
+from nutdamp.screening import Candidate, Cases
+from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft, Steerable
 from nutdamp.tightening import Tightening
 from nutdamp.tolerances import Dispersions
 
@@ -56,7 +60,7 @@ def dispersed(
 def planned(
     body: Spacecraft, *names: str, samples: int = SAMPLES, trials: int | None = None
 ) -> robust.RobustComparison:
-    compared = compare(body, names or CLASSIC)
+    compared = compare(body, names or CLASSIC, samples=0 if body.requirement is None else samples)
     attempts = robust.attempts(compared)
     if trials is not None:
         attempts = [partial(list, [("as planned", plan) for plan in compared]), *attempts[:trials]]
@@ -67,6 +71,12 @@ def planned(
 def untightened(monkeypatch: pytest.MonkeyPatch) -> None:
     """How far tolerances have to shrink is not asked: that flies many cases more."""
     monkeypatch.setattr(robust, "tightening", lambda *_: None)
+
+
+@pytest.fixture
+def untrimmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On-times stay as they are planned: each try flies all cases."""
+    monkeypatch.setattr(robust, "trimmed", lambda plan, _: plan)
 
 
 def best(found: robust.RobustComparison) -> Candidate:
@@ -82,7 +92,7 @@ def share(body: Spacecraft, plan: Plan, seed: int = SEED, samples: int = SAMPLES
 def test_a_thruster_that_cannot_be_trusted_is_left_out() -> None:
     """Nominally four-pulse fires the untrusted channel; the robust plan does without, and tells what that takes."""
     untrusted = planning.plan(dispersed(), "four-pulse").pulses.pulses[0].channel
-    found = planned(dispersed(replace(EXACT, thrust={untrusted: share_of(0.3)})), "four-pulse", samples=500)
+    found = planned(dispersed(replace(EXACT, thrust={untrusted: share_of(0.3)})), "four-pulse", samples=250)
     assert found.usual is not None
     more, less = best(found).plan.pulses, found.usual.plan.pulses
     assert [untrusted in {pulse.channel for pulse in pulses} for pulses in (less, more)] == [True, False]
@@ -161,15 +171,112 @@ def test_the_earliest_end_is_a_candidate() -> None:
     assert (best(planned(body, "four-pulse", "optimal")).met or 0.0) >= alone > 0.4
 
 
+ENOUGH = Dispersions(thrust_per_pulse=share_of(0.001))
+
+
 @pytest.mark.deep
-@pytest.mark.usefixtures("untightened")
-def test_of_plans_with_which_all_cases_comply_the_cheapest() -> None:
+@pytest.mark.usefixtures("untightened", "untrimmed")
+@pytest.mark.parametrize(("shift", "scheme"), [(5.0, "four-pulse"), (0.1, "two-pulse")])
+def test_of_plans_with_which_all_cases_comply_the_cheapest(shift: float, scheme: str) -> None:
     """Four pulses of the example cost less, but turn H more; two pulses bring it back."""
-    body = replace(nutdamp.example(), dispersions=Dispersions(thrust_per_pulse=share_of(0.001)))
-    for shift, scheme in ((5.0, "four-pulse"), (0.1, "two-pulse")):
-        requested = Requirement(math.radians(0.5), math.radians(shift), 0.99)
-        found = planned(replace(body, requirement=requested), "four-pulse", "two-pulse")
-        assert (best(found).plan.scheme, best(found).met, found.meets_requirement) == (scheme, 1.0, True)
+    requested = Requirement(math.radians(0.5), math.radians(shift), 0.99)
+    body = replace(nutdamp.example(), dispersions=ENOUGH, requirement=requested)
+    found = planned(body, "four-pulse", "two-pulse")
+    assert (best(found).plan.scheme, best(found).met, found.meets_requirement) == (scheme, 1.0, True)
+
+
+@pytest.mark.deep
+def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it_is_judged_and_new_ones() -> None:
+    requested = Requirement(math.radians(0.5), math.radians(0.1), 0.99)
+    body = replace(nutdamp.example(), dispersions=ENOUGH, requirement=requested)
+    found = planned(body, "two-pulse", trials=0)
+    chosen, whole = best(found), found.candidates[1]
+    assert (chosen.variant, whole.variant, whole.met) == ("as planned, trimmed", "as planned", 1.0)
+    assert chosen is found.candidates[0]
+    assert (found.ground, found.usual, found.comparison.recommended) == (Ground.COST, whole, whole.plan)
+    ratios = [short.on_time / long.on_time for short, long in zip(chosen.plan.pulses, whole.plan.pulses, strict=True)]
+    assert all(trimming.SHORTEST**2 < ratio <= 1.0 for ratio in ratios)
+    assert chosen.plan.pulses.cost < 0.999 * whole.plan.pulses.cost
+    assert found.cost is not None
+    assert found.cost.impulse == chosen.plan.pulses.total_impulse - whole.plan.pulses.total_impulse < 0.0
+    for short, long in zip(chosen.plan.pulses, whole.plan.pulses, strict=True):
+        assert (short.channel, short.t) == (long.channel, pytest.approx(long.t))
+    assert violations(body, chosen.plan.pulses) == []
+    # By the cases of any other schedule; and in others.
+    assert found.decision is not None
+    assert (found.decision.cases, found.decision.met, found.meets_requirement) == (chosen.cases, True, True)
+    assert chosen.met == share(body, chosen.plan) >= 0.99
+    assert found.fresh is not None
+    assert found.fresh.met == share(body, chosen.plan, robust.FRESH) >= 0.99
+    # A little shorter and too few comply.
+    shorter = trimming._scaled(chosen.plan, [0, 1], 0.997)
+    assert shorter is None or min(share(body, shorter), share(body, shorter, robust.FRESH)) < 0.99
+
+
+WIDE = Requirement(nutation=math.radians(2.0))
+
+
+def asked(least: list[float], plan: Plan, *, first: list[Plan] | None = None) -> list[float]:
+    """Of the on-times what is left where a plan complies with ``least`` of each; ``first`` gets those tried."""
+
+    def complies(one: Plan) -> bool:
+        assert one.meets_requirement
+        assert (one.scheme, one.spacecraft) == (plan.scheme, plan.spacecraft)
+        assert violations(one.spacecraft, one.pulses) == []
+        if first is not None:
+            first.append(one)
+        return all(ratio >= share for ratio, share in zip(ratios(one), least, strict=True))
+
+    def ratios(one: Plan) -> list[float]:
+        return [short.on_time / long.on_time for short, long in zip(one.pulses, plan.pulses, strict=True)]
+
+    return ratios(trimming.trimmed(plan, complies))
+
+
+def test_on_times_are_shortened_together_and_then_each_alone() -> None:
+    plan = planning.plan(dispersed(requirement=WIDE), "two-pulse")
+    for least, together in (([0.9, 0.9], 0.9), ([0.93, 0.6], 0.93), ([0.6, 0.93], 0.93), ([0.5, 0.5], 0.8)):
+        left = asked(least, plan)
+        step, finer = 0.2 / 2**trimming.HALVINGS, 0.2 / 2**trimming.FINER
+        for ratio, share in zip(left, least, strict=True):
+            alone = max(share, together * trimming.SHORTEST)
+            assert alone <= ratio <= alone + step + (finer if alone < together else 0.0), least
+    tried: list[Plan] = []
+    assert asked([1.0, 1.0], plan, first=tried) == [1.0, 1.0]
+    assert len(tried) == trimming.HALVINGS + 2 * trimming.FINER
+    assert trimming.trimmed(plan, lambda _: False) is plan
+
+
+def test_what_cannot_be_shortened_stays() -> None:
+    """On ticks, of a command block, without channel or width; below the shortest on-time; many only together."""
+    body = dispersed(requirement=WIDE)
+    plan = planning.plan(body, "two-pulse")
+    pulses, steered = plan.pulses.pulses, spinner(steerable=Steerable(20.0), requirement=WIDE)
+    first = pulses[0]
+    ideal = replace(first, on_time=0.0, torque=None)
+    for fixed in (
+        replace(plan, spacecraft=replace(body, limits=replace(body.limits, tick=1e-3))),
+        replace(plan, schedule=Schedule(pulses, blocks=(Block("+1", 1, 0.1, 0.1, 1),))),
+        replace(plan, schedule=Schedule((ideal, *pulses[1:]))),
+        planning.plan(steered, "two-pulse"),
+    ):
+        assert fixed.feasible
+        assert trimming.trimmed(fixed, lambda _: pytest.fail("it is not to be tried")) is fixed
+    longest = min(pulse.on_time for pulse in pulses)
+    bound = [
+        replace(one, thrusters=tuple(replace(each, min_on_time=0.95 * longest) for each in one.thrusters))
+        for one in body.channels
+    ]
+    shortest = min(asked([0.5, 0.5], replace(plan, spacecraft=replace(body, channels=tuple(bound)))))
+    assert 0.95 <= shortest < 0.96
+    many = replace(body, channels=tuple(one.of(thrust=10.0, isp=220.0) for one in cross(8.0, max_on_time=0.2)))
+    long = planning.plan(many, "four-pulse")
+    assert len(long.pulses) > trimming.FEW
+    tried: list[Plan] = []
+    left = asked([0.9] * len(long.pulses), long, first=tried)
+    assert left == pytest.approx([left[0]] * len(left))
+    assert 0.9 <= left[0] < 0.902
+    assert len(tried) == trimming.HALVINGS
 
 
 LUCKY = """
@@ -202,13 +309,13 @@ def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_ne
     assert seemed
     for one in seemed:
         assert share(body, one.plan, robust.FRESH, found.samples) < found.probability
-    # Where there is no other plan, the new cases decide.
-    alone = robust._checked(replace(found, chosen=seemed[0], candidates=(seemed[0],)), [seemed[0]])
-    assert (alone.chosen, alone.lucky, alone.meets_requirement) == (seemed[0], True, False)
+    # Where there is no other plan, the cases of any schedule decide; the new ones are a note, and nothing is trimmed.
+    alone = robust._trimmed(robust._checked(replace(found, chosen=seemed[0], candidates=(seemed[0],)), [seemed[0]]))
+    assert (alone.chosen, alone.lucky, alone.meets_requirement) == (seemed[0], True, True)
     assert alone.decision is not None
     assert alone.fresh is not None
-    assert alone.decision.cases == alone.fresh.cases
-    assert alone.tightening is not None
+    assert (alone.decision.cases, alone.met, alone.tightening) == (seemed[0].cases, seemed[0].met, None)
+    assert alone.fresh.met < found.probability
 
 
 @pytest.mark.deep
@@ -220,9 +327,10 @@ def test_the_spin_is_part_of_the_requirement_in_every_case() -> None:
     assert best(found).met == pytest.approx(math.erf(1.0 / math.sqrt(2.0)), abs=0.01)
 
 
+@pytest.mark.usefixtures("untrimmed")
 def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(monkeypatch: pytest.MonkeyPatch) -> None:
     """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
-    compared = compare(dispersed(requirement=Requirement(None, math.radians(0.7))), ("four-pulse",))
+    compared = compare(dispersed(requirement=Requirement(None, math.radians(0.7))), ("four-pulse",), samples=500)
     trials, reported = robust.attempts(compared)[:3], list[int]()
     found = robust.compare(compared, trials, reported.append, samples=500)
     planned_as_it_is = next(one for one in found.candidates if one.variant == "as planned")
@@ -245,7 +353,8 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(m
 def candidate(impulse: float, left: float = 0.0, met: float | None = None, end: float = 1.0) -> Candidate:
     """A plan of so many N m s, whose angle left (rad) and share of 1,000 cases met are given."""
     levels = {Part.NUTATION: left, Part.SHIFT: 0.0}
-    return Candidate(judged("plan", 0.0, impulse=impulse, end=end), "as planned", Cases(1_000, 1, met, 0.997, levels))
+    cases = Cases(1_000, 1_000, 1, met, 0.997, levels)
+    return Candidate(judged("plan", 0.0, impulse=impulse, end=end), "as planned", cases)
 
 
 def ranked(usual: Candidate, *given: Candidate) -> robust.RobustComparison:
@@ -278,7 +387,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
     bare = ranked(usual, usual, dear)
     of_A = Input("A", "A", "normal", 0.6, 120.0, "kg m²")
     needed = Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971)
-    fresh = robust.Fresh(Cases(1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
+    fresh = robust.Fresh(Cases(1_000, 1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
     written = robust_json(replace(bare, fresh=fresh, tightening=needed), "because")
     told = (
         written["probability"],
@@ -320,6 +429,133 @@ def test_only_what_cannot_be_chosen_flies_no_more_cases() -> None:
         assert {given.index(one) for one in screening._hopeful(given, 20_000, 0.95)} == hopeful
 
 
+SHORT, LONG, ALL = 2_048, 8_192, 20_000
+NEVER = "cannot be flown"
+
+# Of each plan, the cheapest first, between which shares of all cases those lie that comply, as far as 2,048, 8,192 and
+# 20,000 cases tell; how many it flies; which of them is recommended, and whether enough comply.
+FLOWN: list[tuple[list[tuple[list[tuple[float, float]], int]], int, bool | None]] = [
+    # As many as it takes to know whether enough comply, and all with the plan to fly.
+    (
+        [([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998,) * 2], ALL)],
+        1,
+        True,
+    ),
+    (
+        [([(0.998, 1.0), (0.998, 1.0), (0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)],
+        0,
+        True,
+    ),
+    ([([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL), ([(0.998, 1.0), (0.998, 1.0), (0.999,) * 2], ALL)], 1, True),
+    # Too few with each: all that may be as good as the best.
+    (
+        [
+            ([(0.5, 0.6), (0.55, 0.57), (0.56,) * 2], ALL),
+            ([(0.3, 0.58), (0.4, 0.5)], LONG),
+            ([(0.2, 0.55)], SHORT),
+        ],
+        0,
+        False,
+    ),
+    ([([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL), ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL)], 1, False),
+    # Plans with a case that cannot be flown are out, at once or later.
+    ([([], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
+    ([([(0.998, 1.0)], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
+]
+
+
+@pytest.fixture
+def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, float]]]:
+    """What cases tell of plans, by stage, instead of flying them; each takes a unit of work."""
+    known: dict[Plan, list[tuple[float, float]]] = {}
+
+    def told(one: Candidate, stage: int) -> None:
+        work.spend(1.0)
+        if stage >= len(known[one.plan]):
+            raise Infeasible(NEVER)
+        one.low, one.high = known[one.plan][stage]
+        one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.low)
+
+    def entered(plan: Plan, variant: str, study: object, samples: int) -> Candidate:
+        made = Candidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))
+        told(made, 0)
+        return made
+
+    def further(one: Candidate, samples: int) -> None:
+        assert samples == ALL
+        told(one, 1 + screening.STAGES.index(one.cases.samples))
+
+    monkeypatch.setattr(screening, "entered", entered)
+    monkeypatch.setattr(screening, "_further", further)
+    monkeypatch.setattr(screening, "study_of", lambda *_: None)
+    return known
+
+
+def flown_of(plans: list[Plan], flown: dict[Plan, Candidate]) -> list[int]:
+    return [flown[one].cases.samples if one in flown else 0 for one in plans]
+
+
+def test_plans_compared_fly_as_many_cases_as_decide(staged: dict[Plan, list[tuple[float, float]]]) -> None:
+    for given, chosen, met in FLOWN:
+        plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(len(given))]
+        staged.update({plan: told for plan, (told, _) in zip(plans, given, strict=True)})
+        flown = screening.fly_compared(plans, ALL, lambda shares, those=plans: recommend(those, shares).plan)
+        assert flown_of(plans, flown) == [count for _, count in given]
+        compared = Comparison(plans[0].spacecraft, tuple(plans), flown)
+        assert compared.recommended is plans[chosen]
+        assert compared.meets(plans[chosen]) is met
+        for plan in plans:
+            expected = Share(*staged[plan][-1], 0.997) if plan in flown else Share(0.0, 1.0, 0.997)
+            if plan not in flown or flown[plan].cases.decided:
+                assert compared.shares[plan] == expected
+            assert (compared.cases(plan) is None) == (plan not in flown)
+
+
+def test_without_a_requirement_the_plan_to_fly_has_all_cases_and_a_budget_ends_them(
+    staged: dict[Plan, list[tuple[float, float]]],
+) -> None:
+    free = [judged(f"{n}", 0.0, impulse=1.0 + n) for n in range(2)]
+    staged.update({plan: [(0.0, 0.0)] * 3 for plan in free})
+    flown = screening.fly_compared(free, ALL, lambda shares: recommend(free, shares).plan)
+    assert flown_of(free, flown) == [ALL, SHORT]
+    bound = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(2)]
+    staged.update({plan: [(0.99, 1.0), (0.99, 0.999), (0.998, 0.998)] for plan in bound})
+    for units, expected in ((0.5, [SHORT, 0]), (2.0, [SHORT, SHORT]), (3.0, [LONG, SHORT]), (6.0, [ALL, ALL])):
+        with work.budget("cases", units):
+            flown = screening.fly_compared(bound, ALL, lambda shares: recommend(bound, shares).plan)
+        assert flown_of(bound, flown) == expected
+        decision = decide(Comparison(bound[0].spacecraft, tuple(bound), flown))
+        assert decision is not None
+        assert (decision.unknown, decision.met) == (units < 6.0, units == 6.0)
+
+
+@pytest.mark.deep
+def test_cases_of_a_comparison_are_those_of_a_study_of_each_plan() -> None:
+    """Of the seed of any study, the first ones first; and no more than were asked for."""
+    spread = Dispersions(A=share_of(0.01), thrust_per_pulse=share_of(0.02))
+    body = dispersed(spread, Requirement(math.radians(0.4), math.radians(0.3), 0.6))
+    compared = compare(body, CLASSIC, samples=3_000)
+    assert compared.recommended is not None
+    counts = set()
+    for plan in compared:
+        cases, results = compared.cases(plan), compared.results(plan)
+        assert cases is not None
+        counts.add(cases.samples)
+        again = run(Results(study_of(body, plan.pulses), cases.samples))
+        assert (cases.complying, cases.seed, cases.requested) == (again.met_fraction, SEED, 3_000)
+        assert (results is None) == (cases.samples < 3_000)
+        assert compared.shares[plan].low <= (again.met_fraction or 0.0) <= compared.shares[plan].high
+    assert compared.results(compared.recommended) is not None
+    assert counts == {2_048, 3_000}
+    nominal = [compare(body, CLASSIC, samples=0), compare(replace(body, dispersions=None), CLASSIC)]
+    nominal += [compare(replace(body, requirement=None), CLASSIC)]
+    for one in nominal:
+        assert (one.flown, one.shares, one.cases(one.plans[0]), one.results(one.plans[0])) == (None, {}, None, None)
+    with work.budget("nothing", 0.0):
+        assert compare(body, ["two-pulse"]).flown == {}
+
+
+@pytest.mark.usefixtures("untrimmed")
 @pytest.mark.parametrize(
     "requirement",
     [
@@ -331,7 +567,7 @@ def test_only_what_cannot_be_chosen_flies_no_more_cases() -> None:
 def test_the_choice_is_that_of_all_cases_for_a_fraction_of_them(
     requirement: Requirement | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    body, samples = replace(nutdamp.example(), requirement=requirement), 5_000
+    body, samples = replace(nutdamp.example(), requirement=requirement), 4_000
     few = planned(body, "two-pulse", "four-pulse", samples=samples, trials=7)
     monkeypatch.setattr(screening, "_hopeful", lambda candidates, *_: list(candidates))
     every = planned(body, "two-pulse", "four-pulse", samples=samples, trials=7)
@@ -364,3 +600,19 @@ def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
         run(Results(study, 2_048), watch=interrupt)
     assert not over.is_set()
     over.set()
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("untightened", "untrimmed")
+def test_the_robust_plan_of_a_spacecraft_with_commands_can_be_commanded_unless_pulses_may_be_timed() -> None:
+    """Timed pulses cost far less."""
+    body = replace(nutdamp.load(case("cbp1004.yaml")), dispersions=EXACT)
+    compared = compare(body, ("command-block", "two-pulse"), samples=200)
+    alone = compare(body, ("two-pulse",), samples=200)
+    for one, commanded in ((compared, True), (replace(compared, timed=True), False), (alone, False)):
+        trials = [partial(list, [("as planned", plan)]) for plan in one]
+        found = robust.compare(one, trials, samples=200)
+        assert {each.plan.scheme for each in found.candidates} == (
+            {"command-block"} if commanded else {plan.scheme for plan in one}
+        )
+        assert best(found).plan.commandable is commanded
