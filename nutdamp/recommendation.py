@@ -213,8 +213,8 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
         (Ground.DELTA_V, _speed, SAME_SPEED),
         (Ground.SHIFT, _off, SAME_ANGLE),
     ):
-        values = [measure(one) for one in equal]
-        if any(value is None for value in values):
+        values = [value for one in equal if (value := measure(one)) is not None]
+        if len(values) < len(equal):  # not known of all
             continue
         least = min(values) + same
         equal = [one for one, value in zip(equal, values, strict=True) if value <= least]

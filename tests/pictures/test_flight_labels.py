@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -223,7 +224,7 @@ def test_no_text_is_cut_or_covers_another_and_no_number_is_minus_zero(name: str,
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("path", sorted(places.CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
-def test_no_text_is_cut_in_the_pictures_of_the_configs(path: places.Path) -> None:
+def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
     body = load_spacecraft(str(path))
     for plan in (plan for plan in compare(body, CLASSIC).plans if plan.feasible):
         for name in NAMES:

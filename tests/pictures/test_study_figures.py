@@ -78,9 +78,10 @@ def test_histograms_and_cases_beyond_reach_the_last_case(which: str) -> None:
     for histogram, function, output in zip(axes[::2], axes[1::2], outputs, strict=True):
         values = np.sort(np.degrees(results.values[OUTPUTS.index(output)]))
         (stairs,) = (patch for patch in histogram.patches if isinstance(patch, StepPatch))
-        assert stairs.get_data().edges[-1] == pytest.approx(values[-1])
-        assert float(np.sum(stairs.get_data().values)) == pytest.approx(100.0)
-        assert histogram.get_xlim()[1] >= stairs.get_data().edges[-1]
+        heights, edges, _ = stairs.get_data()
+        assert edges[-1] == pytest.approx(values[-1])
+        assert float(np.sum(heights)) == pytest.approx(100.0)
+        assert histogram.get_xlim()[1] >= edges[-1]
         assert function.get_xlim() == histogram.get_xlim()
         places, shares = line(function, "cases").T
         assert places[-3:] == pytest.approx([values[-2], values[-1], values[-1]], rel=1e-3)

@@ -299,7 +299,7 @@ class BlockSearch:
     def _delays(self) -> Array:
         """All delays that can be commanded."""
         most = round(float(self.commanded(np.array(math.inf))) / self.commands.delay_step)
-        return np.arange(most + 1) * self.commands.delay_step
+        return np.asarray(np.arange(most + 1) * self.commands.delay_step, dtype=np.float64)
 
     @property
     def _all_counts(self) -> NDArray[np.int64]:

@@ -12,8 +12,6 @@ from support import places
 
 from nutdamp import load
 from nutdamp.comparison import compare
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.study import Results, run
 from nutdamp.files.examples import example_text
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.presentation.page.content import Repeat, report_page
@@ -73,14 +71,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             source = next((path.read_text(encoding="utf-8") for path in CONFIGS if path.stem == stem), None)
             source = source or example_text()
             commanded = (*CLASSIC, *COMMANDED) if name.endswith("+") else CLASSIC
-            compared = compare(read_spacecraft(source, f"{name}.yaml"), commanded)
-            repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source)
-            flown = {}
-            if name.endswith(DISPERSED):
-                assert compared.recommended is not None
-                results = Results(study_of(compared.spacecraft, compared.recommended.pulses), 500)
-                flown[compared.recommended.scheme] = run(results, threads=1)
-            made = report_page(compared, repeat, dispersed=flown)
+            samples = 500 if name.endswith(DISPERSED) else 0
+            compared = compare(read_spacecraft(source, f"{name}.yaml"), commanded, samples=samples)
+            made = report_page(compared, Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source))
             target.write_text(page_html(made), encoding="utf-8")
         return target
 
