@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.cases import weekly
-from support.commands import call, names, result, rows, transcript, words
+from support.commands import WIDE, call, names, result, rows, transcript, words
 from support.dispersed import FILE
 from support.golden import check_text
 from support.markup import parsed
@@ -135,18 +135,23 @@ def test_tables_that_the_disk_does_not_hold_are_exit_1(run: Run, body: Path) -> 
 
 @pytest.mark.weekly
 def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path: Path) -> None:
-    """`disperse`, `plan --robust` and `report` of the built-in example, 20,000 cases of seed 1."""
+    """`disperse`, `plan`, `plan --robust` and `report` of the built-in example, 20,000 cases of seed 1."""
     sentence = r"((?:NOT )?met: [\d.]+ % of cases comply \([\d.]+ % required\))"
-    planned = run("plan", "--robust", "--scheme", "two-pulse", "--json", "robust.json")
-    dispersed = run("disperse", "--scheme", "two-pulse", "--json", "s.json")
-    assert run("report", "--scheme", "two-pulse", "--disperse", "20000", "-o", "r.html").returncode == 4
+    two = ("--scheme", "two-pulse", *WIDE)
+    usual, planned = run("plan", *two, "--json", "plan.json"), run("plan", "--robust", *two, "--json", "robust.json")
+    dispersed = run("disperse", *two, "--json", "s.json")
+    assert run("report", *two, "-o", "r.html").returncode == usual.returncode == 4
     report = parsed((tmp_path / "r.html").read_text(encoding="utf-8")).text
     robust = json.loads((tmp_path / "robust.json").read_text())["robust"]
     (share,) = [plan["met_fraction"] for plan in robust["candidates"] if plan["variant"] == "as planned"]
     assert (planned.returncode, robust["recommended"]["met_fraction"]) == (4, share)
     assert json.loads((tmp_path / "s.json").read_text())["requirement"]["met_fraction"] == share
+    (cases,) = (plan["cases"] for plan in json.loads((tmp_path / "plan.json").read_text())["plans"])
+    assert (cases["met_fraction"], cases["samples"], cases["met"]) == (share, 20_000, False)
     verdicts = {
-        text for shown in (planned.stdout, dispersed.stdout, report) for text in re.findall(sentence, words(shown))
+        text
+        for shown in (usual.stdout, planned.stdout, dispersed.stdout, report)
+        for text in re.findall(sentence, words(shown))
     }
     (verdict,) = verdicts
     assert verdict.startswith(f"NOT met: {100 * share:.1f} % of cases comply")

@@ -140,7 +140,9 @@ def test_a_misspelt_inertia_stops_every_command(run: Run, tmp_path: Path) -> Non
 
 
 def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Path) -> None:
-    planned = result(run, "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s")
+    planned = result(
+        run, "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s"
+    )
     assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
     for name in ("a.yaml", "b.yaml"):
         run("init", name)

@@ -29,7 +29,7 @@ FILM = ("--seconds", "0.5", "--fps", "10", "--width", "320")
 def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
     pytest.importorskip("matplotlib")
     assert call(run, f"simulate --scheme four-pulse --figure motion --plot a.{ending}").returncode == 0
-    assert call(run, f"plan --figure timeline --plot b.{ending}").returncode == 0
+    assert call(run, f"plan --nominal --scheme two-pulse --figure timeline --plot b.{ending}").returncode == 0
     disperse = "disperse --scheme four-pulse --samples 200 --figure cases"
     assert call(run, f"{disperse} --plot c.{ending}").returncode == 4
     assert names(tmp_path) == [f"{name}.{ending}" for name in "abc"]
@@ -44,7 +44,10 @@ def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(run: 
     """
     draw = ("--figure", "timeline", "--plot")
     for name, options in {
-        "recommended": "", "two": "--scheme two-pulse", "cheapest": "--nominal", "optimal": "--nominal --scheme optimal"
+        "recommended": "",
+        "two": "--scheme two-pulse",
+        "cheapest": "--nominal",
+        "optimal": "--nominal --scheme optimal",
     }.items():
         run("plan", *options.split(), *draw, f"{name}.png")
     for figure in ("sphere", "timeline"):
@@ -64,7 +67,8 @@ def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> N
     assert {"one-pulse", "two-pulse", "propellant, g", "required"} <= set(texts)
     assert run("plan", "-", "--scheme", "four-pulse", *draw, "none.svg", stdin=EXACT).returncode == 3
     assert "no plan" in (tmp_path / "none.svg").read_text(encoding="utf-8")
-    run("plan", "--scheme", "two-pulse", "--robust", "-q", *draw, "robust.svg")
+    written(tmp_path, tolerant_yaml=EXACT + "dispersions: {A: {normal: 1 %}}\nrequirement: {nutation: 1 deg}\n")
+    run("plan", "tolerant.yaml", "--scheme", "two-pulse", "--robust", "-q", *draw, "robust.svg")
     assert "complying cases, %" in (tmp_path / "robust.svg").read_text(encoding="utf-8")
 
 
@@ -80,7 +84,7 @@ def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.deep
 def test_standard_output_takes_the_picture_alone() -> None:
-    command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--plot", "-", "--figure", "timeline"]
+    command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--nominal", "--plot", "-", "--figure", "timeline"]
     ended = subprocess.run(command, env={**os.environ, "COLUMNS": "80"}, capture_output=True, check=True)
     assert ended.stdout.startswith(b"\x89PNG")
     assert ended.stdout.endswith(b"IEND\xaeB`\x82")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.commands import EXACT, call, contents, result, rows, transcript, words, written
+from support.commands import EXACT, WIDE, call, contents, result, rows, transcript, words, written
 from support.golden import check_text
 from support.process import Run
 
@@ -119,12 +119,13 @@ def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) ->
     assert shift["left_deg"] == pytest.approx(data["plans"][0]["flown"]["momentum_shift_deg"])
     text = (tmp_path / "pulses.csv").read_bytes().decode()
     assert text.endswith("\r\n")  # RFC 4180
+    (first, second) = rows(run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "-").stdout)
+    assert (first["pulse"], second["pulse"]) == ("1", "2")
     table, recommended = rows(text), next(plan for plan in data["plans"] if plan["scheme"] == data["recommended"])
     assert tuple(table[0]) == HEADER
     assert [float(row["t_s"]) for row in table] == [pulse["t_s"] for pulse in recommended["pulses"]]
     assert float(table[-1]["nutation_after_deg"]) == pytest.approx(recommended["flown"]["nutation_deg"], abs=1e-12)
     assert float(table[0]["nutation_before_deg"]) == pytest.approx(data["spacecraft"]["nutation_deg"], rel=1e-9)
-    assert [row["pulse"] for row in rows(run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "-").stdout)] == ["1", "2"]
 
 
 def test_schemes_are_named_and_a_spin_is_a_part_of_the_requirement(run: Run) -> None:
@@ -255,10 +256,10 @@ def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, 
 @pytest.mark.deep
 @pytest.mark.usefixtures("faulty", "plain_pages")
 def test_pages_and_robust_plans_go_on_too(run: Run, tmp_path: Path) -> None:
-    assert run("report").returncode == 1
+    written(tmp_path, sat_yaml=UNTRUSTED)
+    assert run("report", "--disperse", "500").returncode == 1
     assert "ZeroDivisionError" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    schemes = ("--scheme", "two-pulse", "--scheme", "four-pulse")
-    robust = run("plan", "--robust", *schemes, "--set", "limits.tick=1ms")  # which cannot be trimmed
+    robust = run("plan", "sat.yaml", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse")
     assert robust.returncode == 1
     assert "Robust plan: four-pulse" in robust.stdout
     assert "two-pulse: internal error, please report: ZeroDivisionError" in robust.stdout
@@ -303,16 +304,17 @@ def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees:
 
 
 @pytest.mark.weekly
-def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
+def test_the_plan_picked_for_wide_tolerances_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
     """85.6 % of cases comply with two-pulse, the best of the plans that do not end as early as they can."""
-    ended = run("plan", "--robust", "--json", "plan.json")
+    ended = run("plan", "--robust", "--json", "plan.json", *WIDE)
     assert ended.returncode == 0
     data = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     for part in (
         "Robust plan: optimal, against dispersions, ",
         "at least 99.7 % of cases comply with it, of ",
         "Requirement met: 99.",
-        " instead of 63.5 % of cases comply",
+        "Against two-pulse, recommended without --robust: 99.",
+        " instead of 85.6 % of cases comply",
         f"Of 20,000 new cases (seed {data['fresh']['seed']}), not used for the choice, 99.",
     ):
         assert part in words(ended.stdout)
@@ -323,7 +325,15 @@ def test_the_plan_picked_for_the_example_complies_where_no_scheme_does(run: Run,
     assert max(shares) == pytest.approx(0.8562, abs=0.025)
     enough = [plan["propellant_kg"] for plan in data["candidates"] if plan["met_fraction"] >= 0.997]
     assert data["recommended"]["propellant_kg"] == min(enough)
-    assert data["against"]["scheme"] == "optimal"
+    assert (data["against"]["scheme"], data["against"]["met_fraction"]) == ("two-pulse", pytest.approx(max(shares)))
+    (best, *others) = data["candidates"]
+    assert best["variant"] == data["recommended"]["variant"]
+    kind, _, how = best["variant"].rpartition(", ")
+    (untrimmed,) = (plan for plan in others if plan["variant"] == kind)
+    assert how == "trimmed"
+    assert 0.997 <= best["met_fraction"] < untrimmed["met_fraction"]
+    assert 0.8 < best["propellant_kg"] / untrimmed["propellant_kg"] < 0.999
+    assert data["fresh"]["met_fraction"] >= 0.997
 
 
 @pytest.mark.weekly
