@@ -188,7 +188,11 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
     assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
     assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
     blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
-    assert "does not see the Sun at" in " ".join(run("check", "-", stdin=blind).stdout.split())
+    shown = " ".join(run("check", "-", stdin=blind).stdout.split())
+    seen = sun_pulses.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
+    first = sun_pulses.first_sun_pulse(SUN_BODY)
+    assert seen == pytest.approx(first + sun_pulses.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
+    assert f"Sun pulses one every 1.998 s on average; the first at {seen:.4g} s" in shown
 
 
 POINTED = """
