@@ -144,24 +144,24 @@ def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], uni
 def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
     """Of the schemes of which all have flown; those with which too few comply fall short."""
     sure = replace(BODY, dispersions=Dispersions(thrust_per_pulse=normal(0.001, relative=True)))
-    for body, samples, count in ((BODY, 2_000, 3), (BODY, 3_000, 1), (sure, 2_000, 3)):
-        three = compare(body, ("one-pulse", "two-pulse", "four-pulse"), samples=samples)
-        figure = figures.schemes_figure(three)
+    for body, samples, count in ((BODY, 2_000, 2), (BODY, 3_000, 1), (sure, 2_000, 2)):
+        both = compare(body, ("two-pulse", "four-pulse"), samples=samples)
+        figure = figures.schemes_figure(both)
         check_layout(figure)
         axes = column(figure, "complying cases")
-        shares = {plan.scheme: 100.0 * share.exact for plan, share in three.shares.items() if share.exact is not None}
+        shares = {plan.scheme: 100.0 * share.exact for plan, share in both.shares.items() if share.exact is not None}
         assert {name: place for name, (place, _, _) in dots(axes).items()} == pytest.approx(shares)
         assert len(shares) == count
-        meet = {plan.scheme for plan in three.plans if three.meets(plan)}
+        meet = {plan.scheme for plan in both.plans if both.meets(plan)}
         assert ({name for name, (_, mark, _) in dots(axes).items() if mark == "o"}) == meet & set(shares)
         assert meet == (set() if body is BODY else {"two-pulse"})
         chosen = [name for name, (_, mark, filled) in dots(axes).items() if filled and mark == "o"]
-        assert chosen == [name for name in sorted(meet) if three[name] is three.recommended]
-        few = {plan.scheme for plan in three.plans if plan.meets_requirement} - meet
+        assert chosen == [name for name in sorted(meet) if both[name] is both.recommended]
+        few = {plan.scheme for plan in both.plans if plan.meets_requirement} - meet
         assert bool(few) == (body is BODY)
         rows = [text.get_text() for text in column(figure, "nutation").get_yticklabels()]
         assert {row.partition("\n")[0] for row in rows if "too few cases comply" in row} == few
-        assert axes.get_xlim()[1] < 105.0
+        assert axes.get_xlim()[1] <= 106.0  # beyond all of them by 6 % of the scale at most
         assert line(axes, "required")[0, 0] == pytest.approx(99.7)
 
 

@@ -167,7 +167,7 @@ def test_the_last_milestone_is_what_the_study_says_of_the_end(scheme: str) -> No
 
 
 def test_milestones_are_even_and_the_first_pulses_are_those_of_the_first_blocks() -> None:
-    body = turning(FILE, 5.0, 0.5)
+    body = turning(FILE, 3.0, 0.5)
     made = planning.plan(body, "command-block").pulses
     part = first_pulses(made, 4)
     assert [block.count for block in part.blocks] == [4]
