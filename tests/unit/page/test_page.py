@@ -207,13 +207,13 @@ def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, rec
             share = plan["cases"]["met_fraction"]
             told = f"{100.0 * share:.3f}" if share is not None else "≥ 99.7" if plan["cases"]["met"] else "< 99.7"
             assert row[names.index("cases that comply %")].text == told
-    (marked,) = (row for row in shown.all("tr") if row.attributes.get("class") == "mark")
+    (marked,) = (one for one in shown.all("tr") if one.attributes.get("class") == "mark")
     assert both.recommended is not None
     assert marked.all("th")[0].text == both.recommended.scheme == recommended
     fired = sheet(section(shown, "schedule"), "Pulses of")
-    for row, pulse in zip(fired, both.recommended.pulses, strict=True):
-        assert row["channel"] == pulse.channel
-        times = (float(row["start s"]), float(row["on-time s"]))
+    for shot, pulse in zip(fired, both.recommended.pulses, strict=True):
+        assert shot["channel"] == pulse.channel
+        times = (float(shot["start s"]), float(shot["on-time s"]))
         assert times == pytest.approx((pulse.start, pulse.on_time), abs=1e-4)
 
 

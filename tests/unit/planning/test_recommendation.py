@@ -123,9 +123,9 @@ def plans_of(given: str, text: str) -> list[Plan]:
     plans = []
     for name, *rest in (one.split() for one in text.split(";")):
         numbers = [None if one == "-" else float(one) for one in rest]
-        more = dict(zip(("spin", "pulses", "speed"), numbers[4:], strict=False))
-        more["pulses"] = int(more.get("pulses") or 1)
-        plans.append(made(name, *numbers[:4], **GIVEN[given], **more))  # type: ignore[arg-type]
+        more: dict[str, Any] = dict(zip(("spin", "pulses", "speed"), numbers[4:], strict=False))
+        more = GIVEN[given] | more | {"pulses": int(more.get("pulses") or 1)}
+        plans.append(made(name, *numbers[:4], **more))  # type: ignore[arg-type]
     return plans
 
 

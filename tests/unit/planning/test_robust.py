@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -200,7 +201,8 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert found.cost is not None
     assert found.cost.impulse == chosen.plan.pulses.total_impulse - whole.plan.pulses.total_impulse < 0.0
     for short, long in zip(chosen.plan.pulses, whole.plan.pulses, strict=True):
-        assert (short.channel, short.t) == (long.channel, pytest.approx(long.t))
+        assert short.channel == long.channel
+        assert short.t == pytest.approx(long.t)
     assert violations(body, chosen.plan.pulses) == []
     # By the cases of any other schedule; and in others.
     assert found.decision is not None
@@ -491,6 +493,10 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, floa
     return known
 
 
+def chosen_of(plans: list[Plan], shares: Mapping[Plan, Share]) -> Plan | None:
+    return recommend(plans, shares).plan
+
+
 def flown_of(plans: list[Plan], flown: dict[Plan, Candidate]) -> list[int]:
     return [flown[one].cases.samples if one in flown else 0 for one in plans]
 
@@ -499,7 +505,7 @@ def test_plans_compared_fly_as_many_cases_as_decide(staged: dict[Plan, list[tupl
     for given, chosen, met in FLOWN:
         plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(len(given))]
         staged.update({plan: told for plan, (told, _) in zip(plans, given, strict=True)})
-        flown = screening.fly_compared(plans, ALL, lambda shares, those=plans: recommend(those, shares).plan)
+        flown = screening.fly_compared(plans, ALL, partial(chosen_of, plans))
         assert flown_of(plans, flown) == [count for _, count in given]
         compared = Comparison(plans[0].spacecraft, tuple(plans), flown)
         assert compared.recommended is plans[chosen]
@@ -610,7 +616,7 @@ def test_the_robust_plan_of_a_spacecraft_with_commands_can_be_commanded_unless_p
     compared = compare(body, ("command-block", "two-pulse"), samples=200)
     alone = compare(body, ("two-pulse",), samples=200)
     for one, commanded in ((compared, True), (replace(compared, timed=True), False), (alone, False)):
-        trials = [partial(list, [("as planned", plan)]) for plan in one]
+        trials: list[robust.Attempt] = [partial(list, [("as planned", plan)]) for plan in one]
         found = robust.compare(one, trials, samples=200)
         assert {each.plan.scheme for each in found.candidates} == (
             {"command-block"} if commanded else {plan.scheme for plan in one}

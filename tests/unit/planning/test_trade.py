@@ -69,7 +69,7 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
             *(given(28.0, 0.9, 5.0), given(8.0, 2.5), given(18.0, 1.5, 2.0), given(20.0, 1.4995, 2.0)),
         ]
     )
-    asked, done = list[tuple[str, bool, float]](), list[int]()
+    asked, done = list[tuple[str, bool | None, float]](), list[int]()
 
     def search(body: Spacecraft, name: str, options: OptimalOptions) -> Plan:
         assert name == "optimal"
