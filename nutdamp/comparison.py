@@ -126,7 +126,7 @@ class Comparison(views.Data, views.Tabled):
                     if schemes.SCHEMES[one.scheme].slow == slow:
                         aware = replace(one.options, with_disturbances=True)
                         others = (*others, attempt(body, one.scheme, aware))
-                best = Comparison(body, others).recommended
+                best = replace(self, plans=others, flown=None).recommended
                 if best is not None and best.standing is Standing.COMPLIES:
                     break
         except NutdampError:

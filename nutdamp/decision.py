@@ -127,6 +127,6 @@ def decide(compared: Comparison) -> Decision | None:
     plan = compared.recommended
     if plan is None:
         return None
-    cases = compared.cases(plan)
-    undecided = plan in compared.shares and (cases is None or not cases.decided)
+    cases, share = compared.cases(plan), compared.shares.get(plan)
+    undecided = share is not None and share.met is None
     return Decision(plan, None if undecided else cases, undecided)

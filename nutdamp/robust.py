@@ -161,6 +161,7 @@ def compare(
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
+    timed = comparison.timed or (comparison.named and not any(one.commandable for one in comparison.eligible))
     found: dict[object, Candidate] = {}
     for number, trial in enumerate(trials):
         watch(number)
@@ -170,6 +171,8 @@ def compare(
             if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
+            if not (timed or own.commandable):
+                continue
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                 found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
     candidates = list(found.values())

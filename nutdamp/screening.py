@@ -61,8 +61,8 @@ class Cases:
 
     @property
     def met(self) -> bool | None:
-        """Whether as many cases comply as must; not where some have not flown, None where nothing is required."""
-        return None if self.complying is None else self.decided and self.complying >= self.probability
+        """Whether as many of those flown comply as must; None where nothing is required."""
+        return None if self.complying is None else self.complying >= self.probability
 
 
 def cases_of(results: Results, requested: int | None = None) -> Cases:

@@ -13,7 +13,7 @@ from nutdamp.planning import Plan
 from nutdamp.schedule import channel_pulse
 
 SHORTEST = 0.8
-"""Share of the on-times that is left at least."""
+"""Share of on-times that is left at least when they are shortened: together, and then each alone once more."""
 
 HALVINGS, FINER = 7, 3
 """Steps in which all on-times are shortened together, and then each alone."""

@@ -158,7 +158,8 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     found, body = compared.recommendation, compared.spacecraft
     if found.standing is Standing.COMPLIES:
         return
-    if chosen in compared.shares and chosen.standing is not Standing.MISSES:
+    missing = found.standing is Standing.MISSES
+    if missing and chosen in compared.shares and chosen.standing is not Standing.MISSES:
         yield _too_few(chosen, compared)
         return
     required = found.standing is Standing.MISSES and bool(compliance.required(body))
@@ -175,11 +176,12 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
 def _too_few(chosen: Plan, compared: Comparison) -> str:
     """That no plan meets the requirement in enough dispersed cases."""
     share = compared.shares[chosen]
-    if share.exact is None:
+    if share.met is None:
         return f"{sentence(UNDECIDED)} Nominal values alone: plan --nominal."
-    least, count = exact_percent(share.probability), len(compared.plans)
-    head = f"With none of the {count} schemes compared" if count > 1 else f"With {chosen.scheme} not"
-    return f"{head} do {least} of cases comply. nutdamp plan --robust looks for a plan made for the tolerances."
+    count = len(compared.plans)
+    whom = f"any of the {count} schemes compared" if count > 1 else chosen.scheme
+    few = f"Fewer than {exact_percent(share.probability)} of cases comply with {whom}."
+    return f"{few} nutdamp plan --robust looks for a plan made for the tolerances."
 
 
 UNDECIDED = "the share of cases that comply is undecided: not all of them could be flown within the budget of work"
