@@ -74,7 +74,11 @@ def test_plan_draws_all_schemes_beside_each_other(run: Run, tmp_path: Path) -> N
 
 @pytest.mark.weekly
 def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
-    texts = {"cases": "cases beyond, %", "momentum": "H towards you, inertial x to the right", "budget": "A, 0.24 kg m²"}
+    texts = {
+        "cases": "cases beyond, %",
+        "momentum": "H towards you, inertial x to the right",
+        "budget": "A, 0.24 kg m²",
+    }
     for figure in (*texts, "all"):
         named = () if figure == "all" else ("--figure", figure)
         run("disperse", "--scheme", "two-pulse", "--samples", "200", "-q", "--plot", f"{figure}.svg", *named)
