@@ -76,6 +76,11 @@ class Comparison(views.Data, views.Tabled):
         return feasible if self.named and not commanded else commanded
 
     @property
+    def restricted(self) -> bool:
+        """Whether feasible plans were left out because they cannot be commanded."""
+        return len(self.eligible) < sum(one.feasible for one in self.plans)
+
+    @property
     def needless(self) -> bool:
         """Whether no pulse has to be fired: the recommended plan has none, or those named are not needed."""
         chosen = self.recommended

@@ -57,7 +57,7 @@ SCHEMES, PRIMER = "schemes", "primer"
 @goal_options
 @click.option("--robust", is_flag=True, help="Cheapest plan with which enough cases comply.")
 @click.option("--nominal", is_flag=True, help="Judge nominal values alone, no dispersed cases.")
-@click.option("--timed", is_flag=True, help="Recommend pulses that no command block fires, too.")
+@click.option("--timed", is_flag=True, help="Recommend pulses no command block fires, too.")
 @click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
 @click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")

@@ -105,7 +105,8 @@ def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _:
     spacecraft = found.model.spacecraft
     now = carried(found, time)
     body = replaced(spacecraft, now)
-    plan = comparison.compare(body, comparison.usual(body)).recommended
+    known = replace(body, dispersions=posterior(spacecraft.dispersions, now))
+    plan = comparison.compare(known).recommended
     if plan is None or not len(plan.pulses):
         raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
     probability = required_share(spacecraft.requirement)

@@ -71,7 +71,8 @@ def report(
     name, kept = arguments.path("output", output), controlled(**control)
     expect_html(name)
     body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
-    compared = compare(body, names, options, samples=disperse)
+    samples = disperse if disperse in (None, 0) else arguments.count("disperse", disperse)
+    compared = compare(body, names, options, samples=samples)
     known = isinstance(options, Options) and options.with_disturbances
     fronts = () if points is None else trade(body, points, with_disturbances=known).fronts
     given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse}

@@ -30,10 +30,13 @@ COUNT = "cases that comply"
 
 def verdict(decision: Decision) -> str:
     """Whether the requirement is met, in words that leave no doubt for what."""
-    broken, end = list(map(strays, decision.strays)), _at_end(decision)
+    broken, cases = " and ".join(map(strays, decision.strays)), decision.cases
+    if not broken:
+        return _at_end(decision)
     # Cases that break a cone do not comply: what is said of them is not of the end alone.
-    beside = "" if decision.cases is not None and decision.cases.complying is not None else "otherwise "
-    return f"NOT met: {' and '.join(broken)}; {beside}{end}" if broken else end
+    if cases is not None and cases.complying is not None:
+        return f"NOT met: {broken}; {verdicts.cases_share(cases.complying, cases.probability)}"
+    return f"NOT met: {broken}; otherwise {_at_end(decision)}"
 
 
 def statement(decision: Decision) -> Text:
@@ -52,8 +55,9 @@ def _at_end(decision: Decision) -> str:
     if decision.unknown:
         return f"NOT met{' with nominal values' * (not nominal)}: {verdicts.UNDECIDED}"
     if cases is not None and cases.complying is not None:
-        counted = verdicts.cases_verdict(cases.complying, cases.probability)
-        return counted if nominal else f"NOT met with nominal values; {counted}"
+        if nominal:
+            return verdicts.cases_verdict(cases.complying, cases.probability)
+        return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
     said = f"{'met' if nominal else 'NOT met'} with nominal values"
     return f"{said}; dispersed cases were not flown" if decision.undispersed else said
 
@@ -64,12 +68,12 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
     ``looped``: it is the flight of a closed loop, which goes on firing.
     """
     yield from filter(None, (verdicts.idealised(decision.plan),))
+    if looped:
+        return
     if turned := _turned(decision):
         yield f"{decision.plan.scheme} {listed(turned)}."
     if not decision.plan.commandable:
         yield f"{decision.plan.scheme} cannot be commanded: no command block fires its pulses."
-    if looped:
-        return
     yield from _growing(decision)
     if decision.plan.spacecraft.loop is not None:
         yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nutdamp.presentation.text import degrees, mass, moment, quantity
-from nutdamp.presentation.verdicts import exact_percent, percent
+from nutdamp.presentation.verdicts import ROUNDING, exact_percent, percent
 from nutdamp.recommendation import Ground
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.words import listed
@@ -51,17 +51,20 @@ def robust_cost(found: RobustComparison) -> str:
         return "There is nothing to compare it with."
     if chosen is usual:
         return "It is the plan that is recommended without --robust too."
+    pulses = usual.plan.pulses
     if cost.propellant is None:
-        spent = _more(cost.impulse, quantity(abs(cost.impulse), "N m s"), "impulse")
+        less = cost.impulse if abs(cost.impulse) > ROUNDING * pulses.total_impulse else 0.0
+        spent = _more(less, quantity(abs(less), "N m s"), "impulse")
     else:
-        spent = _more(cost.propellant, mass(abs(cost.propellant)), "propellant")
+        less = cost.propellant if abs(cost.propellant) > ROUNDING * (pulses.propellant or 0.0) else 0.0
+        spent = _more(less, mass(abs(less)), "propellant")
     when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
     level = exact_percent(found.probability)
     what = left_name(found.comparison.spacecraft)
     gained = f"{degrees(chosen.left)} instead of {degrees(usual.left)} of {what} in {level} of the cases"
     if chosen.met is not None and usual.met is not None:
         shares = (percent(one.met or 0.0, found.probability) for one in (chosen, usual))
-        gained = f"{' instead of '.join(shares)} of cases comply"
+        gained = f"{' instead of '.join(dict.fromkeys(shares))} of cases comply"
     return f"Against {usual.plan.scheme}, recommended without --robust: {gained}; it takes {spent} and ends {when}."
 
 

@@ -113,7 +113,7 @@ def _only(compared: Comparison) -> str:
     if len(compared.plans) == 1:
         return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
     cones = "keeps the cones" if found.plan is not None and found.plan.kept else ""
-    said = " and ".join(filter(None, (verdict, cones)))
+    said = " and ".join(filter(None, ("can be commanded" * compared.restricted, verdict, cones)))
     return f"the only {'' if verdict else 'feasible '}plan{f' that {said}' * bool(said)}"
 
 
@@ -158,9 +158,10 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     found, body = compared.recommendation, compared.spacecraft
     if found.standing is Standing.COMPLIES:
         return
-    missing = found.standing is Standing.MISSES
-    if missing and chosen in compared.shares and chosen.standing is not Standing.MISSES:
-        yield _too_few(chosen, compared)
+    share = compared.shares.get(chosen)
+    if share is not None and not share.met and chosen.standing is not Standing.MISSES:
+        if chosen.kept is not False:  # else the cones are the reason
+            yield _too_few(chosen, compared)
         return
     required = found.standing is Standing.MISSES and bool(compliance.required(body))
     does, do, what = ("damps", "damp", "nutation") if body.goal.axis is None else ("reaches", "reach", "target")
@@ -168,7 +169,7 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
         does, do, what = "meets", "meet", "requirement"
     it, head = "It", f"{chosen.scheme} does not {do} the {what}"
     if len(compared.plans) > 1:
-        it, head = chosen.scheme, f"none of the {len(compared.plans)} schemes compared {does} the {what}"
+        it, head = chosen.scheme, f"none of the {_rivals(compared)} {does} the {what}"
     missed = "; ".join(shortfall(chosen, bound) for bound in chosen.shortfalls)
     yield " ".join((f"{head}. {it} leaves {missed}.", *_obstacles(chosen, compared)))
 
@@ -178,10 +179,14 @@ def _too_few(chosen: Plan, compared: Comparison) -> str:
     share = compared.shares[chosen]
     if share.met is None:
         return f"{sentence(UNDECIDED)} Nominal values alone: plan --nominal."
-    count = len(compared.plans)
-    whom = f"any of the {count} schemes compared" if count > 1 else chosen.scheme
+    whom = f"any of the {_rivals(compared)}" if len(compared.plans) > 1 else chosen.scheme
     few = f"Fewer than {exact_percent(share.probability)} of cases comply with {whom}."
     return f"{few} nutdamp plan --robust looks for a plan made for the tolerances."
+
+
+def _rivals(compared: Comparison) -> str:
+    """Among which the recommended plan was chosen."""
+    return "plans that can be commanded" if compared.restricted else f"{len(compared.plans)} schemes compared"
 
 
 UNDECIDED = "the share of cases that comply is undecided: not all of them could be flown within the budget of work"
@@ -371,8 +376,12 @@ def required(spacecraft: Spacecraft) -> str:
 
 def cases_verdict(share: float, probability: float) -> str:
     """Whether enough cases comply: "met: 99.9 % of cases comply (99.7 % required)"."""
-    shown, least = percent(share, probability), exact_percent(probability)
-    return f"{VERDICT[share >= probability]}: {shown} of cases comply ({least} required)"
+    return f"{VERDICT[share >= probability]}: {cases_share(share, probability)}"
+
+
+def cases_share(share: float, probability: float) -> str:
+    """How many cases comply, of how many that must."""
+    return f"{percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
 
 
 def share_text(share: Share | None) -> str:

@@ -137,7 +137,7 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
     tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
     starts = windows.ticks_after(tried[tried >= earliest])
     seconds, (long, longer) = windows.nearest_ticks(starts + to_second), (np.full(len(starts), on) for on in on_times)
-    allowed = windows.allowed(starts, long, earliest)
+    allowed = windows.allowed(starts, long, earliest) & (seconds > starts)  # not on one tick, however long that is
     allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
     return [float(start) for start in starts[allowed]]
 

@@ -24,15 +24,13 @@ state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
 attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [0.3, -0.2, 0.9, 0.1]}
 steerable: {torque: 20 N m}
 """
-WIDE = [
-    part
-    for key, size in {
-        "A": "0.5 %", "C": "0.5 %", "omega0": "0.1 deg/s", "thrust": "2 %", "thrust_per_pulse": "1 %",
-        "thrust_direction": "0.5 deg", "position": "5 mm", "attitude": "0.2 deg",
-    }.items()
-    for part in ("--set", f"dispersions.{key}={{normal: {size}}}")
-]  # fmt: skip
-"""Sets tolerances of the built-in example with which no plan that is made without them complies often enough."""
+WIDER = {
+    "A": "0.5 %", "C": "0.5 %", "omega0": "0.1 deg/s", "thrust": "2 %", "thrust_per_pulse": "1 %",
+    "thrust_direction": "0.5 deg", "position": "5 mm", "attitude": "0.2 deg",
+}  # fmt: skip
+"""Tolerances of the built-in example with which no plan that is made without them complies often enough."""
+WIDE = [part for key, size in WIDER.items() for part in ("--set", f"dispersions.{key}={{normal: {size}}}")]
+"""Sets them."""
 SCHEDULE = "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,steerable,4,0,0\n"
 
 

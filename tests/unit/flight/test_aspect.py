@@ -250,7 +250,7 @@ def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
     assert decided.cases.levels[Part.NUTATION] < math.radians(0.5)
     assert "meets" not in verdicts.reason(compared)
     said = decisions.verdict(decided)
-    assert re.fullmatch(r"NOT met: the spin axis comes to 0\.14\d+° from Star at .*; NOT met: 0\.0 % of cases.*", said)
+    assert re.fullmatch(r"NOT met: the spin axis comes to 0\.14\d+° from Star at .*; 0\.0 % of cases comply.*", said)
     assert dict(compared.shares) == {decided.plan: Share(0.0, 0.0, 0.997)}
 
 

@@ -12,6 +12,7 @@ import pytest
 from support.builders import channel, cross, spinner
 from support.cases import deep, weekly
 from support.checker import violations
+from support.commands import WIDER
 from support.dispersed import normal
 
 import nutdamp
@@ -175,7 +176,8 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
         monkeypatch.setattr(tightening, "CASES", 2_048)
         monkeypatch.setattr(tightening, "SAMPLES", 4_096)
     given = Requirement(math.radians(0.5), math.radians(0.2), probability)
-    body = replace(nutdamp.example(), requirement=given)
+    wider = {"dispersions": {key: {"normal": size} for key, size in WIDER.items()}}
+    body = replace(nutdamp.example().with_(**wider), requirement=given)
     found = robustly(body, "two-pulse", most=1)
     assert found.chosen is not None
     needed, pulses = found.tightening, found.chosen.plan.pulses
