@@ -210,8 +210,8 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
 def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Path, probability: float) -> None:
     """The nutation shown is that of as many cases as the file requires."""
     flight(tmp_path, 6)
-    limits = ("--set", "requirement.nutation=0.1 deg", "--set", f"requirement.probability={probability}%")
-    limits += ("--set", "limits.max_pulses=2")
+    keys = ("requirement.nutation=0.1 deg", f"requirement.probability={probability}%", "limits.max_pulses=2")
+    limits = [part for key in keys for part in ("--set", key)]
     shown = fit(run, "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", *limits)
     ahead = results(tmp_path)["next"]
     assert ahead["probability"] == pytest.approx(probability / 100.0)
