@@ -135,12 +135,12 @@ class Fit:
 
     def white(self, signal: int) -> bool:
         """Whether the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
-        from scipy.stats import chi2
+        from scipy.special import chdtri
 
         count = int((self.used & (self.model.signal == signal)).sum())
         found = self.whiteness(signal, 20)
         lags = np.arange(1, len(found) + 1)
-        return bool(count * (count + 2) * np.sum(found**2 / (count - lags)) < chi2.ppf(0.999, len(found)))
+        return bool(count * (count + 2) * np.sum(found**2 / (count - lags)) < chdtri(len(found), 0.001))
 
 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
