@@ -114,11 +114,12 @@ def _broken(breach: Breach) -> str:
     begins, ends = breach.window or (math.nan, math.nan)
     start, on_time = pulse.loaded
     on = f"is on for {on_time:.6g} s"
+    early = f"comes less than {bound} after the one before" if breach.bound else "starts before the one before ends"
     how = {
         Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
         Limit.EARLIEST: f"starts before {bound}",
         Limit.HORIZON: f"ends after the horizon of {bound}",
-        Limit.GAP: f"comes less than {bound} after the one before",
+        Limit.GAP: early,
         Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
         Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
         Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",

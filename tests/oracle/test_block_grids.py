@@ -21,11 +21,11 @@ from nutdamp.spacecraft import Spacecraft
 def grid(seed: int) -> Spacecraft:
     """A spinner of two axial thrusters, three delays, two widths, and up to two pulses a block.
 
-    Odd seeds are the body of the seed before, mirrored and of another size.
+    Odd seeds are like the seed before, but spin the other way and are three times as large.
     """
-    rng, mirrored = np.random.default_rng(seed // 2), seed % 2 == 1
-    A, spin, scale = 10.0 ** rng.uniform(0.5, 2.5), rng.uniform(0.8, 2.0), 3.0 if mirrored else 1.0
-    C, turn, sign = A * rng.uniform(0.7, 1.7), 2.0 * math.pi / spin, -1.0 if mirrored else 1.0
+    rng, reversed_ = np.random.default_rng(seed // 2), seed % 2 == 1
+    A, spin, scale = 10.0 ** rng.uniform(0.5, 2.5), rng.uniform(0.8, 2.0), 3.0 if reversed_ else 1.0
+    C, turn, sign = A * rng.uniform(0.7, 1.7), 2.0 * math.pi / spin, -1.0 if reversed_ else 1.0
     degrees, phase, azimuth, at = rng.uniform(1.0, 6.0), *rng.uniform(-math.pi, math.pi, 3)
     delays = 3
     width = rng.uniform(0.05, 0.12) * turn
@@ -81,7 +81,7 @@ def cheapest(body: Spacecraft, most: float) -> float:
     def cost(block: Block) -> float:
         return flow[block.channel] * block.width * block.count
 
-    sequences = []
+    sequences: list[tuple[float, tuple[Block, ...]]] = []
     for block in blocks_of(body, 1):
         if cost(block) < most:
             sequences.append((cost(block), (block,)))
