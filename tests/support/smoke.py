@@ -64,7 +64,7 @@ plan
 plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png --figure timeline
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --csv optimal.csv
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --free-axis --least time
-plan --scheme half-cone --target 10deg,45deg --json target.json
+plan --scheme half-cone --target 10deg,45deg --nominal --json target.json
 plan --robust --scheme one-pulse --json robust.json; 4
 plan missing.yaml; 1
 plan broken.yaml; 2
