@@ -69,8 +69,6 @@ def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
         columns.append(
             (Column("ΔV", "m/s"), lambda plan: _number(None if plan.delta_v is None else math.hypot(*plan.delta_v)))
         )
-    if compared.spacecraft.commands is not None:
-        columns.append((Column("can be commanded", number=False), lambda plan: "yes" if plan.commandable else "no"))
     if compliance.required(compared.spacecraft):
         columns.append((Column("requirement", number=False), lambda plan: verdicts.VERDICT[compared.meets(plan)]))
     return columns
