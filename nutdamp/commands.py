@@ -23,6 +23,11 @@ class SunSensor:
     half_width: float = 0.5 * math.pi
     jitter: float = 0.0
 
+    @property
+    def sees_all(self) -> bool:
+        """Whether no direction but those along the axis is out of its view, and so every passage of the Sun is seen."""
+        return self.elevation == 0.0 and self.half_width >= 0.5 * math.pi
+
     def sees(self, sun_angle: Any) -> Any:
         """Whether it sees the Sun at this angle (rad) from the spin axis; of arrays each."""
         return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width

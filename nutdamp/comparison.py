@@ -64,16 +64,17 @@ class Comparison(views.Data, views.Tabled):
         return recommend(self.eligible, self.shares)
 
     @property
-    def eligible(self) -> tuple[Plan, ...]:
-        """The plans that may be recommended: of a spacecraft that takes commands those that can be commanded.
+    def only_commanded(self) -> bool:
+        """Whether only plans that can be commanded may be recommended.
 
-        Others too, where they may be ``timed``, or were ``named`` and none of these can be commanded.
+        Others may, where pulses may be ``timed``, or schemes were ``named`` and none of their plans can be commanded.
         """
-        feasible = tuple(one for one in self.plans if one.feasible)
-        if self.timed:
-            return feasible
-        commanded = tuple(one for one in feasible if one.commandable)
-        return feasible if self.named and not commanded else commanded
+        return not self.timed and (not self.named or any(one.feasible and one.commandable for one in self.plans))
+
+    @property
+    def eligible(self) -> tuple[Plan, ...]:
+        """The feasible plans that may be recommended."""
+        return tuple(one for one in self.plans if one.feasible and (one.commandable or not self.only_commanded))
 
     @property
     def restricted(self) -> bool:
@@ -178,10 +179,10 @@ def compare(
         raise KeyError(*sorted(unknown))
     with work.budget("the comparison", work.COMMAND):
         plans = tuple(attempt(spacecraft, name, options) for name in names or usual(spacecraft))
-    counts = samples is not None or compliance.judged(spacecraft)
-    if spacecraft.dispersions is None or samples == 0 or not counts:
-        return Comparison(spacecraft, plans, named=bool(names), timed=timed)
     nominal = Comparison(spacecraft, plans, named=bool(names), timed=timed)
+    wanted = compliance.judged(spacecraft) if samples is None else samples > 0
+    if spacecraft.dispersions is None or not wanted:
+        return nominal
     return replace(nominal, flown=_dispersed(nominal, samples))
 
 
@@ -191,8 +192,8 @@ def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, Candidat
     from nutdamp.screening import fly_compared
 
     feasible = [one for one in compared.plans if one.feasible]
-    with work.budget("the dispersed cases", work.CASES):
-        count = SAMPLES if samples is None else samples
+    count = SAMPLES if samples is None else samples
+    with work.budget("the dispersed cases", work.CASES * max(1.0, count / SAMPLES)):
         return fly_compared(feasible, count, lambda shares: recommend(compared.eligible, shares).plan)
 
 

@@ -161,7 +161,6 @@ def compare(
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
-    timed = comparison.timed or (comparison.named and not any(one.commandable for one in comparison.eligible))
     found: dict[object, Candidate] = {}
     for number, trial in enumerate(trials):
         watch(number)
@@ -171,7 +170,7 @@ def compare(
             if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
                 continue
             own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
-            if not (timed or own.commandable):
+            if comparison.only_commanded and not own.commandable:
                 continue
             with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                 found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
@@ -188,24 +187,22 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
     chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
     if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
         return ranks
-    flown: dict[Plan, Candidate] = {}
+    flown: dict[Plan, tuple[Candidate, Fresh]] = {}
 
     def complies(plan: Plan) -> bool:
         with suppress(Infeasible):
             one = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
-            if one.share is not None and one.share.met is not False:
-                fly_all([one], samples, required, [one])
-                flown[plan] = one
-                fresh = _fresh(one, samples) if (one.met or 0.0) >= required else None
-                return fresh is not None and fresh.met >= required
-        return False
+            fly_all([one], samples, required)
+            fresh = _fresh(one, samples) if one.cases.decided and (one.met or 0.0) >= required else None
+            if fresh is not None and fresh.met >= required:
+                flown[plan] = one, fresh
+        return plan in flown
 
     best = trimmed(chosen.plan, complies)
     if best is chosen.plan or best.pulses.cost > chosen.plan.pulses.cost * (1.0 - SAME_COST):
         return ranks
-    made = flown[best]
-    candidates = (made, *ranks.candidates)
-    return replace(ranks, chosen=made, candidates=candidates, ground=Ground.COST, fresh=_fresh(made, samples))
+    made, fresh = flown[best]
+    return replace(ranks, chosen=made, candidates=(made, *ranks.candidates), ground=Ground.COST, fresh=fresh)
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:

@@ -20,6 +20,7 @@ from nutdamp.demands import required_share
 from nutdamp.dispersion import study_of
 from nutdamp.dispersion.binomial import binomial_interval
 from nutdamp.dispersion.outputs import OUTPUTS
+from nutdamp.dispersion.statistics import EXACT_CASES
 from nutdamp.dispersion.study import CONFIDENCE, Results, Study, run, threads_here
 from nutdamp.errors import Infeasible
 from nutdamp.planning import Plan
@@ -220,7 +221,8 @@ def _further(one: Candidate, samples: int) -> None:
     """Fly the cases of the next stage."""
     assert one.results is not None
     stage = next((count for count in STAGES if one.cases.samples < count < samples), samples)
-    one.results = _run(one.results.extended(stage))
+    exact = stage <= EXACT_CASES  # beyond, cases are counted and not kept: from the first one on
+    one.results = _run(one.results.extended(stage) if exact else Results(one.results.study, stage))
     one.cases = cases_of(one.results, samples)
     _bound(one, samples)
 

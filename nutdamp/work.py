@@ -19,7 +19,7 @@ COMMAND = 10_000.0
 """Units that the searches of one comparison may spend together."""
 
 CASES = 3_000.0
-"""Units that the dispersed cases of the plans of one comparison may take together."""
+"""Units that the dispersed cases of one comparison may take together, by default so many; in proportion if more."""
 
 FRONTS = 30_000.0
 """Units that the searches of all points of `trade` may spend together."""

@@ -131,7 +131,7 @@ def scheme_options(command: Command) -> Command:
     @functools.wraps(command)
     def gathered(*args: Any, **parameters: Any) -> Any:
         taken = {name: parameters.pop(name) for name in names}
-        given = {name: value for name, value in taken.items() if value is not False}
+        given = {name: value for name, value in taken.items() if value is not False}  # flags that were not given
         try:
             options = Options(**given)
         except SenselessOption as wrong:

@@ -34,6 +34,10 @@ class RealWidths:
     def _dynamics(self) -> Dynamics:
         return make_dynamics(self.model.spacecraft)
 
+    @cached_property
+    def _seen(self) -> list[bool]:
+        return sun_fired.seen_nominally(self.model)
+
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
         count = number_of(cases)
@@ -42,7 +46,7 @@ class RealWidths:
         propellant = cases.propellant
         if self.model.schedule.blocks:
             settled, turned, _, seen, over = sun_fired.fly(
-                self.model, self._bodies(moments), rates, _upright(count), cases, watch
+                self.model, self._bodies(moments), rates, _upright(count), cases, self._seen, watch
             )
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)

@@ -43,18 +43,19 @@ def fly(
     rates: Array,
     quaternion: Array,
     cases: DispersedCases,
+    nominal: Sequence[bool],
     watch: AxisWatch | None = None,
 ) -> Fired:
     """The pulses of the blocks of ``model``, fired in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    A pulse that is due while the one before is on begins as that ends.
+    ``nominal``: `seen_nominally`. A pulse that is due while the one before is on begins as that ends.
     """
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     over = np.zeros(count)
     rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    pulses, shifts, nominal = model.schedule.pulses, [], _seen_nominally(model)
+    pulses, shifts = model.schedule.pulses, []
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     for pulse, start, lead in zip(pulses, cases.starts, cases.leads, strict=True):
         shifts.append(start - lead - pulse.loaded[0])
@@ -94,8 +95,11 @@ def fly(
     return Fired(rates, quaternion, starts, seen, over)
 
 
-def _seen_nominally(model: Model) -> list[bool]:
+def seen_nominally(model: Model) -> list[bool]:
     """Whether the sensor sees each passage of the Sun in the nominal flight; none, where that cannot be fired."""
+    sensor, blocks = model.spacecraft.sun_sensor, model.schedule.blocks
+    if sensor is not None and sensor.sees_all:
+        return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
     try:
         return fire(model.spacecraft, model.schedule.blocks)[1]
     except Infeasible:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision
 from nutdamp.files.output import csv_text, number, truth
-from nutdamp.files.plan_json import plan_json, residual_json
+from nutdamp.files.plan_json import compared_json, residual_json
 from nutdamp.planning import Plan
 
 WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
@@ -27,8 +27,7 @@ def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.
     rows = []
     for plan in compared.plans:
         share = shares[plan].exact if plan in shares else None
-        data = plan_json(plan) | {"meets_requirement": compared.meets(plan)}
-        rows.append(_row(plan, data, plan is chosen, share))
+        rows.append(_row(plan, compared_json(compared, plan), plan is chosen, share))
     names = list(rows[0]) if rows else list(WORDS)
     longest = {name: max(1, *(len(row[name]) for row in rows)) if rows else 1 for name in WORDS}
     kinds = [(name, f"U{longest[name]}" if name in WORDS else "i8" if name == "pulses" else "f8") for name in names]

@@ -67,7 +67,8 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
 
     ``looped``: it is the flight of a closed loop, which goes on firing.
     """
-    yield from filter(None, (verdicts.idealised(decision.plan),))
+    if ideal := verdicts.idealised(decision.plan):
+        yield ideal
     if looped:
         return
     if turned := _turned(decision):

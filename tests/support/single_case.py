@@ -30,7 +30,7 @@ def timed(model: Model, cases: DispersedCases) -> DispersedCases:
     moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
     bodies = rigid_cases.Bodies(moments, dynamics.constant, dynamics.forcing)
-    fired = sun_fired.fly(model, bodies, rates, upright, cases)
+    fired = sun_fired.fly(model, bodies, rates, upright, cases, sun_fired.seen_nominally(model))
     pulses = zip(cases.impulses, fired.seen, strict=True)
     impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
     return replace(cases, starts=tuple(fired.starts), impulses=impulses)

@@ -111,9 +111,9 @@ class SunPulses:
         Raises Infeasible where there is none: the axis is too near to the Sun, or the sensor sees it no more.
         """
         found, sensor = self.clock.here, self._sensor
-        if sensor.half_width >= 0.5 * math.pi:  # it sees all of them
-            before, missed = float(self.clock.time[0]), number - len(self.seen)
-            self.seen += [True] * missed
+        if sensor.sees_all:
+            before = float(self.clock.time[0])
+            self.seen += [True] * (number - len(self.seen))
             found = self.clock.sun_pulse(number)
             self._expect_found(before)
             return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -23,17 +22,16 @@ from nutdamp import planning, robust, screening, trimming, work
 from nutdamp.commands import Block
 from nutdamp.comparison import Comparison, compare
 from nutdamp.compliance import Part
-from nutdamp.decision import decide
 from nutdamp.dispersion import SEED, study_of
 from nutdamp.dispersion.cases import DispersedCases
 from nutdamp.dispersion.inputs import Input
 from nutdamp.dispersion.kernel import Ends
 from nutdamp.dispersion.study import Results, run
-from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.errors import BadRequest
 from nutdamp.files.robust_json import robust_json
 from nutdamp.files.spacecraft_file import read_spacecraft
 from nutdamp.planning import Plan
-from nutdamp.recommendation import Ground, Share, recommend
+from nutdamp.recommendation import Ground
 from nutdamp.schedule import Schedule
 from nutdamp.schemes import CLASSIC, Options, four_pulse
 from nutdamp.screening import Candidate, Cases
@@ -429,110 +427,6 @@ def test_only_what_cannot_be_chosen_flies_no_more_cases() -> None:
         for one, (_, low, high) in zip(given, bounds, strict=True):
             one.low, one.high = low, high
         assert {given.index(one) for one in screening._hopeful(given, 20_000, 0.95)} == hopeful
-
-
-SHORT, LONG, ALL = 2_048, 8_192, 20_000
-NEVER = "cannot be flown"
-
-# Of each plan, the cheapest first, between which shares of all cases those lie that comply, as far as 2,048, 8,192 and
-# 20,000 cases tell; how many it flies; which of them is recommended, and whether enough comply.
-FLOWN: list[tuple[list[tuple[list[tuple[float, float]], int]], int, bool | None]] = [
-    # As many as it takes to know whether enough comply, and all with the plan to fly.
-    (
-        [([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998,) * 2], ALL)],
-        1,
-        True,
-    ),
-    (
-        [([(0.998, 1.0), (0.998, 1.0), (0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)],
-        0,
-        True,
-    ),
-    ([([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL), ([(0.998, 1.0), (0.998, 1.0), (0.999,) * 2], ALL)], 1, True),
-    # Too few with each: all that may be as good as the best.
-    (
-        [
-            ([(0.5, 0.6), (0.55, 0.57), (0.56,) * 2], ALL),
-            ([(0.3, 0.58), (0.4, 0.5)], LONG),
-            ([(0.2, 0.55)], SHORT),
-        ],
-        0,
-        False,
-    ),
-    ([([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL), ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL)], 1, False),
-    # Plans with a case that cannot be flown are out, at once or later.
-    ([([], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
-    ([([(0.998, 1.0)], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
-]
-
-
-@pytest.fixture
-def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, float]]]:
-    """What cases tell of plans, by stage, instead of flying them; each takes a unit of work."""
-    known: dict[Plan, list[tuple[float, float]]] = {}
-
-    def told(one: Candidate, stage: int) -> None:
-        work.spend(1.0)
-        if stage >= len(known[one.plan]):
-            raise Infeasible(NEVER)
-        one.low, one.high = known[one.plan][stage]
-        one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.low)
-
-    def entered(plan: Plan, variant: str, study: object, samples: int) -> Candidate:
-        made = Candidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))
-        told(made, 0)
-        return made
-
-    def further(one: Candidate, samples: int) -> None:
-        assert samples == ALL
-        told(one, 1 + screening.STAGES.index(one.cases.samples))
-
-    monkeypatch.setattr(screening, "entered", entered)
-    monkeypatch.setattr(screening, "_further", further)
-    monkeypatch.setattr(screening, "study_of", lambda *_: None)
-    return known
-
-
-def chosen_of(plans: list[Plan], shares: Mapping[Plan, Share]) -> Plan | None:
-    return recommend(plans, shares).plan
-
-
-def flown_of(plans: list[Plan], flown: dict[Plan, Candidate]) -> list[int]:
-    return [flown[one].cases.samples if one in flown else 0 for one in plans]
-
-
-def test_plans_compared_fly_as_many_cases_as_decide(staged: dict[Plan, list[tuple[float, float]]]) -> None:
-    for given, chosen, met in FLOWN:
-        plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(len(given))]
-        staged.update({plan: told for plan, (told, _) in zip(plans, given, strict=True)})
-        flown = screening.fly_compared(plans, ALL, partial(chosen_of, plans))
-        assert flown_of(plans, flown) == [count for _, count in given]
-        compared = Comparison(plans[0].spacecraft, tuple(plans), flown)
-        assert compared.recommended is plans[chosen]
-        assert compared.meets(plans[chosen]) is met
-        for plan in plans:
-            expected = Share(*staged[plan][-1], 0.997) if plan in flown else Share(0.0, 1.0, 0.997)
-            if plan not in flown or flown[plan].cases.decided:
-                assert compared.shares[plan] == expected
-            assert (compared.cases(plan) is None) == (plan not in flown)
-
-
-def test_without_a_requirement_the_plan_to_fly_has_all_cases_and_a_budget_ends_them(
-    staged: dict[Plan, list[tuple[float, float]]],
-) -> None:
-    free = [judged(f"{n}", 0.0, impulse=1.0 + n) for n in range(2)]
-    staged.update({plan: [(0.0, 0.0)] * 3 for plan in free})
-    flown = screening.fly_compared(free, ALL, lambda shares: recommend(free, shares).plan)
-    assert flown_of(free, flown) == [ALL, SHORT]
-    bound = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(2)]
-    staged.update({plan: [(0.99, 1.0), (0.99, 0.999), (0.998, 0.998)] for plan in bound})
-    for units, expected in ((0.5, [SHORT, 0]), (2.0, [SHORT, SHORT]), (3.0, [LONG, SHORT]), (6.0, [ALL, ALL])):
-        with work.budget("cases", units):
-            flown = screening.fly_compared(bound, ALL, lambda shares: recommend(bound, shares).plan)
-        assert flown_of(bound, flown) == expected
-        decision = decide(Comparison(bound[0].spacecraft, tuple(bound), flown))
-        assert decision is not None
-        assert (decision.unknown, decision.met) == (units < 6.0, units == 6.0)
 
 
 @pytest.mark.deep

@@ -100,7 +100,10 @@ def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> 
     inside = commanded(spinner(degrees=8.0, channels=cross(8.0)), np.array([0.02, 0.0, 1.0]))
     still = commanded(spinner(degrees=0.0, channels=cross(8.0)), np.array([1.0, 0.0, 0.2]))
     blind = replace(still, sun_sensor=SunSensor(0.0, elevation=1.2, half_width=0.3))
-    for key, body, count in (("cone", inside, 30), ("sensor", replace(inside, sun_sensor=None), 1), ("view", blind, 2)):
+    beyond = replace(still, sun_sensor=SunSensor(0.0, elevation=-1.5))  # half the sky is seen, not this half
+    without = replace(inside, sun_sensor=None)
+    cases = (("cone", inside, 30), ("sensor", without, 1), ("view", blind, 2), ("view", beyond, 2))
+    for key, body, count in cases:
         with refused(Infeasible, f"blocks.no-sun-pulse-{key}"):
             fired(body, (Block("+1", 1, 0.1, 0.1, count),))
 
