@@ -97,7 +97,7 @@ def momentum(results: Results) -> Figure:
 
 def budget(results: Results) -> Figure:
     """What each tolerance does to nutation and shift of H, side by side."""
-    figure = style.sheet(8.2, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
+    figure = style.sheet(8.0, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
     _budget(figure, results)
     return figure
 
