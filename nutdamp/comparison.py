@@ -129,7 +129,7 @@ class Comparison(views.Data, views.Tabled):
         try:
             for slow in (False, True):
                 for one in self.plans:
-                    if schemes.SCHEMES[one.scheme].slow == slow:
+                    if one.scheme in schemes.SCHEMES and schemes.SCHEMES[one.scheme].slow == slow:
                         aware = replace(one.options, with_disturbances=True)
                         others = (*others, attempt(body, one.scheme, aware))
                 best = replace(self, plans=others, flown=None).recommended
@@ -179,7 +179,15 @@ def compare(
         raise KeyError(*sorted(unknown))
     with work.budget("the comparison", work.COMMAND):
         plans = tuple(attempt(spacecraft, name, options) for name in names or usual(spacecraft))
-    nominal = Comparison(spacecraft, plans, named=bool(names), timed=timed)
+    return compare_plans(plans, named=bool(names), samples=samples, timed=timed)
+
+
+def compare_plans(
+    plans: Sequence[Plan], *, named: bool = True, samples: int | None = None, timed: bool = False
+) -> Comparison:
+    """The comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
+    spacecraft = plans[0].spacecraft
+    nominal = Comparison(spacecraft, tuple(plans), named=named, timed=timed)
     wanted = compliance.judged(spacecraft) if samples is None else samples > 0
     if spacecraft.dispersions is None or not wanted:
         return nominal

@@ -42,6 +42,9 @@ WITHIN = (1.5, 2.0)
 FRESH = 211
 """Seed of cases that nothing was chosen by."""
 
+ROBUST = "robust"
+"""Name of the robust plan beside those of schemes."""
+
 CHECKED = 6
 """Plans with which just enough cases seem to comply that are tried in such cases, one after the other."""
 
@@ -113,6 +116,15 @@ class RobustComparison:
     def decision(self) -> Decision | None:
         """The decision on the robust plan, by the cases that `nutdamp.dispersion` draws for any schedule."""
         return None if self.chosen is None else Decision(self.chosen.plan, self.chosen.cases)
+
+    @property
+    def joined(self) -> Comparison:
+        """The comparison with the robust plan in it, under the name `ROBUST`, unless it is one of those compared."""
+        if self.chosen is None or any(_kind(one) == _kind(self.chosen.plan) for one in self.comparison.plans):
+            return self.comparison
+        plan = replace(self.chosen.plan, scheme=ROBUST)
+        flown = None if self.comparison.flown is None else {**self.comparison.flown, plan: self.chosen}
+        return replace(self.comparison, plans=(*self.comparison.plans, plan), flown=flown)
 
     @property
     def lucky(self) -> bool:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from nutdamp.cli.job import Job
     from nutdamp.comparison import Comparison
     from nutdamp.planning import Plan
+    from nutdamp.robust import RobustComparison
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -77,6 +78,16 @@ def compared_with(
     expect_read(names or usual(job.spacecraft), options, job.spacecraft, job.remark)
     with working("planning", quiet=job.quiet):
         return compare(job.spacecraft, names, options, samples=samples, timed=timed)
+
+
+def robust_of(job: Job, compared: Comparison, options: Options) -> RobustComparison:
+    """The plans compared and their variants in dispersed cases, with a bar."""
+    from nutdamp import robust
+    from nutdamp.cli.progress import progress
+
+    trials = robust.attempts(compared, options)
+    with progress("dispersing", len(trials), quiet=job.quiet) as advance:
+        return robust.compare(compared, trials, advance)
 
 
 def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:

@@ -18,7 +18,7 @@ from nutdamp.cli.common import (
     spacecraft_argument,
 )
 from nutdamp.cli.failures import show_failures
-from nutdamp.cli.flown import compared_with
+from nutdamp.cli.flown import compared_with, robust_of
 from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options, scheme_options
@@ -103,7 +103,7 @@ def command(
     from nutdamp.presentation import verdicts
 
     compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
-    dispersed = _disperse(compared, options, quiet) if robust else None
+    dispersed = robust_of(job, compared, options) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
@@ -133,16 +133,6 @@ def _expect_one_scheme(names: Sequence[str], **written: str | None) -> None:
             raise click.UsageError(
                 f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
             )
-
-
-def _disperse(compared: Comparison, options: Options, quiet: bool) -> RobustComparison:
-    """Fly the plans and their variants in dispersed cases, with a bar."""
-    from nutdamp import robust
-    from nutdamp.cli.progress import progress
-
-    trials = robust.attempts(compared, options)
-    with progress("dispersing", len(trials), quiet=quiet) as advance:
-        return robust.compare(compared, trials, advance)
 
 
 def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: str) -> list[Output]:

@@ -14,7 +14,7 @@ from nutdamp.cli.boundary import leave
 from nutdamp.cli.common import Input, quiet_option, require_dispersions, spacecraft_argument
 from nutdamp.cli.disperse import SAMPLES
 from nutdamp.cli.failures import show_failures
-from nutdamp.cli.flown import compared_with
+from nutdamp.cli.flown import Flown, compared_with, plan_or_read, robust_of
 from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
 from nutdamp.cli.progress import working
@@ -67,6 +67,9 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command("report", cls=Report)
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=SchemeName(PLANNED), help="Compare this one only; repeatable.")
+@click.option("--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it.")
+@click.option("--blocks", type=FILE, help="Report what the command blocks of a CSV file fire.")
+@click.option("--robust", is_flag=True, help="Compare the plan of `plan --robust` as well.")
 @goal_options
 @click.option(
     "-o",
@@ -94,6 +97,9 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def command(
     spacecraft: Input,
     names: tuple[str, ...],
+    schedule: str | None,
+    blocks: str | None,
+    robust: bool,
     options: Options,
     aim: Aim,
     output: str,
@@ -111,8 +117,12 @@ def command(
     from nutdamp.presentation.page.html import expect_html
 
     expect_html(output)
-    job = begin(spacecraft, aim=aim, quiet=quiet, output=output)
+    flown = Flown(names[0] if names else None, schedule, blocks)
+    if flown.count(None) < 2 or (flown.file is not None and robust):
+        raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
 
+    from nutdamp.comparison import compare_plans
     from nutdamp.files.yaml_tree import dotted
     from nutdamp.library.reports import controlled, made_of
     from nutdamp.presentation.page.content import Repeat
@@ -121,11 +131,17 @@ def command(
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
     text, name = job.source
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
-    if disperse is not None:
+    if disperse is not None or robust:
         require_dispersions(job.spacecraft)
         if nominal:
-            raise click.UsageError("--disperse flies dispersed cases, which --nominal leaves out: name one of them")
-    compared = compared_with(job, names, options, 0 if nominal else disperse)
+            raise click.UsageError("--disperse and --robust fly dispersed cases, which --nominal leaves out")
+    samples = 0 if nominal else disperse
+    if flown.file is None:
+        compared = compared_with(job, names, options, samples)
+    else:
+        compared = compare_plans((plan_or_read(job, flown, options),), samples=samples)
+    if robust:
+        compared = robust_of(job, compared, options).joined
     fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
         made = made_of(compared, repeat, kept, fronts)

@@ -48,7 +48,7 @@ from nutdamp.presentation.text import degrees, sentence
 from nutdamp.presentation.trade_tables import apart, beats, front_parts, outdone
 from nutdamp.presentation.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 from nutdamp.recommendation import Gain, Standing
-from nutdamp.remarks import said
+from nutdamp.remarks import broken_limits, said
 from nutdamp.spacecraft import Spacecraft
 from nutdamp.verification import verify
 from nutdamp.words import listed
@@ -104,7 +104,8 @@ def report_page(
         good=decided is not None
         and decided.met is not False
         and decided.plan.standing is Standing.COMPLIES
-        and decided.plan.commandable,
+        and decided.plan.commandable
+        and not _broken(decided.plan),
         decision=() if decided is None else tuple(_decision(decided)),
         figures=tuple(_unplanned(body) if decided is None else _figures(decided)),
         sections=(*sections, _repeat(repeat, dispersed)),
@@ -122,12 +123,15 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
     reason = verdicts.reason(compared)
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
-    said = f"{decisions.statement(decided)} Recommended: {decided.plan.scheme} – {reason}."
+    recommended = f"Recommended: {decided.plan.scheme} – {reason}."
+    schedule = f"Schedule of the file {decided.plan.scheme}, as it is."
+    said = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
     others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
     fired = [verdicts.hint(compared, one) for one in dict.fromkeys(others) if one is not None]
     notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
+    notes += map(sentence, _broken(decided.plan))
     notes += filter(None, [outdone(traded, decided.plan)])
     return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
@@ -175,7 +179,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 
 def _schemes(compared: Comparison, decided: Decision | None) -> Section:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
-    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in said(plan))
+    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*said(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
     blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
     if remarks:
@@ -183,6 +187,11 @@ def _schemes(compared: Comparison, decided: Decision | None) -> Section:
     if decided is not None and len(compared) > 1:
         blocks.append(schemes_picture_of(compared, decided))
     return Section("schemes", "Schemes compared", tuple(blocks))
+
+
+def _broken(plan: Plan) -> list[str]:
+    """The limits that the schedule of a file breaks; schemes keep them."""
+    return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
 def _reading(compared: Comparison) -> Iterator[str]:

@@ -36,7 +36,7 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]
     lines = [line for topic in topics for line in _listed(topic, _formulas(topic)[-1])]
-    if chosen is not None:
+    if chosen is not None and chosen.scheme in guide.NAMES:
         scheme = guide.found(chosen.scheme)
         lines += _listed(scheme, _formulas(scheme)[0])
     yield Listing("Equations", "\n".join(lines))
@@ -63,9 +63,10 @@ def _symbols(topics: list[Topic], chosen: Plan | None, listed: str) -> Iterator[
                 if isinstance(block, Rows):
                     seen.update((symbol, text) for symbol, text in block.rows if symbol.removesuffix(")") in listed)
     yield from seen.items()
-    for part in () if chosen is None else guide.found(chosen.scheme).parts:
+    if chosen is None or chosen.scheme not in guide.NAMES:
+        return
+    for part in guide.found(chosen.scheme).parts:
         if any(isinstance(block, Formula) for block in part.blocks):
-            assert chosen is not None
             yield chosen.scheme, " ".join(block for block in part.blocks if isinstance(block, str))
             return
 

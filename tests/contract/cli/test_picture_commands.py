@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -248,6 +249,37 @@ def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
     )
     assert verdict is not None
     assert page_of(tmp_path).count(verdict[1]) == 3  # the verdict, the tile, the section below
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_a_page_of_a_schedule_judges_that_flight_alone(run: Run, tmp_path: Path) -> None:
+    assert run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "p.csv", "-q").returncode == 0
+    assert run("report", "--schedule", "p.csv").returncode == 0
+    assert "Requirement met: 99.995 % of cases comply (99.7 % required)." in verdict_of(tmp_path, "good")
+    broken = ("--nominal", "--schedule", "p.csv", "--set", "limits.horizon=2 s")
+    assert run("report", *broken).returncode == 0  # the requirement is met, but a limit is not
+    assert "ends after the horizon of 2 s" in verdict_of(tmp_path, "bad").replace("\N{NO-BREAK SPACE}", " ")
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_a_page_of_command_blocks_knows_that_they_can_be_commanded(run: Run, tmp_path: Path) -> None:
+    craft = str(places.case("cb1015.yaml"))
+    assert run("plan", craft, "--scheme", "command-block", "--blocks", "b.csv", "--csv", "p.csv").returncode == 0
+    assert run("report", craft, "--blocks", "b.csv").returncode == 0
+    assert verdict_of(tmp_path, "good")
+    assert run("report", craft, "--schedule", "p.csv").returncode == 0
+    assert "cannot be commanded" in verdict_of(tmp_path, "bad")
+
+
+@pytest.mark.weekly
+@pytest.mark.usefixtures("plain_pages")
+def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(run: Run, tmp_path: Path) -> None:
+    craft = str(places.case("rob2.yaml"))
+    data = json.loads(run("plan", craft, "--robust", "--json", "-").stdout)
+    assert run("report", craft, "--robust").returncode == 0
+    assert f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply" in verdict_of(tmp_path, "good")
 
 
 def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:

@@ -42,6 +42,8 @@ USAGE = {
                        "animate -o a.gif --scheme none --schedule a.csv",
                        "export dated.yaml --format apm --scheme two-pulse --schedule p.csv",
                        "plan --robust --nominal", "report --nominal --disperse 100", "report --disperse --nominal",
+                       "report --schedule p.csv --blocks b.csv", "report --scheme optimal --schedule p.csv",
+                       "report --schedule p.csv --robust", "report --robust --nominal",
                        "disperse --case 3 --csv x.csv", "export dated.yaml --format stk --xml",
                        "export --format spin-table --scheme none --xml",
                        "export dated.yaml --format apm --until '3 s'"],
