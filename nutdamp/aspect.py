@@ -14,7 +14,10 @@ from nutdamp.physics import attitude
 from nutdamp.spacecraft import Spacecraft, Vector
 
 ROWS = 48
-"""Rows in each nutation period; between them the moment is found by a parabola, and the angle is that of the moment."""
+"""Rows in each nutation period; between them the moment is found by a parabola, and then looked for about it."""
+
+CLOSE, LOOKS, FINER = 3, 3, 9
+"""About so many moments it is looked so many times, at so many places: a pulse on its way bends the curve there."""
 
 TRIED = 8
 """Of the turns of the axis those at which it is looked at closely."""
@@ -60,7 +63,11 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     found = []
     for keep in body.watched:
         nearness = axis @ keep.direction
-        looked = np.concatenate([_peaks(times, nearness), _peaks(times, -nearness)])
+        tops = [
+            _closer(flown, way * keep.direction, _peaks(times, way * nearness), period / ROWS, end)
+            for way in (1.0, -1.0)  # farthest from a direction is nearest to the opposite one
+        ]
+        looked = np.concatenate(tops)
         angles = attitude.angle_between(flown.axis(looked), keep.direction)
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
         found.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
@@ -88,6 +95,26 @@ def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
 def _seen(axis: Vector, keep: Keep, time: float) -> Aspect:
     angle = float(attitude.angle_between(axis, keep.direction))
     return Aspect(keep, angle, time, angle, time)
+
+
+def _closer(flown: Flight, direction: Vector, times: Vector, width: float, end: float) -> Vector:
+    """Moments up to ``end`` within ``width`` s of the ``times`` (n,) at which the axis is nearest.
+
+    Each look is among places a quarter as far apart as before, with a parabola in the square of the distance.
+    """
+    rough = attitude.angle_between(flown.axis(times), direction)
+    times = times[np.argsort(rough, kind="stable")[:CLOSE]]
+    for _ in range(LOOKS):
+        places = np.clip(times[:, None] + width * np.linspace(-1.0, 1.0, FINER), 0.0, end)
+        apart = np.sum((flown.axis(places.ravel()) - direction) ** 2, axis=1).reshape(places.shape)
+        best = np.argmin(apart, axis=1, keepdims=True)
+        middle = np.clip(best, 1, FINER - 2)
+        before, here, after = (np.take_along_axis(apart, middle + step, axis=1) for step in (-1, 0, 1))
+        bend, inside = before - 2.0 * here + after, best == middle
+        way = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0))
+        width *= 2.0 / (FINER - 1)
+        times = np.clip(np.take_along_axis(places, best, axis=1) + width * way, 0.0, end)[:, 0]
+    return times
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:

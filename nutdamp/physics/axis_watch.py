@@ -20,7 +20,10 @@ from nutdamp.physics.rigid_cases import Stretch
 Array = NDArray[np.float64]
 
 ROWS = 24
-"""Steps in each turn of the axis, where it is followed in steps; between them it nears at a rate that falls evenly."""
+"""Steps in each turn of the axis, where it is followed in steps."""
+
+SECANTS = 2
+"""Steps of the secant method to the moment between two steps at which the axis is nearest or farthest."""
 
 CIRCLE = 2.0 * math.pi
 
@@ -118,11 +121,20 @@ class AxisWatch:
         for index in range(count):
             then, before, here = here, nearing, here.moved(begin + (index + 1) * step)
             nearing = self._look(here, ...)
-            for rise, fall in zip(before, nearing, strict=True):
+            for number, (rise, fall) in enumerate(zip(before, nearing, strict=True)):
                 cases = np.flatnonzero(rise * fall < 0.0)  # in between the axis comes nearest, or goes farthest
                 if len(cases):
-                    way = step[cases] * rise[cases] / (rise[cases] - fall[cases])
-                    self._look(then.some(cases).moved(then.since[cases] + way), cases)
+                    self._between(then.some(cases), step[cases], (rise[cases], fall[cases]), number, cases)
+
+    def _between(self, then: Stretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
+        """Extremes between the ends of a step, by `SECANTS` from the rates (nearer, farther) there of one direction."""
+        begin, end, (rise, fall) = np.zeros_like(step), step, rates
+        for _ in range(SECANTS):
+            way = begin + (end - begin) * rise / (rise - fall)
+            here = self._look(then.moved(then.since + way), cases)[number]
+            before = here * rise > 0.0
+            begin, rise = np.where(before, way, begin), np.where(before, here, rise)
+            end, fall = np.where(before, end, way), np.where(before, fall, here)
 
     def _look(self, here: Stretch, cases: Any) -> list[Array]:
         """Take the angles of one moment; returns at what rate the axis comes nearer, in cosines by s."""

@@ -279,7 +279,9 @@ def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(run: Run, 
     craft = str(places.case("rob2.yaml"))
     data = json.loads(run("plan", craft, "--robust", "--json", "-").stdout)
     assert run("report", craft, "--robust").returncode == 0
-    assert f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply" in verdict_of(tmp_path, "good")
+    assert f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply" in verdict_of(
+        tmp_path, "good"
+    )
 
 
 def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
