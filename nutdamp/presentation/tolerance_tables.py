@@ -114,11 +114,10 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
     table.add_row(Text("in combination", style="dim"), "", *texts)
     count = min(results.done, EARLY)
-    how = "central differences" if study.model.schedule.blocks else "analytic derivatives"
     note = (
-        f"Effect of each input alone on the nutation and on the {budgeted[1][1]}, and its share of their "
-        f"variance: linear by {how}, cases as the first {count:,} cases show it (first-order Sobol "
-        "index), an estimate: its column need not add to 100 %."
+        f"Effect of each input alone on the nutation and on the {budgeted[1][1]}, and its share of the variance of the "
+        f"residual vector (two components), whose length the angle is: linear by derivatives of the flight, cases as "
+        f"the first {count:,} cases show it (first-order Sobol index), an estimate: its column need not add to 100 %."
     )
     if study.model.groups:
         note += " Correlated inputs vary together, and their effect is the root mean square of what they do together."
