@@ -32,8 +32,8 @@ STAGES = (2_048, 8_192)
 CERTAIN = 1.0 - 1e-6
 """Confidence of the intervals by which plans are left out."""
 
-CASE, FIRED = 2e-3, 2e-3
-"""Units of work of a case, and of each of its pulses."""
+LIKELIER = 0.01
+"""Where too few cases comply with each plan: the share by which more must, perhaps, for a plan to be flown further."""
 
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
@@ -146,8 +146,7 @@ def entered(plan: Plan, variant: str, study: Study, samples: int) -> Candidate:
 
 def _run(results: Results) -> Results:
     """`run`, counted as work."""
-    pulses, cases = len(results.study.model.schedule), results.requested - results.done
-    work.spend((CASE + FIRED * pulses) * cases)
+    work.spend(results.study.flies.effort * (results.requested - results.done))
     return run(results, threads=threads_here())
 
 
@@ -196,7 +195,7 @@ def _undecided(
         return flown[chosen]
     if not shares or shares[chosen].met:
         return None
-    return next((one for one in ahead if shares[one.plan].high >= shares[chosen].low), None)
+    return next((one for one in ahead if shares[one.plan].high >= shares[chosen].low + LIKELIER), None)
 
 
 def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, Candidate]) -> dict[Plan, Share]:

@@ -18,7 +18,7 @@ SCHEME = 9_000.0
 COMMAND = 10_000.0
 """Units that the searches of one comparison may spend together."""
 
-CASES = 3_000.0
+CASES = 20_000.0
 """Units that the dispersed cases of one comparison may take together, by default so many; in proportion if more."""
 
 FRONTS = 30_000.0

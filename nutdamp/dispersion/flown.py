@@ -20,6 +20,9 @@ from nutdamp.physics.arc_cones import arc_cones
 
 Array = NDArray[np.float64]
 
+CASE, STEPPED = 2e-3, 1e-2
+"""Units of work: of a case and of each of its pulses, and of a step of a coast that is no arc."""
+
 
 @dataclass(frozen=True, eq=False)
 class RealWidths:
@@ -37,6 +40,14 @@ class RealWidths:
     @cached_property
     def _seen(self) -> list[bool]:
         return sun_fired.seen_nominally(self.model)
+
+    @cached_property
+    def effort(self) -> float:
+        """Units of `nutdamp.work` of a case: for each pulse, and for each step where coasts are no arcs."""
+        moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
+        arcs = self._bodies(moments).free
+        turned = 0.0 if arcs else float(np.linalg.norm(rates)) * self.model.schedule.end
+        return CASE * (1.0 + len(self.model.schedule)) + STEPPED * turned / rigid_cases.STRIDE
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""

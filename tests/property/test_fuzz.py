@@ -13,6 +13,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+from support.cases import spread
+from support.equipped import equipped
 from support.planner import Planner
 from support.process import within
 from support.random_bodies import power
@@ -29,6 +31,7 @@ INTERNAL = re.compile(r"internal error|Traceback|[a-z]Warning:|pydantic|scipy|nu
 SCRIPTED = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
 """What a page does not show."""
 
+MINUS_ZERO = re.compile(r"(?<![\w.e])-0(\.0*)?(?![\w.])")
 NOT_A_NUMBER = re.compile(r"(?<![\w.])[-+]?(nan|inf|infinity)(?!\w)", re.IGNORECASE)
 
 
@@ -208,6 +211,25 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 20_000)
     monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
     return one
+
+
+EVERY = (
+    "plan f.yaml --json -",
+    "simulate f.yaml --samples 50 --flown --csv -",
+    "disperse f.yaml --samples 300 --json -",
+    "loop f.yaml --json -",
+    "report f.yaml -o f.html --disperse 300",
+)
+"""What each file of `equipped` goes through."""
+
+
+@spread("seed", range(400), quick=0, deep=40)
+def test_files_over_the_whole_schema_get_results_or_reasons(seed: int, tmp_path: Path, planner: Planner) -> None:
+    (tmp_path / "f.yaml").write_text(json.dumps(equipped(seed), indent=1), encoding="utf-8")
+    for row in EVERY if seed % 5 == 0 else EVERY[:-1]:
+        done = within(tmp_path, *row.split())
+        assert problem_of(row.split(), done, tmp_path) == "", done.stderr[-500:]
+        assert not MINUS_ZERO.search(done.stdout + done.stderr), row
 
 
 @pytest.mark.weekly
