@@ -10,6 +10,7 @@ from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, EndTime
 from nutdamp.cli.progress import progress
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
+from nutdamp.errors import printable
 from nutdamp.schemes import Options
 
 
@@ -63,4 +64,4 @@ def command(
     with progress("filming", timed.frames, quiet=quiet) as step:
         deliver([(output, lambda: lambda stream: animation.film(stream, made, timed, output, width, step))])
     if output != "-":
-        remark(f"wrote {output}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")
+        remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")

@@ -12,6 +12,7 @@ from nutdamp.cli.flown import Flown, flown_options, plan_or_read
 from nutdamp.cli.job import begin, deliver
 from nutdamp.cli.parameters import FILE, EndTime, Named
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
+from nutdamp.errors import printable
 from nutdamp.files.exchange import FORMATS, MESSAGES, export_text, lacking
 from nutdamp.schemes import Options
 
@@ -65,7 +66,7 @@ def command(
     if missing is not None:
         job.doubt([missing])
     if output != "-":
-        job.remark(f"wrote {output}: {plan.scheme}, {len(plan.pulses)} pulses")
+        job.remark(f"wrote {printable(output)}: {plan.scheme}, {len(plan.pulses)} pulses")
     if Decision(plan).met is False:
         job.remark(f"{plan.scheme} does not meet the requirement")
         leave(missed=True)

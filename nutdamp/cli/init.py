@@ -8,6 +8,7 @@ from click.shell_completion import CompletionItem
 from nutdamp.cli.common import DEFAULT_FILE, quiet_option
 from nutdamp.cli.job import remarks
 from nutdamp.cli.parameters import FILE
+from nutdamp.errors import printable
 
 
 def _completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG001
@@ -42,7 +43,7 @@ def command(file: str, name: str | None, listed: bool, force: bool, quiet: bool)
         raise CannotWrite(file, "it is already there; --force replaces it")
     write_whole(file, text)
     if file != STDOUT:
-        remarks(quiet)(f"wrote {file}; plan it with: nutdamp plan {file}")
+        remarks(quiet)(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
 
 
 def _list() -> None:

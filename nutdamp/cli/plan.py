@@ -23,7 +23,7 @@ from nutdamp.cli.job import Output, begin
 from nutdamp.cli.parameters import FILE, SchemeName
 from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options, scheme_options
 from nutdamp.cli.screen import say
-from nutdamp.errors import BadRequest
+from nutdamp.errors import BadRequest, printable
 from nutdamp.schemes import PLANNED, Options
 from nutdamp.words import listed
 
@@ -107,7 +107,7 @@ def command(
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, one_plan)):
-        say(f"{path} was not written: no plan is feasible")
+        say(f"{printable(path)} was not written: no plan is feasible")
     proof, unproved = _certified(compared, [certificate, curve])
     if proof is not None and proof.plan is not chosen:
         job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")

@@ -20,6 +20,7 @@ from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
 from nutdamp.cli.progress import working
 from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, goal_options
 from nutdamp.cli.trade import trade_with
+from nutdamp.errors import printable
 from nutdamp.schemes import PLANNED, Options
 from nutdamp.schemes.options import LEAST
 
@@ -149,5 +150,5 @@ def command(
     if not made.good:
         job.remark(made.verdict)
     if output != "-":
-        job.remark(f"wrote {output}")
+        job.remark(f"wrote {printable(output)}")
     leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=made.met is False)

@@ -15,6 +15,7 @@ from nutdamp import __version__, schemes
 from nutdamp.aspect import Aspect
 from nutdamp.comparison import Comparison
 from nutdamp.decision import Decision, decide
+from nutdamp.errors import printable
 from nutdamp.fronts import Front
 from nutdamp.planning import Plan, unrounded
 from nutdamp.presentation import decisions, verdicts
@@ -269,14 +270,14 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Section:
 
 
 def _repeat(repeat: Repeat, dispersed: Results | None) -> Section:
-    blocks: list[Block] = [Listing("Command", repeat.command), Facts("Versions", tuple(_versions()))]
+    blocks: list[Block] = [Listing("Command", printable(repeat.command)), Facts("Versions", tuple(_versions()))]
     facts = [] if dispersed is None else [("seed of the dispersed cases", str(dispersed.study.seed))]
     if repeat.text:
         facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
     if facts:
         blocks.append(Facts("Input", tuple(facts)))
     if repeat.text:
-        blocks.append(Listing(f"Input file {repeat.name}", repeat.text.rstrip("\n")))
+        blocks.append(Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n")))
     if repeat.settings:
         blocks.append(Facts("Set in place of what the file says", repeat.settings))
     return Section("repeat", "To repeat it", tuple(blocks))

@@ -254,7 +254,7 @@ def test_shells_complete_commands_options_choices_topics_and_leave_files_to_the_
 
 @pytest.mark.deep
 def test_completion_is_that_of_a_process_called_nutdamp() -> None:
-    code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli import main; main()"
+    code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli.root import main; main()"
     asked = {"_NUTDAMP_COMPLETE": "bash_complete", "COMP_WORDS": "nutdamp plan sp", "COMP_CWORD": "2"}
     process = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True, check=False
@@ -305,7 +305,7 @@ def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str,
 def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
     code = (
-        "import os, sys\n{}\nfrom nutdamp.cli import main\nsys.argv = ['nutdamp', '--version']\ntry: main()\nfinally: "
+        "import os, sys\n{}\nfrom nutdamp.cli.root import main\nsys.argv = ['nutdamp', '--version']\ntry: main()\nfinally: "
     )
     code += "print(os.environ['OPENBLAS_NUM_THREADS'])"
     for given, used in (

@@ -136,7 +136,7 @@ def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
 LACKING = """
 import sys
 sys.modules[{package!r}] = None
-from nutdamp.cli import main
+from nutdamp.cli.root import main
 import nutdamp.comparison
 sys.argv = ["nutdamp", *{words!r}]
 nutdamp.comparison.compare = None
@@ -334,3 +334,15 @@ def test_a_long_name_leaves_no_warning_of_the_picture(run_apart: Run) -> None:
     ended = run_apart("report", str(places.case("long-name.yaml")), "--scheme", "two-pulse", "-o", "r.html")
     assert ended.returncode == 0
     assert "Warning" not in ended.stderr
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_what_steers_a_terminal_is_escaped_on_a_page(run: Run, tmp_path: Path) -> None:
+    name = "a\x1b[31m\nb.yaml"
+    (tmp_path / name).write_text(EXACT)
+    ended = run("report", name, "--scheme", "four-pulse", "-o", f"{name}.html")
+    page = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+    assert "\x1b" not in page
+    assert "a\\x1b[31m\\nb.yaml" in page
+    assert "a\\x1b[31m\\nb.yaml.html" in ended.stderr

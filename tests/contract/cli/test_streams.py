@@ -333,3 +333,9 @@ def test_where_such_names_are_shown_or_written_they_are_escaped_and_json_gives_t
     ended = run("check", f"{ODD}.yaml", "missing" + ODD, "--json", "-")
     assert [entry["file"] for entry in json.loads(ended.stdout)["files"]] == [f"{ODD}.yaml", "missing" + ODD]
     assert ended.stderr == "nutdamp: cannot read missingd\\udcfcse: no such file or directory\n"
+
+
+def test_an_interrupt_while_modules_are_imported_ends_quietly(run_apart: Run, tmp_path: Path) -> None:
+    (tmp_path / "click.py").write_text("raise KeyboardInterrupt")  # `python -m` looks here first
+    ended = run_apart("--version")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "interrupted\n")
