@@ -204,18 +204,18 @@ class Session:
         for item, after in zip(session.items, [*session.items[1:], None], strict=True):
             monitoring.restart_events()
             self.lines.clear()
-            start = time.process_time()
+            start, failed = time.process_time(), session.testsfailed
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=after)
             spent = time.process_time() - start
-            for place in self.lines:
-                self.seen[place].append((spent, item))
+            if session.testsfailed == failed:  # what fails without a mutant kills none
+                for place in self.lines:
+                    self.seen[place].append((spent, item))
         monitoring.set_events(monitoring.COVERAGE_ID, 0)
         monitoring.free_tool_id(monitoring.COVERAGE_ID)
         self.say(
             f"{len(session.items)} tests, {session.testsfailed} failed, {time.process_time() - begun:.0f} s of CPU"
         )
-        if not session.testsfailed:
-            self._mutate()
+        self._mutate()
         return True
 
     def _line(self, code: CodeType, line: int) -> Any:
@@ -273,7 +273,8 @@ class Session:
 
 
 def main() -> int:
-    """Draw, run, and print the rate; 1 where the tests fail without any mutant."""
+    """Draw, run, and print the rate."""
+    sys.path.remove(str(Path(__file__).parent))  # where Python finds the helpers as modules of their own, too
     options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     options.add_argument("package")
     options.add_argument("tests", nargs="*")

@@ -232,10 +232,11 @@ class _Search(Problem):
         try:
             return _Search(replace(self.spacecraft, channels=others), self.options)
         except Infeasible:
-            name, count = max(overtaxed.items(), key=lambda entry: entry[1])
-            longest = next(one.max_on_time for one in self.channels if one.name == name)
+            # Of opposite channels one program asks this one and another one that one for the same: their sum is told.
+            longest = max(one.max_on_time for one in self.channels if one.name in overtaxed)
+            count = sum(overtaxed.values())
             raise Infeasible(
-                f"{name} would have to fire {count:.3g} pulses, none longer than {longest:.3g} s (max_on_time)"
+                f"the channels would have to fire {count:.1g} pulses, none longer than {longest:.3g} s (max_on_time)"
             ) from None
 
     def astray(self, made: Schedule | None) -> bool:
