@@ -223,6 +223,16 @@ EVERY = (
 """What each file of `equipped` goes through."""
 
 
+FAULTY = (44,)
+"""Seeds of files that went wrong once."""
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize("seed", FAULTY)
+def test_files_that_went_wrong_once(seed: int, tmp_path: Path, planner: Planner) -> None:
+    test_files_over_the_whole_schema_get_results_or_reasons(seed, tmp_path, planner)
+
+
 @spread("seed", range(400), quick=0, deep=40)
 def test_files_over_the_whole_schema_get_results_or_reasons(seed: int, tmp_path: Path, planner: Planner) -> None:
     (tmp_path / "f.yaml").write_text(json.dumps(equipped(seed), indent=1), encoding="utf-8")

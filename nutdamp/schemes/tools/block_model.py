@@ -192,7 +192,8 @@ class BlockModel:
             return 0.0
         ratio = np.exp(-1.0 / cold.pulses + 1j * step)
         lacks = (1.0 - cold.first) * cold.decay(int(state.fired.get(channel.name, 0)))
-        return lacks * (1.0 - ratio**trial.count) / (1.0 - ratio)
+        with np.errstate(invalid="ignore"):  # blocks that would take H over the Sun have no step
+            return lacks * (1.0 - ratio**trial.count) / (1.0 - ratio)
 
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
         """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
