@@ -17,6 +17,7 @@ from nutdamp.physics import rigid_cases
 from nutdamp.physics.axis_watch import AxisWatch
 from nutdamp.physics.rigid_cases import Bodies, Stretch
 from nutdamp.physics.sun_clock import Push, SunClock
+from nutdamp.physics.valve import Opened
 from nutdamp.schemes.tools.sun_pulses import fire, pushes
 
 Array = NDArray[np.float64]
@@ -109,14 +110,17 @@ def seen_nominally(model: Model) -> list[bool]:
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:
     """The torques of thrusters through valves of their own, together, from one corner of any of them to the next."""
     torques = [np.array([part(one) for one in each.torque]) * seen for each in thrust]
-    corners = [[part(corner) for corner in each.opened.corners] for each in thrust]
-    edges = np.sort(np.array(corners).reshape(-1, len(seen)), axis=0)
+    opened = [
+        Opened(tuple(map(part, each.opened.corners)), part(each.opened.level))  # type: ignore[arg-type]  # four
+        for each in thrust
+    ]
+    edges = np.sort(np.array([each.corners for each in opened]).reshape(-1, len(seen)), axis=0)
     found = []
     for begin, end in pairwise(edges):
         middle, first, last = 0.5 * (begin + end), np.zeros_like(torques[0]), np.zeros_like(torques[0])
-        for each, torque in zip(thrust, torques, strict=True):
-            first = first + torque * part(each.opened.within(middle, begin))
-            last = last + torque * part(each.opened.within(middle, end))
+        for each, torque in zip(opened, torques, strict=True):
+            first = first + torque * each.within(middle, begin)
+            last = last + torque * each.within(middle, end)
         found.append(Push(begin, end, first, last))
     return found
 

@@ -113,7 +113,11 @@ def _feed(draws: Draws, file: dict[str, Any]) -> None:
     if draws.chance(0.2):
         file["cold"] = {"first": f"{draws.between(70.0, 99.0)} %", "pulses": draws.pick(1, 4, 10)}
     if draws.chance(0.3) and all("isp" in one for one in file["thrusters"]):
-        tank: dict[str, Any] = {"propellant": f"{power(draws.rng, -1.0, 1.5)} kg", "pressure": "22 bar", "final_pressure": "8 bar"}
+        tank: dict[str, Any] = {
+            "propellant": f"{power(draws.rng, -1.0, 1.5)} kg",
+            "pressure": "22 bar",
+            "final_pressure": "8 bar",
+        }
         if draws.chance(0.3):
             tank["exponent"] = draws.pick(0.8, 1, 1.2)
         if draws.chance(0.3):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from support import dispersed, reference
 from support.builders import cross, spinner
 from support.cases import deep, spread
-from support.flights import by_blocks
+from support.flights import BODY_ERRORS, by_blocks
 from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
@@ -220,6 +220,20 @@ def test_blocks_fire_what_their_valves_give(number: int) -> None:
     assert flown[:, number] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
     spun = flight.flown(true, made).settled.spin - true.spin
     assert flown[OUTPUTS.index("spin_change"), number] == pytest.approx(spun, abs=1e-9)
+
+
+def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what each valve does of its own; in as many parts as there may be."""
+    valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
+    channels = tuple(one.of(valve=valve) for one in BLOCKS["spin reversed"].spacecraft.channels)
+    late = {"T": dispersed.normal(0.01), "+1": dispersed.normal(0.01)}
+    given = replace(BODY_ERRORS, open_delay=late, close_delay=late)
+    whole = by_blocks(given, channels=channels)
+    model = Model(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
+    draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
+    at_once = outputs(RealWidths, model, draws)
+    monkeypatch.setattr("nutdamp.physics.rigid_cases.BLOCK", 5)
+    assert outputs(RealWidths, model, draws) == pytest.approx(at_once, abs=1e-12, nan_ok=True)
 
 
 @pytest.mark.parametrize("number", [deep(0), deep(3)])
