@@ -157,13 +157,17 @@ def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, 
 
 
 def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
-    """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time."""
+    """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time.
+
+    One whose torques cancel is none of them.
+    """
     time = spacecraft.horizon - spacecraft.limits.earliest
 
     def has_on_time(channel: Channel) -> bool:
         return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
 
-    return [channel for channel in spacecraft.channels if (channel.damps or axial) and has_on_time(channel)]
+    turning = [one for one in spacecraft.channels if one.damps or (axial and one.torque.any())]
+    return [channel for channel in turning if has_on_time(channel)]
 
 
 def commandable_widths(commands: Commands, channel: Channel) -> Vector:
