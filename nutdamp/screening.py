@@ -150,6 +150,11 @@ def _run(results: Results) -> Results:
     return run(results, threads=threads_here())
 
 
+def affordable(study: Study, samples: int) -> bool:
+    """Whether the budget of work that is open is enough for so many cases, which are flown at once."""
+    return study.flies.effort * samples <= work.left()
+
+
 def fly_compared(
     plans: Sequence[Plan],
     samples: int,
@@ -162,9 +167,10 @@ def fly_compared(
     """
     flown: dict[Plan, Candidate] = {}
     for plan in plans:
-        if not work.exhausted():
+        study = study_of(plan.spacecraft, plan.pulses)
+        if affordable(study, min(STAGES[0], samples)):
             with suppress(Infeasible):
-                flown[plan] = entered(plan, "", study_of(plan.spacecraft, plan.pulses), samples)
+                flown[plan] = entered(plan, "", study, samples)
     while not work.exhausted():
         first = _undecided(plans, flown, samples, choose)
         if first is None:

@@ -7,6 +7,7 @@ with the best found so far.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -77,6 +78,12 @@ def spend(units: float) -> None:
     while one is not None:
         one.done += units
         one = one.around
+
+
+def left() -> float:
+    """Units that are left of the budget that is open; endless without one."""
+    one = _budget.get()
+    return math.inf if one is None else max(one.most - one.done, 0.0)
 
 
 def exhausted() -> bool:

@@ -15,13 +15,13 @@ from nutdamp.dispersion.elementwise import Cases, Triple, rotated, triple
 from nutdamp.dispersion.kernel import Ends, carried
 from nutdamp.dispersion.watched import number_of, watch_of
 from nutdamp.dynamics import Dynamics, make_dynamics
-from nutdamp.physics import rigid_cases
+from nutdamp.physics import axis_watch, rigid_cases
 from nutdamp.physics.arc_cones import arc_cones
 
 Array = NDArray[np.float64]
 
-CASE, STEPPED = 2e-3, 1e-2
-"""Units of work: of a case and of each of its pulses, and of a step of a coast that is no arc."""
+CASE, STEPPED, LOOKED = 2e-3, 1e-2, 4e-3
+"""Units of work: of a case and of each of its pulses, of a step of a coast that is no arc, of a look at its axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,13 @@ class RealWidths:
 
     @cached_property
     def effort(self) -> float:
-        """Units of `nutdamp.work` of a case: for each pulse, and for each step where coasts are no arcs."""
+        """Units of `nutdamp.work` of a case: its pulses, and where coasts are no arcs, its steps and looks at cones."""
         moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
         arcs = self._bodies(moments).free
         turned = 0.0 if arcs else float(np.linalg.norm(rates)) * self.model.schedule.end
-        return CASE * (1.0 + len(self.model.schedule)) + STEPPED * turned / rigid_cases.STRIDE
+        looks = turned * axis_watch.ROWS / axis_watch.CIRCLE if self.model.spacecraft.keep else 0.0
+        stepping = STEPPED * turned / rigid_cases.STRIDE + LOOKED * looks
+        return CASE * (1.0 + len(self.model.schedule)) + stepping
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
+from support import places
 from support.builders import HALF_A_DEGREE, judged
 
 import nutdamp
@@ -14,7 +15,9 @@ from nutdamp import screening, work
 from nutdamp.comparison import Comparison, compare
 from nutdamp.decision import decide
 from nutdamp.dispersion import SEED, study
+from nutdamp.dispersion.flown import RealWidths
 from nutdamp.errors import Infeasible
+from nutdamp.files.spacecraft_file import load_spacecraft
 from nutdamp.planning import Plan
 from nutdamp.recommendation import Share, recommend
 from nutdamp.screening import Candidate, Cases
@@ -78,6 +81,7 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, floa
     monkeypatch.setattr(screening, "entered", entered)
     monkeypatch.setattr(screening, "_further", further)
     monkeypatch.setattr(screening, "study_of", lambda *_: None)
+    monkeypatch.setattr(screening, "affordable", lambda *_: not work.exhausted())
     return known
 
 
@@ -139,3 +143,14 @@ def test_more_cases_than_are_kept_one_by_one_are_counted_and_have_the_budget_of_
     decided = decide(counted)
     assert decided is not None
     assert (decided.unknown, decided.met) == (False, True)
+
+
+def test_what_costs_more_than_is_left_of_the_budget_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first cases are flown at once: they alone may take long, where coasts are no arcs and cones are looked at."""
+    body = load_spacecraft(places.case("rob2.yaml"))
+    monkeypatch.setattr(RealWidths, "effort", 1e9)
+    compared = compare(body, ["two-pulse"])
+    assert compared.flown == {}
+    decided = decide(compared)
+    assert decided is not None
+    assert (decided.unknown, decided.met) == (True, False)
