@@ -43,7 +43,7 @@ class RealWidths:
 
     @cached_property
     def effort(self) -> float:
-        """Units of `nutdamp.work` of a case: its pulses, and where coasts are no arcs, its steps and looks at cones."""
+        """Units of work of a case: its pulses, and where coasts are no arcs, its steps and looks at cones."""
         moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
         arcs = self._bodies(moments).free
         turned = 0.0 if arcs else float(np.linalg.norm(rates)) * self.model.schedule.end
